@@ -292,8 +292,8 @@ GALLERY = (
         "jumps",
         "motion",
         f"periodic {MOTION}/damper.toml --speeds 1000:5000rpm",
-        "A squeeze-film damper: between 2663 and 3056 rpm there are two stable motions; a run-up jumps down, a "
-        "run-down up.",
+        "A squeeze-film damper: between 2663 and 3056 rpm there are two stable motions; a run-up jumps "
+        "down, a run-down up.",
         dense=True,
     ),
     Picture(

@@ -15,6 +15,7 @@ from fem.model.node_forces import (
     JournalBearing,
     MuszynskaSeal,
     NodeForce,
+    ShortFilm,
     SqueezeFilm,
     Stop,
 )
@@ -38,12 +39,11 @@ def tables(forces: Sequence[NodeForce]) -> tuple[IndexArray, FloatArray]:
     codes = np.array([_CODES[type(force)] for force in forces], dtype=np.intp)
     values = np.zeros((len(forces), _WIDTH))
     for row, force in zip(values, forces, strict=True):
-        if isinstance(force, (JournalBearing, SqueezeFilm)):
-            L, D, c, eta = force.parameters[:4]
-            turns = isinstance(force, JournalBearing)
-            centred = 0.0 if isinstance(force, JournalBearing) else force.centring_stiffness
-            by_line = isinstance(force, JournalBearing) and force.film == "line of centres"
-            row[:5] = eta * L**3 * D / 2 / c**3, c, turns, by_line, centred
+        if isinstance(force, ShortFilm):
+            C = force.viscosity * force.length**3 * force.diameter / 2 / force.clearance**3
+            by_line = getattr(force, "film", "") == "line of centres"
+            centred = getattr(force, "centring_stiffness", 0.0)
+            row[:5] = C, force.clearance, isinstance(force, JournalBearing), by_line, centred
         else:
             row[: len(force.parameters)] = force.parameters
     return codes, values
@@ -59,10 +59,8 @@ def law(
     ----------
     code, v
         Of `tables`.
-    x, y, vx, vy
-        Of the node, m and m/s.
-    omega
-        Of the shaft, rad/s.
+    x, y, vx, vy, omega
+        Of the node, m and m/s, and of the shaft, rad/s.
     out
         Written: (F_x, F_y) in N and their derivatives by x, y, x', y' and Ω, shape (2, 6); NaN on or beyond
         the wall.

@@ -50,21 +50,18 @@ def short_film(  # noqa: PLR0913  what is compiled takes no objects
     line_of_centres: bool,
     out: FloatArray,
 ) -> None:
-    """Force on the journal and its derivatives.
+    """Force on the journal and its derivatives, as `fem.forces.laws.law` writes them.
 
     Parameters
     ----------
     C, c
         η L³ R / c³, N·s/m, and the radial clearance, m.
-    x, y, vx, vy
-        Of the journal, m and m/s, inside the clearance.
-    omega
-        Of the journal, rad/s; 0 for a damper.
+    x, y, vx, vy, omega
+        Of the journal, m, m/s and rad/s; Ω is 0 for a damper.
     line_of_centres
         Which film; False: where the pressure is positive.
     out
-        Written: (F_x, F_y) in N and their derivatives by x, y, x', y' and Ω, shape (2, 6); NaN on or beyond
-        the wall.
+        Written, shape (2, 6).
     """
     X, Y = x / c, y / c
     k2 = 1.0 - X * X - Y * Y

@@ -17,19 +17,9 @@ from rotorid.base.compiled import compiled_part
 
 @compiled_part
 def stop(v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray) -> None:
-    """Force on the shaft and its derivatives.
+    """Force on the shaft and its derivatives, as `fem.forces.laws.law` writes them; zeros without contact.
 
-    Parameters
-    ----------
-    v
-        Gap m, k N/m, c N·s/m, µ, the shaft's diameter 2 R m, v₀ m/s.
-    x, y, vx, vy
-        Of the shaft, m and m/s.
-    omega
-        Of the shaft, rad/s.
-    out
-        Written: (F_x, F_y) in N and their derivatives by x, y, x', y' and Ω, shape (2, 6); zeros without
-        contact.
+    `v`: gap m, k N/m, c N·s/m, µ, the shaft's diameter 2 R m, v₀ m/s.
     """
     out[:, :] = 0.0
     gap, k, c, mu, R, v0 = v[0], v[1], v[2], v[3], v[4] / 2, v[5]

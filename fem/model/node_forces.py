@@ -23,14 +23,12 @@ centres bounds, on the side where a steady journal's pressure is positive (the t
 
 @dataclass(frozen=True)
 class NodeForce:
-    """What all of them have; numbers are finite and not negative, those of `above_zero` above 0.
+    """What all of them have; their numbers are finite and not negative.
 
     Attributes
     ----------
-    node
-        Node number, from 1.
-    name
-        For messages and drawings.
+    node, name
+        From 1; for messages and drawings.
 
     Raises
     ------
@@ -42,6 +40,7 @@ class NodeForce:
     name: str = ""
 
     above_zero: ClassVar[tuple[str, ...]] = ()
+    """Numbers that must be so, 1e-30 at least."""
 
     def __post_init__(self) -> None:
         what = attachment(self)
@@ -49,8 +48,8 @@ class NodeForce:
             if item.type != "float":
                 continue
             value = number(getattr(self, item.name), f"{what}: {item.name}")
-            if value == 0 and item.name in self.above_zero:
-                raise ValueError(f"{what}: {item.name} must be above 0")
+            if value < 1e-30 and item.name in self.above_zero:
+                raise ValueError(f"{what}: {item.name} must be above 0, not {value:g}")
             object.__setattr__(self, item.name, value)
 
     @property
@@ -60,17 +59,27 @@ class NodeForce:
 
     @property
     def mass(self) -> float:
-        """Inertia that it adds at its node, kg."""
-        return 0.0
+        """Inertia that it adds at its node, kg: that of a seal's fluid."""
+        return float(getattr(self, "fluid_mass", 0.0))
 
     @property
     def wall(self) -> float:
-        """From the centre to where its law ends, m; infinite without a wall."""
-        return np.inf
+        """From the centre to where its law ends, m: its clearance; infinite without one."""
+        return float(getattr(self, "clearance", np.inf))
 
 
 @dataclass(frozen=True)
-class _ShortFilm(NodeForce):
+class ShortFilm(NodeForce):
+    """A film that is short along the shaft: up to half the diameter; a longer one carries less than it says.
+
+    Attributes
+    ----------
+    node, name
+        As of `NodeForce`.
+    length, diameter, clearance, viscosity
+        Along the shaft, and of the journal; radial, m; Pa·s.
+    """
+
     length: float = 0.0
     diameter: float = 0.0
     clearance: float = 0.0
@@ -78,31 +87,17 @@ class _ShortFilm(NodeForce):
 
     above_zero: ClassVar[tuple[str, ...]] = ("length", "diameter", "clearance", "viscosity")
 
-    @property
-    def wall(self) -> float:
-        """The radial clearance."""
-        return self.clearance
-
 
 @dataclass(frozen=True)
-class JournalBearing(_ShortFilm):
-    """A short plain journal bearing (Ocvirk).
-
-    It has no orientation: its film lies where the rotor's weight and motion put it. Lengths up to half the
-    diameter are short; a longer one carries less than this says.
+class JournalBearing(ShortFilm):
+    """A short plain journal bearing (Ocvirk), its film where the rotor's weight and motion put it.
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    length, diameter
-        Along the shaft, and of the journal, m.
-    clearance
-        Radial, m.
-    viscosity
-        Pa·s.
+    node, name, length, diameter, clearance, viscosity
+        As of `ShortFilm`.
     film
-        Where its film carries, see `Film`.
+        Where it carries, see `Film`.
     """
 
     film: Film = "pressure"
@@ -113,19 +108,13 @@ class JournalBearing(_ShortFilm):
 
 
 @dataclass(frozen=True)
-class SqueezeFilm(_ShortFilm):
+class SqueezeFilm(ShortFilm):
     """A short squeeze-film damper, its film where the pressure is positive; its ring does not turn.
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    length, diameter
-        Along the shaft, and of the journal, m.
-    clearance
-        Radial, m.
-    viscosity
-        Pa·s.
+    node, name, length, diameter, clearance, viscosity
+        As of `ShortFilm`.
     centring_stiffness
         N/m, of the spring that centres it; 0 for none.
     """
@@ -146,10 +135,8 @@ class MuszynskaSeal(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    stiffness, damping, fluid_mass
-        K₀ N/m, D₀ N·s/m, m kg.
+    node, name, stiffness, damping, fluid_mass
+        As of `NodeForce`; K₀ N/m, D₀ N·s/m, m kg.
     swirl_ratio
         τ₀, fluid's mean speed by the shaft's, about 0.5 or less.
     clearance
@@ -168,16 +155,6 @@ class MuszynskaSeal(NodeForce):
 
     above_zero: ClassVar[tuple[str, ...]] = ("clearance",)
 
-    @property
-    def mass(self) -> float:
-        """The fluid's."""
-        return self.fluid_mass
-
-    @property
-    def wall(self) -> float:
-        """The radial clearance."""
-        return self.clearance
-
 
 @dataclass(frozen=True)
 class CubicSpring(NodeForce):
@@ -185,10 +162,8 @@ class CubicSpring(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    stiffness, cubic_stiffness
-        k, N/m, and k₃, N/m³.
+    node, name, stiffness, cubic_stiffness
+        As of `NodeForce`; k, N/m, and k₃, N/m³.
     """
 
     stiffness: float = 0.0
@@ -204,16 +179,10 @@ class Stop(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    gap
-        m.
-    stiffness, damping
-        N/m, N·s/m of the contact.
-    friction
-        µ.
-    diameter
-        2 R of the shaft where it rubs, m.
+    node, name, gap, stiffness, damping
+        As of `NodeForce`; m; N/m and N·s/m of the contact.
+    friction, diameter
+        µ; 2 R of the shaft where it rubs, m.
     slip_speed
         v₀, m/s, below which friction grows with the slip.
     """
@@ -236,10 +205,8 @@ class InternalDamping(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    damping
-        c, N·s/m.
+    node, name, damping
+        As of `NodeForce`; c, N·s/m.
     """
 
     damping: float = 0.0
@@ -271,11 +238,5 @@ def kind_of(force: NodeForce) -> str:
 
 
 def in_order(forces: Iterable[NodeForce]) -> tuple[NodeForce, ...]:
-    """Sorted by their kinds, as files have them; of one kind as they are.
-
-    Raises
-    ------
-    ValueError
-        As `kind_of`.
-    """
+    """Sorted by `kind_of`, as files have them; of one kind as they are."""
     return tuple(sorted(forces, key=lambda force: names(FORCES).index(kind_of(force))))

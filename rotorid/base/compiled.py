@@ -22,33 +22,25 @@ def compiled(function: _F) -> _F:
 
 
 def compiled_part(function: _F) -> _F:
-    """The same for what compiled functions call: called from Python, a few times, it runs as Python does.
-
-    To load numba takes longer than some thousand such calls.
-    """
-    return Part(function) if COMPILED else function  # type: ignore[return-value, arg-type]
+    """The same for what those call: from Python it runs as Python, since to load numba takes a second."""
+    return Compiled(function, alone=False) if COMPILED else function  # type: ignore[return-value, arg-type]
 
 
 class Compiled:
     """A function that numba compiles at its first call: until then numba is not imported.
 
+    It may call others of this class by their global names; constants stand in the modules of such functions.
     Machine code is kept beside the module for the next start as long as its `stamp` is the same: numba alone
     would look at the file of the function only, and go on with old code of what it takes from other files.
-
-    Parameters
-    ----------
-    function
-        As Python has it, later `py_func`. It may call others of this class by their global names; constants
-        stand in the modules of these functions.
     """
 
-    def __init__(self, function: FunctionType) -> None:
+    def __init__(self, function: FunctionType, *, alone: bool = True) -> None:
         update_wrapper(self, function)
-        self.py_func = function
+        self.py_func, self.alone = function, alone
 
     def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401  as the function has them
         """As the function."""
-        return self.machine(*arguments)
+        return (self.machine if self.alone else self.py_func)(*arguments)
 
     @cached_property
     def machine(self) -> Callable[..., Any]:
@@ -72,11 +64,3 @@ class Compiled:
         for name in sorted(imported.keys() - {self.py_func.__module__}):
             digest.update(imported[name].stamp.encode())
         return digest.hexdigest()
-
-
-class Part(Compiled):
-    """One that Python calls as it is."""
-
-    def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401  as the function has them
-        """As the function."""
-        return self.py_func(*arguments)

@@ -1,9 +1,9 @@
-"""Picture of journal bearings: loci of the journals, stability map, stiffness and damping over speed."""
+"""Picture of journal bearings: loci of the journals, and stability map."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from fem.static import GRAVITY
 from rotorid.base.plot_style import (
     DARK,
     VERMILION,
-    legend_above,
     legend_below,
     look,
     new_figure,
@@ -19,8 +18,7 @@ from rotorid.base.plot_style import (
     plain,
     plain_numbers,
 )
-from rotorid.base.rpm import RPM, rpm_text
-from rotorid.motion.linear_coefficients import coefficients
+from rotorid.base.rpm import rpm_text
 from rotorid.motion.stability_map import always_stable_above, critical_mass
 
 if TYPE_CHECKING:
@@ -29,82 +27,45 @@ if TYPE_CHECKING:
 
     from rotorid.motion.equilibrium import Equilibrium
 
-_MARKED = 5
-"""Speeds that are marked on a locus."""
 
-
-def bearings_figure(found: Sequence[Equilibrium], labels: Sequence[str], threshold: float | None) -> Figure:
-    """Loci and stability map above a row of stiffness and damping for each bearing.
-
-    Parameters
-    ----------
-    found
-        At ascending speeds.
-    labels
-        Of the bearings, b of them.
-    threshold
-        Speed at which the rotor loses stability, rad/s, if it does.
-    """
-    figure = new_figure(3.6 + 2.2 * len(labels))
-    grid = figure.add_gridspec(1 + len(labels), 2, height_ratios=[3.4, *[2.2] * len(labels)])
-    locus, chart = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
-    draw_loci(found, labels, locus)
-    draw_stability_map(found, chart)
-    K, C = coefficients(found)
-    rpm = np.array([at.speed for at in found]) * RPM
-    walled = [k for k, force in enumerate(found[0].system.forces) if np.isfinite(force.wall)]
-    for row, (k, label) in enumerate(zip(walled, labels, strict=True), start=1):
-        for column, (values, sign, unit) in enumerate(((K / 1e6, "k", "MN/m"), (C / 1e3, "c", "kN·s/m"))):
-            ax = figure.add_subplot(grid[row, column])
-            for j, name in enumerate(("xx", "xy", "yx", "yy")):
-                ax.plot(rpm, values[:, k].reshape(-1, 4)[:, j], label=sign + name, **look(j))
-            if threshold is not None:
-                ax.axvline(threshold * RPM, color=VERMILION, linewidth=0.8)
-                side = 1 if 2 * threshold * RPM < rpm[0] + 1.4 * rpm[-1] else -1
-                style = {"color": VERMILION, "ha": "left" if side > 0 else "right"}
-                note(ax, "threshold", (threshold * RPM, ax.get_ylim()[1]), (2 * side, -9), **style)
-            ax.set(xlabel="speed, rpm" if row == len(labels) else "", ylabel=f"{label}\n{sign}, {unit}")
-            plain(ax)
-            if row == 1:
-                legend_above(ax, 4, handlelength=1.6, columnspacing=1.0)
+def bearings_figure(found: Sequence[Equilibrium], labels: Sequence[str]) -> Figure:
+    """Loci of the bearings, of some labels, and stability map, over ascending speeds."""
+    figure = new_figure(4.2)
+    locus, chart = figure.subplots(1, 2)
+    marked = np.unique(np.linspace(0, len(found) - 1, 5).round().astype(int)).tolist()
+    style = [look(k) | {"marker": "o", "markersize": 4, "markevery": marked} for k in range(len(labels))]
+    _draw_loci(found, labels, style, locus)
+    _draw_stability_map(found, style, chart)
     legend_below(figure, (locus,), 3, title="journals in the clearance circle and in the stability map")
     return figure
 
 
-def draw_loci(found: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> None:
-    """Path of each journal in its clearance circle over speed, with the direction of its load."""
+def _draw_loci(
+    found: Sequence[Equilibrium], labels: Sequence[str], style: Sequence[dict[str, Any]], ax: Axes
+) -> None:
+    """Path of each journal in its clearance circle over speed, with the directions of load and rotation."""
     turn = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
     ax.plot(turn.real, turn.imag, color=DARK)
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in found])
-    marked = np.unique(np.linspace(0, len(found) - 1, _MARKED).round().astype(int)).tolist()
-    for k, label in enumerate(labels):
-        ax.plot(
-            Z[:, k].real, Z[:, k].imag, label=label, marker="o", markersize=4, markevery=marked, **look(k)
-        )
+    for path, label, own in zip(Z.T, labels, style, strict=True):
+        ax.plot(path.real, path.imag, label=label, **own)
     for end in (0, -1):
-        side = 1 if end == 0 and abs(Z[0, 0]) < 0.6 else -1  # where neither wall nor the other speed is
-        shift, words = (7.0 * side, 0.0), rpm_text(found[end].speed)
-        note(
-            ax,
-            words,
-            (Z[end, 0].real, Z[end, 0].imag),
-            shift,
-            ha="left" if side > 0 else "right",
-            va="center",
-        )
+        inwards = end == 0 and abs(Z[0, 0]) < 0.6  # where neither wall nor the other speed is
+        shift, side = ((7.0, 0.0), "left") if inwards else ((-7.0, 0.0), "right")
+        at = (Z[end, 0].real, Z[end, 0].imag)
+        note(ax, rpm_text(found[end].speed), at, shift, ha=side, va="center")
+    arrow = {"arrowstyle": "-|>", "color": DARK}
     load = found[-1].load.sum()
-    if load:
-        tip = 0.32 * load / abs(load)
-        style = {"arrowstyle": "-|>", "color": DARK}
-        ax.annotate("", (-0.4 + tip.real, 0.45 + tip.imag), (-0.4, 0.45), arrowprops=style)
-        note(ax, "load", (-0.4, 0.45), (0, 4), color=DARK, ha="center")
-    ax.annotate("", (0.36, 0.6), (0.52, 0.4), arrowprops={**style, "connectionstyle": "arc3,rad=0.25"})
+    tip = 0.32 * load / (abs(load) or 1.0)
+    ax.annotate("", (-0.4 + tip.real, 0.45 + tip.imag), (-0.4, 0.45), arrowprops=arrow)
+    note(ax, "load" if load else "no load", (-0.4, 0.45), (0, 4), color=DARK, ha="center")
+    ax.annotate("", (0.36, 0.6), (0.52, 0.4), arrowprops={**arrow, "connectionstyle": "arc3,rad=0.25"})
     note(ax, "Ω", (0.46, 0.54), (2, 2), color=DARK)
     ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
     plain(ax)
 
 
-def draw_stability_map(found: Sequence[Equilibrium], ax: Axes) -> None:
+def _draw_stability_map(found: Sequence[Equilibrium], style: Sequence[dict[str, Any]], ax: Axes) -> None:
     """Critical mass number of a rigid rotor over eccentricity, and where the bearings are over speed.
 
     The mass that a bearing carries is its load by gravity.
@@ -113,14 +74,13 @@ def draw_stability_map(found: Sequence[Equilibrium], ax: Axes) -> None:
     M = critical_mass(e)[0]
     ax.plot(e, M, color=DARK)
     ax.fill_between(e, M, 1e3, color=VERMILION, alpha=0.14, linewidth=0)
-    E = np.array([at.eccentricity for at in found])
-    walls = np.array([one.wall for one in found[0].bearings])
-    numbers = walls * np.array([[at.speed] for at in found]) ** 2 / GRAVITY
-    marked = np.unique(np.linspace(0, len(found) - 1, _MARKED).round().astype(int)).tolist()
-    for k in np.flatnonzero(np.isfinite(found[0].sommerfeld)):
-        ax.plot(E[:, k], numbers[:, k], marker="o", markersize=4, markevery=marked, **look(int(k)))
+    low, high = 0.5, 100.0
+    for k in np.flatnonzero(np.isfinite(found[0].sommerfeld)).tolist():
+        numbers = found[0].bearings[k].wall * np.array([at.speed for at in found]) ** 2 / GRAVITY
+        ax.plot([at.eccentricity[k] for at in found], numbers, **style[k])
+        low, high = min(low, 0.7 * numbers.min()), max(high, 2 * numbers.max())
     note(ax, "a rigid rotor\nis unstable", (0.08, 20.0), color=VERMILION)
-    ax.set(xlim=(0, 1), ylim=(min(0.5, numbers.min()), max(100.0, 2 * numbers.max())), yscale="log")
+    ax.set(xlim=(0, 1), ylim=(low, high), yscale="log")
     ax.set(xlabel="eccentricity by clearance", ylabel="mass number m c Ω² / W")
     plain_numbers(ax)
     plain(ax)

@@ -34,18 +34,14 @@ class Equilibrium:
 
     Attributes
     ----------
-    system
-        What rests.
-    speed
-        rad/s.
+    system, speed
+        What rests, and its speed, rad/s.
     q
         Of all unknowns, shape (n,), m and rad.
     bearings
         The forces with a wall: journal bearings, squeeze films, seals; b of them.
     load
         On each of these, from the shaft, complex: x + iy, N, shape (b,).
-    residual
-        Largest force that is left over, by the weight.
     """
 
     system: MotionSystem
@@ -53,7 +49,6 @@ class Equilibrium:
     q: FloatArray
     bearings: tuple[NodeForce, ...]
     load: ComplexArray
-    residual: float
 
     @property
     def position(self) -> ComplexArray:
@@ -63,7 +58,7 @@ class Equilibrium:
     @property
     def eccentricity(self) -> FloatArray:
         """Of the shaft by the clearance, shape (b,)."""
-        return np.abs(self.position) / self._walls
+        return np.abs(self.position) / [one.wall for one in self.bearings]
 
     @property
     def attitude(self) -> FloatArray:
@@ -71,27 +66,14 @@ class Equilibrium:
         return np.asarray(np.angle(self.position * self.load.conj()))
 
     @property
-    def film(self) -> FloatArray:
-        """Smallest thickness of the film, m, shape (b,)."""
-        return self._walls - np.abs(self.position)
-
-    @property
     def sommerfeld(self) -> FloatArray:
         """Of each journal bearing, S = η N L D / W (R / c)² with N in 1/s, shape (b,); NaN of others."""
-        revolutions = self.speed / (2 * np.pi)
-        return np.array(
-            [
-                one.viscosity * revolutions * one.length * one.diameter / abs(W)
-                * (one.diameter / 2 / one.clearance) ** 2
-                if isinstance(one, JournalBearing) and W
-                else np.nan
-                for one, W in zip(self.bearings, self.load, strict=True)
-            ]
-        )  # fmt: skip
-
-    @property
-    def _walls(self) -> FloatArray:
-        return np.array([one.wall for one in self.bearings])
+        S = np.full(len(self.bearings), np.nan)
+        for k, (one, W) in enumerate(zip(self.bearings, np.abs(self.load), strict=True)):
+            if isinstance(one, JournalBearing) and W:
+                drag = one.viscosity * self.speed / (2 * np.pi) * one.length * one.diameter
+                S[k] = drag / W * (one.diameter / 2 / one.clearance) ** 2
+        return S
 
 
 def equilibria(system: MotionSystem, speeds: Sequence[float]) -> tuple[Equilibrium, ...]:
@@ -109,10 +91,8 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
 
     Parameters
     ----------
-    system
-        With its weight.
-    speed
-        rad/s, above 0 where there is a journal bearing.
+    system, speed
+        With its weight; rad/s, above 0 where there is a journal bearing.
     start
         Where the search begins, (n,), such as the equilibrium at a speed near by; None: at the centres.
 
@@ -128,12 +108,13 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
         raise ValueError(f"speed 0: {named(journal)} carries nothing at rest; give speeds above 0")
     resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
     K = system.linear(speed)[1]
-    _check_held(system, _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1], speed)
-    q = _solved(resting, K, speed, start)
-    residual = _left_over(resting, K, q, speed, 1.0)[0]
+    J = _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1]
+    if start is None:
+        _check_held(system, J, speed)
+    q = _condensed(resting, K, speed, start)
     _check_walls(system, q, speed)
-    left = float(np.abs(residual).max() / (np.abs(system.weight).sum() or 1.0))
-    if not left <= _LOST:
+    if not np.abs(_left_over(resting, K, q, speed, 1.0)[0]).max() <= _LOST * np.abs(system.weight).sum():
+        _check_held(system, J, speed)
         raise ValueError(
             f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
         )
@@ -141,7 +122,7 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
     load = -each_force(resting, q, speed)[walled, :, 0]
     q.setflags(write=False)
     bearings = tuple(system.forces[k] for k in walled)
-    return Equilibrium(system, speed, q, bearings, load[:, 0] + 1j * load[:, 1], left)
+    return Equilibrium(system, speed, q, bearings, load[:, 0] + 1j * load[:, 1])
 
 
 def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
@@ -158,6 +139,26 @@ def _left_over(
     """Forces that are left over under a share of the weight, and minus their derivative."""
     F, F_q, *_ = system.acting(q, np.zeros(system.size), speed)
     return share * system.weight + F - K @ q, K - F_q
+
+
+def _condensed(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
+    """The equilibrium: what has no force of its own follows the rest in a straight line."""
+    at = np.unique(system.law_tables[2])
+    others = np.setdiff1d(np.arange(system.size), at)
+    known = np.column_stack((system.weight[others], -K[np.ix_(others, at)]))
+    follow = np.linalg.solve(K[np.ix_(others, others)], known)
+    across = K[np.ix_(at, others)]
+    part = replace(
+        system,
+        coordinates=tuple(system.coordinates[i] for i in at),
+        weight=system.weight[at] - across @ follow[:, 0],
+    )
+    q = np.empty(system.size)
+    q[at] = _solved(
+        part, K[np.ix_(at, at)] + across @ follow[:, 1:], speed, None if start is None else start[at]
+    )
+    q[others] = follow[:, 0] + follow[:, 1:] @ q[at]
+    return q
 
 
 def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:

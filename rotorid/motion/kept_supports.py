@@ -17,20 +17,23 @@ import numpy as np
 
 import fem
 from fem.matrices.banded_matrices import assemble, multiply
-from fem.model.node_forces import JournalBearing, SqueezeFilm, kind_of
+from fem.model.node_forces import JournalBearing, SqueezeFilm
 from fem.static import GRAVITY
 from rotorid.base.arrays import FloatArray
-from rotorid.base.text import listing
+from rotorid.base.text import listing, percent
 from rotorid.motion.small_model import SmallModel
 from rotorid.reduction import small_rotor
 
 _RIGID = 1e7  # stiffness of a rigid support by that of a shaft on two of them
+_NEAR = 0.05  # of a natural frequency: beyond, it is told
 
 _FIRST = 1e7  # weight of mass and moment by that of the shares
 
 
-def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
+def held_rigidly(rotor: fem.Rotor, stiffness: float = _RIGID) -> fem.Rotor:
     """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
+
+    `stiffness` of a support is by that of the shaft, 48 E I / l³.
 
     Raises
     ------
@@ -44,7 +47,7 @@ def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
             f"bearings and squeeze films: two nodes at least are needed, this rotor has {len(nodes)}"
         )
     bending = float((rotor.youngs_modulus * rotor.second_moment).max())
-    stiffness = _RIGID * 48 * bending / float(np.sum(rotor.length)) ** 3
+    stiffness *= 48 * bending / float(np.sum(rotor.length)) ** 3
     tilting = {node: sum(s.tilting_stiffness for s in rotor.supports if s.node == node) for node in nodes}
     return replace(
         rotor,
@@ -100,7 +103,7 @@ def keep_supports(
     order = np.argsort(small.kept)
     grid = np.ix_(order, order)
     along = tuple(int(small.kept[i]) for i in order)
-    return SmallModel(
+    made = SmallModel(
         nodes=along,
         masses=found[order],
         weight=GRAVITY * weights[order],
@@ -110,8 +113,8 @@ def keep_supports(
         damping=damping[grid],
         supports=[replace(support, tilting_stiffness=0.0) for support in rotor.supports],
         forces=rotor.forces,
-        warnings=(*small.warnings, *_of_masses(rotor, along, found[order])),
     )
+    return replace(made, warnings=(*small.warnings, *_of_masses(rotor, made)))
 
 
 def check_free(held: Sequence[int], nodes: Sequence[int]) -> None:
@@ -137,11 +140,12 @@ def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> F
     """
     from scipy.optimize import lsq_linear
 
-    scale = np.sqrt(np.maximum(shares, 1e-3 * shares.max()))
+    largest = np.abs(shares).max()  # an overhang or a mass nearby may lift what a node carries
+    scale = np.sqrt(np.maximum(shares, 1e-3 * largest))
     length = float(np.ptp(at))
     rows = _FIRST * np.stack((np.ones_like(at), (at - at.mean()) / length)) * scale
     wanted = _FIRST * np.array([mass, (moment - mass * at.mean()) / length])
-    least = np.maximum(0.1 * shares, 0.01 * shares.max()) / scale
+    least = np.maximum(0.1 * shares, 0.01 * largest) / scale
     found = lsq_linear(
         np.vstack((rows, np.eye(len(at)))),
         np.concatenate((wanted, shares / scale)),
@@ -152,20 +156,36 @@ def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> F
     return np.asarray(scale * found.x)
 
 
-def _of_masses(rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray) -> list[str]:
-    said = []
-    total = rotor.total_mass
-    if abs(masses.sum() / total - 1) > 1e-9:
+def _of_masses(rotor: fem.Rotor, model: SmallModel) -> list[str]:
+    """What is wrong with the masses, in words."""
+    said, total = [], rotor.total_mass
+    if abs(model.masses.sum() / total - 1) > 1e-9:
         said.append(
-            f"the masses found are too large to leave some for the supports: together {masses.sum():.1f} kg "
-            f"of the rotor's {total:.1f} kg; use other nodes or more modes"
+            "the masses found are too large to leave some for the supports: together "
+            f"{model.masses.sum():.1f} kg of the rotor's {total:.1f} kg; use other nodes or more modes"
         )
-    bare = [node for node, mass in zip(nodes, masses, strict=True) if mass == 0]
-    for node in bare:
-        kinds = [kind_of(force).replace("_", " ") for force in rotor.forces if force.node == node]
-        kinds += [support.kind for support in rotor.supports if support.node == node]
+    if (off := _on_springs(rotor, model)) > _NEAR:
         said.append(
-            f"no mass stands at node {node} ({listing(kinds, 'and')}): the shaft follows there without "
-            "inertia; better let a mass stand there, with --nodes"
+            "on springs as stiff as the shaft, in place of the rigid supports, its first two natural "
+            f"frequencies are off by {percent(off)} %: use other nodes or more masses"
+        )
+    if bare := [str(node) for node, mass in zip(model.nodes, model.masses, strict=True) if mass == 0]:
+        said.append(
+            f"no mass stands at node {listing(bare, 'and')}, where supports or forces act: the shaft follows "
+            "there without inertia; better let a mass stand there, with --nodes"
         )
     return said
+
+
+def _on_springs(rotor: fem.Rotor, model: SmallModel) -> float:
+    """Largest relative error of the first two natural frequencies on springs as stiff as the shaft."""
+    from scipy.linalg import eigh
+
+    sprung = held_rigidly(rotor, 1.0)
+    still = replace(sprung, model=replace(rotor.model, gyroscopic=False))
+    K = model.stiffness.copy()
+    for support in sprung.supports:
+        i = model.nodes.index(support.node)
+        K[i, i] += support.stiffness
+    periods = eigh(np.diag(model.masses), K, eigvals_only=True)[:-3:-1]
+    return float(np.abs(periods**-0.5 / fem.critical_speeds(still, 2).frequencies - 1).max())

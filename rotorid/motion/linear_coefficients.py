@@ -75,7 +75,7 @@ def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibriu
     """
     lowest, highest = found[0].speed, found[-1].speed
     start = max(lowest, 1e-3 * highest)
-    more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1]
+    more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1].tolist()
     known = {one.speed: one for one in (*found[:: 1 + len(found) // _MANY], found[-1])}
     known |= {one.speed: one for one in equilibria(system, more)}
     every = [known[speed] for speed in sorted(known)]

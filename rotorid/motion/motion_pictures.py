@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     BOX,
     DARK,
@@ -35,47 +35,46 @@ _LARGEST_ORDER = 4.0
 _STEADY = 1000
 """Speeds of the steady response."""
 _PANELS = 4
-_MARKED = 0.3
-"""Of the largest vector: smaller ones have no speed written beside them."""
+_LOWEST_PHASE = -315.0
+"""Degrees; phases stand from here on through a whole turn."""
+_STEADY_LABEL = "dotted: steady, of the linear rotor"
 
 
 def motion_figure(motion: MotionRun) -> Figure:
-    """Of each node x and y over time, and beside them the spectrum of the last part."""
-    shown = range(min(len(motion.nodes), _PANELS))
+    """Of each node x and y over time, and at a constant speed the spectrum of the second half beside them."""
+    shown, constant = _shown(motion), motion.speeds[0] == motion.speeds[1]
     figure = new_figure(1.2 + 1.9 * len(shown))
-    axes = np.atleast_2d(figure.subplots(len(shown), 2, sharex="col", width_ratios=[3, 2]))
-    for row, (over_time, lines) in enumerate(axes):
-        z = 1e6 * motion.z[:, row]
-        for k, (name, values) in enumerate((("x", z.real), ("y", z.imag))):
-            over_time.plot(motion.time, values, label=name, linewidth=0.7, color=look(k)["color"])
-        over_time.set_ylabel(f"node {motion.nodes[row]}, µm")
-        _draw_spectrum(motion, row, lines)
-        plain(over_time)
-        plain(lines)
+    widths = [3, 2] if constant else [1]
+    axes = figure.subplots(len(shown), len(widths), sharex="col", width_ratios=widths, squeeze=False)
+    for i, row in zip(shown, axes, strict=True):
+        for k, (name, values) in enumerate((("x", motion.z[:, i].real), ("y", motion.z[:, i].imag))):
+            row[0].plot(motion.time, 1e6 * values, label=name, linewidth=0.7, color=look(k)["color"])
+        row[0].set_ylabel(f"node {motion.nodes[i]}, µm")
+        if constant:
+            _draw_spectrum(motion, i, row[1])
+        for ax in row:
+            plain(ax)
     axes[-1, 0].set_xlabel("time, s")
+    if constant:
+        axes[-1, 1].set_xlabel("frequency, cycles a turn" if motion.speeds[0] else "frequency, Hz")
+        axes[0, 1].legend(frameon=False, fontsize="small")
     legend_below(figure, [axes[0, 0]])
     return figure
 
 
 def orbits_figure(motion: MotionRun) -> Figure:
     """Of each node the last turns, a dot at each turn, and the clearance circle of its bearing."""
-    shown = range(min(len(motion.nodes), _PANELS))
-    columns = min(2, len(shown))
-    rows = -(-len(shown) // columns)
-    figure = new_figure(0.9 + 3.2 * rows)
-    walls = {force.node: 1e6 * force.wall for force, _ in motion.bearings}
-    for i in shown:
-        ax = figure.add_subplot(rows, columns, i + 1)
+    figure, panels = _panels(motion)
+    walls = {i: 1e6 * force.wall for force, i in motion.bearings}
+    for i, ax in panels:
         _draw_orbit(motion, i, ax)
-        if wall := walls.get(motion.nodes[i]):
+        if wall := walls.get(i):
             ax.axhline(0, color=QUIET, linewidth=0.5)
             ax.axvline(0, color=QUIET, linewidth=0.5)
             turn = wall * np.exp(1j * np.linspace(0, 2 * np.pi, 181))
             ax.plot(turn.real, turn.imag, color=DARK, linewidth=1.2)
             note(ax, "clearance", (0.0, wall), (0, 2), color=DARK, ha="center")
-        ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
-        ax.set_aspect("equal", adjustable="datalim")
-        plain(ax)
+        ax.set(xlabel="x, µm", ylabel="y, µm")
     legend_below(figure, figure.axes)
     return figure
 
@@ -84,19 +83,17 @@ def bode_figure(motion: MotionRun) -> Figure:
     """Synchronous part of the deflection in x of a run-up over speed, beside the steady response."""
     figure = new_figure(5.2)
     above, below = figure.subplots(2, sharex=True, height_ratios=[3, 2])
-    for i, (speed, X, steady_at, steady) in enumerate(_beside(motion)):
-        color, name = look(i)["color"], f"node {motion.nodes[i]}"
-        for at, value, style, words in (
-            (speed, X, "-", name),
-            (steady_at, steady, ":", f"{name}, steady, linear"),
-        ):
-            above.plot(at * RPM, 1e6 * np.abs(value), style, color=color, label=words)
-            phase = np.degrees(np.unwrap(np.angle(value)))
-            if value is X and steady.size:  # as many turns as the steady response, at the end
-                phase -= 360 * np.round((phase[-1] - np.degrees(np.unwrap(np.angle(steady)))[-1]) / 360)
-            below.plot(at * RPM, phase, style, color=color)
+    run, steady = _synchronous(motion), _steady(motion)
+    for k, i in enumerate(_shown(motion)):
+        for (speed, X), style, label in ((steady, ":", ""), (run, "-", f"node {motion.nodes[i]}")):
+            drawn = {"linestyle": style, "color": look(k)["color"], "label": label}
+            above.plot(speed * RPM, 1e6 * np.abs(X[:, i]), **drawn)
+            phase = (np.angle(X[:, i], deg=True) - _LOWEST_PHASE) % 360 + _LOWEST_PHASE
+            phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
+            below.plot(speed * RPM, phase, **drawn)
+    above.plot([], [], ":", color=DARK, label=_STEADY_LABEL)
     above.set(ylabel="1× of x, µm", ylim=(0, None))
-    below.set(xlabel="speed, rpm", ylabel="phase lead, °")
+    below.set(xlabel="speed, rpm", ylabel="phase lead, °", yticks=range(-270, 1, 90))
     for ax in (above, below):
         plain(ax)
     legend_below(figure, [above])
@@ -105,22 +102,19 @@ def bode_figure(motion: MotionRun) -> Figure:
 
 def polar_figure(motion: MotionRun) -> Figure:
     """The same as vectors in the plane, with a few speeds."""
-    figure = new_figure(5.6, 6.0)
-    ax = figure.add_subplot()
-    for i, (speed, X, _, steady) in enumerate(_beside(motion)):
-        color, name = look(i)["color"], f"node {motion.nodes[i]}"
-        ax.plot(1e6 * X.real, 1e6 * X.imag, "-", color=color, label=name)
-        ax.plot(1e6 * steady.real, 1e6 * steady.imag, ":", color=color, label=f"{name}, steady, linear")
-        for k in _marked(X) if i == 0 else []:
-            at = (1e6 * X[k].real, 1e6 * X[k].imag)
-            ax.plot(*at, "o", color=color, markersize=4)
-            note(ax, f"{speed[k] * RPM:.4g} rpm", at, (4, 3), bbox=BOX)
-    ax.axhline(0, color=GRID)
-    ax.axvline(0, color=GRID)
-    ax.set(xlabel="1× of x, cosine, µm", ylabel="sine, with phase lead upwards, µm")
-    ax.set_aspect("equal", adjustable="datalim")
-    plain(ax)
-    legend_below(figure, [ax])
+    figure, panels = _panels(motion)
+    (speed, X), (_, steady) = _synchronous(motion), _steady(motion)
+    for i, ax in panels:
+        run, linear = 1e6 * X[:, i], 1e6 * steady[:, i]
+        ax.axhline(0, color=GRID)
+        ax.axvline(0, color=GRID)
+        ax.plot(linear.real, linear.imag, ":", color=DARK, label=_STEADY_LABEL)
+        ax.plot(run.real, run.imag, "-", color=look(0)["color"], label="this motion")
+        for k in _apart(run):
+            ax.plot(run[k].real, run[k].imag, "o", color=look(0)["color"], markersize=4)
+            note(ax, f"{speed[k] * RPM:.4g} rpm", (run[k].real, run[k].imag), (4, 3), bbox=BOX)
+        ax.set(xlabel="1× of x, cosine, µm", ylabel="sine, lead upwards, µm")
+    legend_below(figure, figure.axes)
     return figure
 
 
@@ -133,26 +127,40 @@ FIGURES: Mapping[str, Callable[[MotionRun], Figure]] = {
 """By what a picture shows."""
 
 
+def _shown(motion: MotionRun) -> list[int]:
+    """Columns of nodes that are drawn, those of bearings first of all."""
+    bearings = [i for _, i in motion.bearings]
+    return sorted(sorted(range(len(motion.nodes)), key=lambda i: i not in bearings)[:_PANELS])
+
+
+def _panels(motion: MotionRun) -> tuple[Figure, list[tuple[int, Axes]]]:
+    """A panel of equal scales for each node."""
+    shown = _shown(motion)
+    columns = min(2, len(shown))
+    rows = -(-len(shown) // columns)
+    figure = new_figure(0.9 + 3.2 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax in axes[len(shown) :]:
+        ax.remove()
+    panels = list(zip(shown, axes, strict=False))
+    for i, ax in panels:
+        ax.set_title(f"node {motion.nodes[i]}")
+        ax.set_aspect("equal", adjustable="datalim")
+        plain(ax)
+    return figure, panels
+
+
 def _draw_spectrum(motion: MotionRun, i: int, ax: Axes) -> None:
     """Amplitude of what whirls with the rotation and against it, over orders, or Hz where nothing turns."""
-    k = motion.time.size // 2 if motion.speeds[0] == motion.speeds[1] else 0
-    z = motion.z[k:, i] - motion.z[k:, i].mean()
+    z = motion.z[motion.time.size // 2 :, i]
     weight = np.hanning(z.size + 2)[1:-1]
-    lines = 2e6 * np.abs(np.fft.fft(weight * z)) / weight.sum() / 2
-    frequency = np.fft.fftfreq(z.size, motion.time[1] - motion.time[0])
-    turns = motion.speeds[1] / (2 * np.pi) if motion.speeds[0] == motion.speeds[1] else 0.0
-    largest = _LARGEST_ORDER if turns else _LARGEST_ORDER * max(motion.speeds) / (2 * np.pi) / 2
-    order = frequency / (turns or 1.0)
-    for sign, words, style in ((1, "with the rotation", look(0)), (-1, "against it", look(1))):
-        part = (sign * order > 0) & (sign * order < (largest or np.inf))
-        shown = np.argsort(sign * order[part])
-        ax.plot(sign * order[part][shown], lines[part][shown], label=words, **{**style, "linewidth": 1.0})
-    ax.set_ylabel("amplitude, µm")
-    ax.set_ylim(0, None)
-    if i == min(len(motion.nodes), _PANELS) - 1:
-        ax.set_xlabel("frequency, cycles a turn" if turns else "frequency, Hz")
-    if i == 0:
-        ax.legend(frameon=False, fontsize="small")
+    lines = 1e6 * np.abs(np.fft.fft(weight * (z - z.mean()))) / weight.sum()
+    order = np.fft.fftfreq(z.size, motion.time[1]) / (motion.speeds[0] / (2 * np.pi) or 1.0)
+    for sign, label, style in ((1, "with the rotation", look(0)), (-1, "against it", look(1))):
+        part = (sign * order > 0) & ((sign * order < _LARGEST_ORDER) | (motion.speeds[0] == 0))
+        at = np.argsort(sign * order[part])
+        ax.plot(sign * order[part][at], lines[part][at], label=label, **{**style, "linewidth": 1.0})
+    ax.set(ylabel="amplitude, µm", ylim=(0, None))
 
 
 def _draw_orbit(motion: MotionRun, i: int, ax: Axes) -> None:
@@ -168,19 +176,25 @@ def _draw_orbit(motion: MotionRun, i: int, ax: Axes) -> None:
         ax.plot(at.real, at.imag, "o", markersize=4, color=VERMILION, label="once a turn")
 
 
-def _beside(motion: MotionRun) -> list[tuple[np.ndarray, ComplexArray, np.ndarray, ComplexArray]]:
-    """Of each node: speeds and synchronous part, speeds and steady response of the linear rotor, in x."""
-    first, last = motion.speeds
-    if first == last:
+def _synchronous(motion: MotionRun) -> tuple[FloatArray, ComplexArray]:
+    if motion.speeds[0] == motion.speeds[1]:
         raise ValueError("at a constant speed there is no curve over speed: --run-up has one")
-    speed, X = synchronous_part(motion)
-    at, _, response = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), _STEADY))
-    columns = [motion.system.index(node)[0] for node in motion.nodes]
-    return [(speed, X[:, i], at, response[:, column]) for i, column in enumerate(columns)][:_PANELS]
+    return synchronous_part(motion)
 
 
-def _marked(X: ComplexArray, count: int = 9) -> list[int]:
-    """Places evenly along a curve, where it is far from the centre."""
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(X)))])
-    places = np.searchsorted(way, np.linspace(0, way[-1], count)).clip(0, X.size - 1)
-    return [int(k) for k in places if abs(X[k]) > _MARKED * np.abs(X).max()]
+def _steady(motion: MotionRun) -> tuple[FloatArray, ComplexArray]:
+    """Speeds and steady response of the linear rotor in x at the nodes."""
+    at, _, response = steady_linear(
+        motion.system, np.linspace(min(motion.speeds), max(motion.speeds), _STEADY)
+    )
+    return at, response[:, [motion.system.index(node)[0] for node in motion.nodes]]
+
+
+def _apart(curve: ComplexArray, count: int = 6) -> list[int]:
+    """Places evenly along a curve that are not near each other."""
+    way = np.cumsum(np.abs(np.diff(curve, prepend=curve[0])))
+    found: list[int] = []
+    for k in np.searchsorted(way, np.linspace(0, way[-1], count + 2)[1:-1]):
+        if all(abs(curve[k] - curve[other]) > 0.25 * np.abs(curve).max() for other in found):
+            found.append(int(k))
+    return found

@@ -7,6 +7,7 @@ are exact. Source: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968) 1313.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,8 +16,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.motion.system import MotionSystem
 
-BEYOND = 8.0
-"""Modes between the kept nodes stay up to this many times the highest speed."""
+ENOUGH = 3e-4
+"""Error of the natural frequencies at which no more modes are needed."""
 _RIGID = 1e-6
 _COMPARED = 2.0
 """Frequencies are compared up to this many times the highest speed."""
@@ -32,8 +33,6 @@ class ReducedSystem:
         Its unknowns are `x7`, `y7` … of the kept nodes, feet of pedestals, and `mode_1` …
     modes
         How many modes stay.
-    first_left_out
-        rad/s, of the lowest mode that does not stay; infinite where all do.
     error
         Largest relative error of the natural frequencies without damping, those below twice the highest speed
         or at least the first two that bend the shaft, at the lowest speed; bearings with films left out.
@@ -42,7 +41,6 @@ class ReducedSystem:
 
     system: MotionSystem
     modes: int
-    first_left_out: float
     error: float
 
 
@@ -56,7 +54,7 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
     nodes
         To be kept, besides those of forces.
     modes
-        In both planes together; None: those up to eight times the highest speed, two at least.
+        In both planes together; None: as many as bring the error down to `ENOUGH`.
 
     Raises
     ------
@@ -73,40 +71,41 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
         raise ValueError(f"modes: from 0 to {others.size} between the kept nodes, not {modes}")
     K, M = (system.K[0] + system.K[0].T) / 2, system.M
     inner = np.ix_(others, others)
-    size, shape = eigh(K[inner], M[inner])
-    frequency = np.sqrt(np.maximum(size, 0.0))
-    if modes is None:
-        modes = max(2, int((frequency <= BEYOND * system.knots[-1]).sum()))
-        modes = min(modes + modes % 2, others.size)  # pairs of both planes
-    T = np.zeros((system.size, len(kept) + modes))
+    T = np.zeros((system.size, system.size))
     T[kept, np.arange(len(kept))] = 1.0
     T[others, : len(kept)] = -np.linalg.solve(K[inner], K[np.ix_(others, kept)])
-    T[others, len(kept) :] = shape[:, :modes]
+    T[others, len(kept) :] = eigh(K[inner], M[inner])[1]
+    K, M = T.T @ K @ T, T.T @ M @ T
+
+    def error(modes: int) -> float:
+        return _error(K, M, len(kept) + modes, system.knots[-1])
+
+    if modes is None:  # in pairs of both planes; more of them are never worse
+        pairs = bisect_left(range((others.size + 1) // 2), True, key=lambda n: error(2 * n) <= ENOUGH)
+        modes = min(2 * pairs, others.size)
+    T = T[:, : len(kept) + modes]
     found = replace(
         system,
         coordinates=(*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes))),
-        M=T.T @ M @ T,
+        M=T.T @ system.M @ T,
         C=T.T @ system.C @ T,
         K=T.T @ system.K @ T,
         weight=T.T @ system.weight,
         unbalance=T.T @ system.unbalance,
         bow=T.T @ system.bow,
     )
-    left_out = float(frequency[modes]) if modes < others.size else np.inf
-    return ReducedSystem(found, modes, left_out, _error(K, M, T, system.knots[-1]))
+    return ReducedSystem(found, modes, error(modes))
 
 
-def _error(K: FloatArray, M: FloatArray, T: FloatArray, highest: float) -> float:
-    """Of natural frequencies, see `ReducedSystem.error`."""
+def _error(K: FloatArray, M: FloatArray, size: int, highest: float) -> float:
+    """Of natural frequencies with the first unknowns alone, see `ReducedSystem.error`."""
     from scipy.linalg import eigh
 
-    def frequencies(K: FloatArray, M: FloatArray) -> FloatArray:
-        return np.asarray(np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0)))
-
-    full, few = frequencies(K, M), frequencies(T.T @ K @ T, T.T @ M @ T)
+    full, few = (
+        np.sqrt(np.maximum(eigh(K[:n, :n], M[:n, :n], eigvals_only=True), 0.0)) for n in (len(K), size)
+    )
     bends = int((full <= _RIGID * full[-1]).sum())
     end = max(int((full <= _COMPARED * highest).sum()), min(bends + 2, full.size))
     if end > few.size:
         return np.inf
-    compared = slice(bends, end)
-    return float(np.max(few[compared] / full[compared] - 1.0, initial=0.0))
+    return float(np.max(few[bends:end] / full[bends:end] - 1.0, initial=0.0))

@@ -1,9 +1,9 @@
-"""The motion of a rotor with forces that are not linear: its beam elements, weight, unbalance and bow."""
+"""The motion of a rotor with forces that are not linear: its shaft, weight, unbalance and bow."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -11,11 +11,12 @@ import fem
 from fem.static import GRAVITY
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import number
+from rotorid.motion.small_model import SmallModel
 from rotorid.motion.system import MotionSystem, system
 
 
 def rotor_system(
-    rotor: fem.Rotor,
+    rotor: fem.Rotor | SmallModel,
     lowest: float,
     highest: float,
     *,
@@ -29,14 +30,14 @@ def rotor_system(
     Parameters
     ----------
     rotor
-        With the forces at its nodes.
+        With the forces at its nodes; or a small model.
     lowest, highest
         rad/s.
     unbalance
-        m e e^{iβ} by node, kg·m, β with the rotation.
+        m e e^{iβ} by node, kg·m, β with the rotation; a small model has its own if there is none here.
     bow
         How far the shaft at rest deviates from a straight line by node, m, complex, at three nodes or more;
-        between them it runs as a shaft does that is bent there.
+        between them it runs as a shaft does that is bent there. A small model has its own, too.
     gravity, direction
         m/s², and where it points, degrees from x with the rotation; −y by default.
 
@@ -51,28 +52,51 @@ def rotor_system(
         raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
     inside = {s for support in rotor.supports for s in support.speeds if lowest < s < highest}
     knots = np.array([lowest, *sorted(inside), highest])
-    straight = dataclasses.replace(
-        rotor.linear, supports=(), material_damping=np.zeros_like(rotor.material_damping)
-    )
-    plane = fem.equations_of_motion(straight, plane="x")
-    deflections = np.array([name[:1] == "x" for name in plane.coordinates], dtype=float)
-    load = plane.M @ deflections
+    motion, names, stiffness, load = _parts(rotor)
+    if isinstance(rotor, SmallModel):
+        unbalance = rotor.unbalance if unbalance is None else unbalance
+        bow = rotor.bow if bow is None else bow
     weight: dict[str, float] = {}
     for axis, part in zip("xy", weight_along(gravity, direction), strict=True):
-        weight |= {_in(name, axis): part * mass for name, mass in zip(plane.coordinates, load, strict=True)}
-    at = np.array([plane.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
-    bent = bow_forces(plane.K, at, np.array(list((bow or {}).values()), dtype=complex))
+        weight |= {_in(name, axis): part * mass for name, mass in zip(names, load, strict=True)}
+    at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
+    bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
     return system(
-        lambda speed: fem.equations_of_motion(rotor.linear, speed=speed),
+        motion,
         knots,
         forces=rotor.forces,
         weight=weight,
         unbalance=unbalance,
         bow={
-            _in(plane.coordinates[i], axis): turned * force
+            _in(names[i], axis): turned * force
             for i, force in zip(at, bent, strict=True)
             for axis, turned in (("x", 1), ("y", -1j))
         },
+    )
+
+
+def _parts(
+    rotor: fem.Rotor | SmallModel,
+) -> tuple[Callable[[float], fem.Motion], tuple[str, ...], FloatArray, FloatArray]:
+    """Linear equations at a speed; of the shaft alone in x: unknowns, stiffness, N/m, and what weighs, kg."""
+    if isinstance(rotor, SmallModel):
+        return (
+            rotor.motion,
+            tuple(f"x{node}" for node in rotor.nodes),
+            rotor.stiffness,
+            rotor.weight / GRAVITY,
+        )
+    straight = dataclasses.replace(
+        rotor.linear, supports=(), material_damping=np.zeros_like(rotor.material_damping)
+    )
+    plane = fem.equations_of_motion(straight, plane="x")
+    deflections = np.array([name[:1] == "x" for name in plane.coordinates], dtype=float)
+    linear = rotor.linear
+    return (
+        lambda speed: fem.equations_of_motion(linear, speed=speed),
+        plane.coordinates,
+        plane.K,
+        plane.M @ deflections,
     )
 
 

@@ -20,10 +20,12 @@ from rotorid.motion.system import MotionSystem
 TOLERANCE = 1e-6
 A_TURN = 64
 """Samples a turn at the highest speed, where no rate is given."""
+LEAST_A_TURN = 8
+"""Samples a turn below which what the shaft does in a turn is not seen."""
 _BLOCK = 10_000
 """Samples that are computed at once: the memory that all unknowns take."""
-_MOST = 50_000_000
-"""Positions that are kept, x and y of one node counted as one: 800 MB."""
+_MOST = 10_000_000
+"""Positions that are kept, x and y of one node counted as one: 160 MB, some times over."""
 _MASSLESS = 1e-12
 _SMALLEST = 1e-4
 """Way that a tolerance refers to at least, by the largest deflection at the beginning."""
@@ -81,6 +83,11 @@ class MotionRun:
         return np.asarray(self.angle + (self.speeds[0] + self.speed) / 2 * self.time)
 
     @property
+    def resolved(self) -> bool:
+        """Whether each turn has `LEAST_A_TURN` samples."""
+        return self.time.size > 1 and max(self.speeds) * self.time[1] * LEAST_A_TURN <= 2 * np.pi
+
+    @property
     def bearings(self) -> tuple[tuple[NodeForce, int], ...]:
         """Forces with a wall, each with the column of its node in `z`; those whose node is known here."""
         return tuple(
@@ -88,6 +95,11 @@ class MotionRun:
             for force in self.system.forces
             if np.isfinite(force.wall) and force.node in self.nodes
         )
+
+    def eccentricity(self, since: int = 0) -> FloatArray:
+        """Smallest and largest by the clearance, of each bearing, from a sample on, shape (b, 2)."""
+        sizes = [np.abs(self.z[since:, i]) / force.wall for force, i in self.bearings]
+        return np.array([(size.min(), size.max()) for size in sizes]).reshape(-1, 2)
 
 
 def run(

@@ -10,15 +10,12 @@ import numpy as np
 
 import fem
 from fem.model.node_forces import NodeForce, kind_of
-from fem.static import GRAVITY
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number
 from rotorid.base.text import counted, listing
-from rotorid.motion.rotor_system import bow_forces, weight_along
-from rotorid.motion.system import MotionSystem, system
 
-_ROUNDING = 1e-9  # share of the largest entry
+_ROUNDING = 1e-5  # share of the largest entry that stands in few digits
 _zero = np.array(0.0).copy  # a new one each time
 _MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
 
@@ -50,7 +47,7 @@ class SmallModel(Answered):
     unbalance
         m e e^{iβ} by node, kg·m, β with the rotation.
     bow
-        As `rotorid.motion.rotor_system` has it, m.
+        How far the shaft at rest deviates from a straight line by node, m, at three nodes or more.
     warnings
         What the reader must know.
 
@@ -81,18 +78,26 @@ class SmallModel(Answered):
             object.__setattr__(self, name, _array(name, getattr(self, name), k))
         if (self.masses < 0).any() or not self.masses.any():
             raise ValueError("masses: 0 or more, and not all of them 0")
-        for support in self.supports:
-            self._known(support.node, support.name or support.kind)
-        for force in self.forces:
-            self._known(force.node, force.name or kind_of(force).replace("_", " "))
-        for support in self.supports:
-            if support.tilting_stiffness:
-                raise ValueError(
-                    f"supports: a small model has no slopes, so the tilting stiffness of the support at node "
-                    f"{support.node} belongs into its shaft stiffness"
-                )
-        for node in (*self.unbalance, *self.bow):
-            self._known(node, "unbalance or bow")
+        acting = *(support.node for support in self.supports), *(force.node for force in self.forces)
+        for node in (*acting, *self.unbalance, *self.bow):
+            self.node(node)
+        if any(support.tilting_stiffness for support in self.supports):
+            raise ValueError(
+                "supports: a small model has no slopes; tilting stiffness belongs into the shaft's stiffness"
+            )
+
+    def node(self, name: str | int) -> int:
+        """Number of a node, given as a number or as its text.
+
+        Raises
+        ------
+        ValueError
+            If the model has no such node.
+        """
+        if str(name) not in map(str, self.nodes):
+            known = listing(map(str, self.nodes), "and")
+            raise ValueError(f"node {name} does not exist: the small model has {known}")
+        return int(name)
 
     def motion(self, speed: float = 0.0) -> fem.Motion:
         """The linear equations in both planes, without forces that are not linear.
@@ -106,18 +111,19 @@ class SmallModel(Answered):
             For an impossible speed or one outside the table of a support.
         """
         speed = number(speed, "speed")
-        k = len(self.nodes)
-        stands = [i for i, support in enumerate(self.supports) if support.pedestal is not None]
         names = [f"{axis}{node}" for axis in "xy" for node in self.nodes]
-        names += [f"foot_{axis}{i + 1}" for axis in "xy" for i in stands]
-        M, C, K = (np.zeros((len(names), len(names))) for _ in range(3))
-        x, y = slice(k), slice(k, 2 * k)
-        for own, other, sign in ((x, y, 1.0), (y, x, -1.0)):
-            M[own, own] = np.diag(self.masses)
-            C[own, own] = self.material_damping + self.damping
-            C[own, other] = sign * speed * self.gyroscopic
-            K[own, own] = self.stiffness
-            K[own, other] = sign * speed * self.material_damping
+        stands = [i for i, support in enumerate(self.supports) if support.pedestal is not None]
+        feet = [f"foot_{axis}{i + 1}" for axis in "xy" for i in stands]
+        along, across = np.eye(2), np.array([[0.0, speed], [-speed, 0.0]])
+        M, C, K = (
+            np.pad(matrix, (0, len(feet)))
+            for matrix in (
+                np.kron(along, np.diag(self.masses)),
+                np.kron(along, self.material_damping + self.damping) + np.kron(across, self.gyroscopic),
+                np.kron(along, self.stiffness) + np.kron(across, self.material_damping),
+            )
+        )
+        names += feet
         for i, support in enumerate(self.supports):
             felt = np.zeros((2, len(names)))
             for plane, axis in enumerate("xy"):
@@ -133,94 +139,26 @@ class SmallModel(Answered):
             C += felt.T @ damping @ felt
         return fem.Motion(M, C, K, tuple(names), speed)
 
-    def system(
-        self,
-        lowest: float,
-        highest: float,
-        *,
-        unbalance: Mapping[int, complex] | None = None,
-        bow: Mapping[int, complex] | None = None,
-        gravity: float = GRAVITY,
-        direction: float = -90.0,
-    ) -> MotionSystem:
-        """What moves at speeds from `lowest` to `highest`, as `rotorid.motion.rotor_system` of a rotor.
-
-        Parameters
-        ----------
-        lowest, highest
-            rad/s.
-        unbalance, bow
-            Instead of the model's own.
-        gravity, direction
-            m/s², and where it points, degrees from x with the rotation; −y by default.
-
-        Raises
-        ------
-        ValueError
-            Speeds that are no range or outside the table of a support; nodes that do not exist; a bow at
-            fewer than three nodes.
-        """
-        lowest, highest = number(lowest, "lowest speed"), number(highest, "highest speed")
-        if not lowest < highest:
-            raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
-        inside = {s for support in self.supports for s in support.speeds if lowest < s < highest}
-        bent = self.bow if bow is None else bow
-        for node in bent:
-            self._known(node, "bow")
-        at = np.array([self.nodes.index(node) for node in bent], dtype=np.intp)
-        pull = bow_forces(self.stiffness, at, np.array(list(bent.values()), dtype=complex))
-        along = zip("xy", weight_along(gravity, direction), strict=True)
-        return system(
-            self.motion,
-            np.array([lowest, *sorted(inside), highest]),
-            forces=self.forces,
-            weight={
-                f"{axis}{node}": float(part * newtons / GRAVITY)
-                for axis, part in along
-                for node, newtons in zip(self.nodes, self.weight, strict=True)
-            },
-            unbalance=self.unbalance if unbalance is None else unbalance,
-            bow={
-                f"{axis}{node}": turned * force
-                for node, force in zip(bent, pull, strict=True)
-                for axis, turned in (("x", 1), ("y", -1j))
-            },
-        )
-
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: nodes, masses, weight, matrices, and what acts where."""
+        """Plain data for JSON; the file of the model has the rest."""
         return {
             "nodes": list(self.nodes),
             "masses_kg": self.masses.tolist(),
             "weight_N": self.weight.tolist(),
-            "shaft_stiffness_N_per_m": self.stiffness.tolist(),
-            "forces": [{"kind": kind_of(force), "node": force.node} for force in self.forces],
-            "supports": [{"kind": support.kind, "node": support.node} for support in self.supports],
             "warnings": list(self.warnings),
         }
 
     @property
     def answer(self) -> Answer:
         """Where its masses stand, and what acts on it."""
-        acting = [(kind_of(force).replace("_", " "), force.node) for force in self.forces]
-        acting += [(support.kind, support.node) for support in self.supports]
-        kinds = {kind: [str(node) for what, node in acting if what == kind] for kind, _ in acting}
-        where = [
-            f"{kind} at {'nodes' if len(at) > 1 else 'node'} {listing(at, 'and')}"
-            for kind, at in kinds.items()
-        ]
+        acting = [f"{kind_of(force).replace('_', ' ')} at {force.node}" for force in self.forces]
+        acting += [f"{support.kind} at {support.node}" for support in self.supports]
         masses = ", ".join(f"{m:.2f} at {n}" for n, m in zip(self.nodes, self.masses, strict=True))
         return Answer(
             f"For motion: {counted(len(self.nodes), 'node')} in both planes, masses in kg {masses}, together "
-            f"{self.masses.sum():.2f}, weight {self.weight.sum():.1f} N; {listing(where, 'and') or 'free'}.",
+            f"{self.masses.sum():.2f}, weight {self.weight.sum():.1f} N; {listing(acting, 'and') or 'free'}.",
             warnings=self.warnings,
         )
-
-    def _known(self, node: int, what: str) -> None:
-        if node not in self.nodes:
-            raise ValueError(
-                f"{what}: node {node} does not exist; the model's are {listing(map(str, self.nodes), 'and')}"
-            )
 
 
 def _array(name: str, value: FloatArray, k: int) -> FloatArray:
@@ -229,15 +167,12 @@ def _array(name: str, value: FloatArray, k: int) -> FloatArray:
     array = np.array(value, dtype=float)
     if not array.ndim and array == 0:
         array = np.zeros(shape)
-    if array.shape != shape:
-        raise ValueError(f"{name}: {' × '.join(map(str, shape))} numbers for {counted(k, 'node')}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name}: finite numbers")
-    if name in _MATRICES and np.abs(array - array.T).max() > _ROUNDING * np.abs(array).max():
-        raise ValueError(f"{name}: a symmetric matrix")
-    if name in _MATRICES and np.linalg.eigvalsh(array)[0] < -_ROUNDING * np.abs(array).max():
-        raise ValueError(
-            f"{name}: a matrix that no motion makes negative; what pushes outwards is a [[seal]]"
-        )
+    if array.shape != shape or not np.isfinite(array).all():
+        numbers = " × ".join(map(str, shape))
+        raise ValueError(f"{name}: {numbers} finite numbers for {counted(k, 'node')}")
+    if name in _MATRICES:
+        rounding = _ROUNDING * np.abs(array).max()
+        if np.abs(array - array.T).max() > rounding or np.linalg.eigvalsh(array)[0] < -rounding:
+            raise ValueError(f"{name}: a symmetric matrix that has no negative eigenvalue")
     read_only(array)
     return array

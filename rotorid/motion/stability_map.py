@@ -14,8 +14,6 @@ from rotorid.base.arrays import FloatArray
 def critical_mass(eccentricity: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Where a rigid rotor in a short journal bearing begins to whirl, from Routh and Hurwitz.
 
-    K in W / c and C in W / (c Ω), of load W, clearance c and speed Ω, at the equilibrium: docs/theory/motion.
-
     Parameters
     ----------
     eccentricity
@@ -25,12 +23,7 @@ def critical_mass(eccentricity: ArrayLike) -> tuple[FloatArray, FloatArray]:
     -------
     M, γ
         Critical mass number m c Ω² / W, infinite where the rotor is stable at every speed; frequency of the
-        whirl by Ω, NaN there.
-
-    Raises
-    ------
-    ValueError
-        For an eccentricity that is not between 0 and 1.
+        whirl by Ω, NaN there. Docs: theory/motion.
     """
     e = np.asarray(eccentricity, dtype=float)
     if not ((e > 0) & (e < 1)).all():

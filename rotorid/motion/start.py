@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.run import TOLERANCE, run
 from rotorid.motion.system import MotionSystem
 
+Beginning = tuple[FloatArray, FloatArray, tuple[str, ...]]
 _BLOCK = 32  # turns
 _BLOCKS = 64
 _SETTLED = 1e-6
@@ -60,15 +60,6 @@ def steady_linear(
     return np.array(at), np.array(rests), np.array(responses)
 
 
-@dataclass(frozen=True, eq=False)
-class Beginning:
-    """Unknowns and their velocities, shape (n,) each, where the angle of rotation is 0; and warnings."""
-
-    q: FloatArray
-    v: FloatArray
-    warnings: tuple[str, ...] = ()
-
-
 def begin(
     system: MotionSystem,
     speed: float,
@@ -76,7 +67,7 @@ def begin(
     shift: Mapping[int, complex] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Beginning:
-    """How a motion begins.
+    """How a motion begins: unknowns and velocities, shape (n,) each, where the angle is 0; and warnings.
 
     Parameters
     ----------
@@ -97,21 +88,19 @@ def begin(
     ValueError
         As `equilibrium` and `run`, if it touches a wall, and for nodes that do not move.
     """
-    found = in_steady_motion(system, speed, tolerance) if how == "steady" else None
-    found = found or Beginning(at_rest(system, speed), np.zeros(system.size))
-    q = found.q.copy()
+    rest = at_rest(system, speed)
+    found = rest, np.zeros(system.size), ()
+    q, v, warnings = _steady(system, speed, rest, tolerance) if how == "steady" else found
     for node, by in (shift or {}).items():
         q[[*system.index(node)]] += by.real, by.imag
-    return replace(found, q=q)
+    return q, v, warnings
 
 
-def in_steady_motion(system: MotionSystem, speed: float, tolerance: float) -> Beginning:
-    """In steady motion, see `begin`."""
-    rest = at_rest(system, speed)
+def _steady(system: MotionSystem, speed: float, rest: FloatArray, tolerance: float) -> Beginning:
     *_, response = steady_linear(system, [speed])
     q, v = rest + response[0].real, (1j * speed * response[0]).real
     if not system.forces or not speed:
-        return Beginning(q, v)
+        return q, v, ()
     walls = np.array([force.wall for force in system.forces])
     x, y = system.law_tables[2].T
     if (np.hypot(q[x], q[y]) > _NEAR * walls).any():
@@ -123,7 +112,7 @@ def in_steady_motion(system: MotionSystem, speed: float, tolerance: float) -> Be
             raise ValueError(f"while it settles at the first speed {found.stopped}")
         q, v, turn = found.q, found.v, found.z[-(found.time.size // _BLOCK) :]
         if before is not None and np.abs(turn - before).max() <= _SETTLED * np.abs(turn).max():
-            return Beginning(q, v)
+            return q, v, ()
         before = turn
     warning = f"at the first speed nothing that comes again each turn is reached in {_BLOCK * _BLOCKS} turns"
-    return Beginning(q, v, (warning,))
+    return q, v, (warning,)

@@ -13,8 +13,8 @@ _SHARE = 0.2
 """Part of the time that is looked at, its last."""
 _LEAST_TURNS = 8
 LEAST_SAMPLES = 64
-_CHANGE = 1e-3
-"""Of amplitude and mean from one half of the window to the other, by the amplitude: steady below it."""
+_TREND, _WANDERS = 1e-3, 1e-2
+"""Change at which a motion that grows or decays, and one that goes up and down, are not steady."""
 _REST = 1e-6
 """Of amplitude by the largest one: at rest below it."""
 _PERIODIC = 2e-3
@@ -28,18 +28,14 @@ class SteadyEnd:
 
     Attributes
     ----------
-    nodes
-        As in the motion.
-    begins
-        Where the part that is looked at begins, s.
     mean
         x + iy, m, shape (m,).
     amplitude
         Largest distance from the mean, m, shape (m,).
     change
-        Of amplitude and mean from one half of this part to the other, by the amplitude.
-    steady
-        Whether they stay as they are, to a thousandth.
+        Of root mean square and mean from the first to the last half of this part, by the largest root mean square.
+    trend
+        Whether what changes most goes one way, up or down.
     at_rest
         Whether nothing moves any more.
     frequency
@@ -48,22 +44,25 @@ class SteadyEnd:
     speed
         Of the rotor, rad/s.
     period
-        After which the motion comes again, turns of the rotor, or s where it does not turn; NaN for none.
+        After which the motion comes again, s; NaN for none.
     eccentricity
-        Smallest and largest by the clearance, of each bearing, shape (b, 2).
+        As `MotionRun.eccentricity`.
     """
 
-    nodes: tuple[int, ...]
-    begins: float
     mean: ComplexArray
     amplitude: FloatArray
     change: float
-    steady: bool
+    trend: bool
     at_rest: bool
     frequency: float
     speed: float
     period: float
     eccentricity: FloatArray
+
+    @property
+    def steady(self) -> bool:
+        """Whether it changes by less than 0.1 % where it grows or decays, 1 % where it goes up and down."""
+        return self.at_rest or self.change <= (_TREND if self.trend else _WANDERS)
 
     @property
     def periodic(self) -> bool:
@@ -76,64 +75,51 @@ class SteadyEnd:
         return self.frequency / self.speed if self.speed else np.nan
 
 
-def steady_end(motion: MotionRun) -> SteadyEnd:
+def steady_end(motion: MotionRun) -> SteadyEnd | None:
     """Look at the last fifth of a motion, or at its last eight turns where that is more.
 
-    Raises
-    ------
-    ValueError
-        If the speed changes, or for fewer than 64 samples.
+    None where the speed changes, for fewer than 64 samples, or fewer than 8 a turn.
     """
     first, last = motion.speeds
-    if first != last:
-        raise ValueError("the speed changes: there is no steady end")
-    if motion.time.size < LEAST_SAMPLES:
-        raise ValueError(f"{LEAST_SAMPLES} samples are needed at least to tell whether the end is steady")
+    if first != last or motion.time.size < LEAST_SAMPLES or not motion.resolved:
+        return None
     whole = float(motion.time[-1])
     window = max(_SHARE * whole, min(_LEAST_TURNS * 2 * np.pi / last, whole) if last else 0.0)
-    k = int(np.searchsorted(motion.time, whole - window))
-    t, z = motion.time[k:], motion.z[k:]
-    mean = _hann_mean(z)
+    since = int(np.searchsorted(motion.time, whole - window))
+    t, z = motion.time[since:] - motion.time[since], motion.z[since:]
+    mean = _faded_mean(z)
     size = np.abs(z - mean).max(axis=0)
-    largest = np.abs(motion.z - mean).max(axis=0)
     most = int(size.argmax())
-    at_rest = bool((size <= _REST * np.maximum(largest, np.abs(mean))).all())
-    halves = np.array_split(z, 2)
-    means = [_hann_mean(half) for half in halves]
-    sizes = [np.abs(half - mean).max(axis=0) for half in halves]
-    change = max(np.abs(sizes[1] - sizes[0]).max(), np.abs(means[1] - means[0]).max())
-    change = float(change / (size[most] or 1.0))
-    steady = at_rest or change <= _CHANGE
-    frequency = np.nan if at_rest else _strongest(t, z[:, most] - mean[most])
-    period = np.nan if at_rest else _period(t, z[:, most] - mean[most], frequency, last, _forced(motion))
+    largest = np.maximum(np.abs(motion.z - mean).max(axis=0), np.abs(mean))
+    if (size <= _REST * largest).all():
+        return SteadyEnd(mean, size, 0.0, False, True, np.nan, last, np.nan, motion.eccentricity(since))
+    halves = [z[k * len(z) // 8 :][: len(z) // 2] for k in range(5)]
+    means = np.array([_faded_mean(part) for part in halves])
+    strength = np.sqrt([_faded_mean(np.abs(part - mean) ** 2).real for part in halves])
+    values = np.hstack([strength, means.real, means.imag])
+    spread = np.ptp(values, axis=0)
+    steps = np.diff(values[:, spread.argmax()])
+    z = z[:, most] - mean[most]
+    frequency = _strongest(t, z)
+    forced = motion.system.unbalance.any() or motion.system.bow.any()
+    own = 2 * np.pi / (last if forced and last else abs(frequency))
     return SteadyEnd(
-        nodes=motion.nodes,
-        begins=float(t[0]),
         mean=mean,
         amplitude=size,
-        change=change,
-        steady=steady,
-        at_rest=at_rest,
+        change=float(spread.max() / strength.max()),
+        trend=bool((steps > 0).all() or (steps < 0).all()),
+        at_rest=False,
         frequency=frequency,
         speed=last,
-        period=period,
-        eccentricity=np.array(
-            [
-                np.array([np.abs(z[:, i]).min(), np.abs(z[:, i]).max()]) / force.wall
-                for force, i in motion.bearings
-            ]
-        ).reshape(-1, 2),
+        period=_period(t, z, own),
+        eccentricity=motion.eccentricity(since),
     )
 
 
-def _forced(motion: MotionRun) -> bool:
-    return bool(motion.system.unbalance.any() or motion.system.bow.any())
-
-
-def _hann_mean(z: ComplexArray) -> ComplexArray:
+def _faded_mean(z: ComplexArray | FloatArray) -> ComplexArray:
     """Mean over a window that fades at both ends: a motion that is cut anywhere does not change it."""
     weight = np.hanning(len(z) + 2)[1:-1, None]
-    return np.asarray((weight * z).sum(axis=0) / weight.sum())
+    return np.asarray((weight * z).sum(axis=0) / weight.sum(), dtype=complex)
 
 
 def _strongest(t: FloatArray, z: ComplexArray) -> float:
@@ -141,32 +127,26 @@ def _strongest(t: FloatArray, z: ComplexArray) -> float:
     from scipy.optimize import minimize_scalar
 
     faded = np.hanning(len(z) + 2)[1:-1] * z
-    step = float(t[1] - t[0])
-    lines = 2 * np.pi * np.fft.fftfreq(len(z), step)
+    lines = 2 * np.pi * np.fft.fftfreq(len(z), t[1])
     middle = lines[int(np.abs(np.fft.fft(faded)).argmax())]
-    width = 2 * np.pi / (len(z) * step)
     found = minimize_scalar(
-        lambda w: -abs(np.exp(-1j * w * (t - t[0])) @ faded),
-        bounds=(middle - width, middle + width),
+        lambda w: -abs(np.exp(-1j * w * t) @ faded),
+        bounds=(middle - lines[1], middle + lines[1]),
         method="bounded",
-        options={"xatol": 1e-9 * width},
+        options={"xatol": 1e-9 * lines[1]},
     )
     return float(found.x)
 
 
-def _period(t: FloatArray, z: ComplexArray, frequency: float, speed: float, forced: bool) -> float:
-    """Shortest period found: one to eight turns where unbalance acts, else that of the strongest line."""
+def _period(t: FloatArray, z: ComplexArray, one: float) -> float:
+    """The shortest of one to eight times a period after which the motion comes again; NaN for none."""
     from scipy.interpolate import CubicSpline
 
     at = CubicSpline(t, z)
-    size = np.abs(z).max()
-    one = 2 * np.pi / speed if speed else 1.0
-    own = 2 * np.pi / abs(frequency)
-    candidates = [n * (one if forced and speed else own) for n in range(1, _PERIODS + 1)]
-    for period in candidates:
+    for period in one * np.arange(1, _PERIODS + 1):
         inside = t[t <= t[-1] - period]
         if inside.size < len(t) // 4:
             break
-        if np.abs(at(inside + period) - at(inside)).max() <= _PERIODIC * size:
-            return period / one
+        if np.abs(at(inside + period) - at(inside)).max() <= _PERIODIC * np.abs(z).max():
+            return float(period)
     return np.nan

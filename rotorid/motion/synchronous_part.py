@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.motion.run import MotionRun
+from rotorid.motion.run import LEAST_A_TURN, MotionRun
 
-_LEAST = 8
-"""Samples a turn that it needs."""
 _OF_A_TURN, _A_TURN = 64, 8
 """Of these so many are told."""
 
@@ -41,9 +39,9 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
     whole = int(angle[-1] / (2 * np.pi))
     if whole < turns:
         raise ValueError(f"the rotor makes {whole} turns; {turns} are needed for its synchronous part")
-    if np.diff(angle).max() > 2 * np.pi / _LEAST:
+    if not motion.resolved:
         raise ValueError(
-            f"{_LEAST} samples a turn are needed at least for the synchronous part: a higher rate"
+            f"{LEAST_A_TURN} samples a turn are needed at least for the synchronous part: a higher rate"
         )
     even = np.arange(whole * _OF_A_TURN + 1) * (2 * np.pi / _OF_A_TURN)
     rising = np.concatenate([[True], np.diff(angle) > 0])

@@ -32,18 +32,13 @@ class MotionSystem:
         Names of the n unknowns as in `fem.Motion`: `x7` and `y7` are the deflections of node 7, m.
     knots
         Speeds at which `C` and `K` are known, rad/s, ascending, shape (s,); between them both are linear.
-    M
-        kg, shape (n, n), the fluid's mass in seals included.
-    C, K
-        Linear damping (gyroscopic effect included) and stiffness, shape (s, n, n).
+    M, C, K
+        Mass, shape (n, n), the fluid's in seals included; linear damping, gyroscopic effect included, and
+        stiffness, shape (s, n, n).
     forces
         What is not linear, f of them.
-    weight
-        N, shape (n,).
-    unbalance
-        kg·m, complex, shape (n,), see above.
-    bow
-        N, complex, shape (n,), see above.
+    weight, unbalance, bow
+        w, N, and, complex, u, kg·m, and b, N, shape (n,) each.
     """
 
     coordinates: tuple[str, ...]
@@ -62,13 +57,7 @@ class MotionSystem:
         return len(self.coordinates)
 
     def index(self, node: int) -> tuple[int, int]:
-        """Where x and y of a node stand, from 0.
-
-        Raises
-        ------
-        ValueError
-            For a node that has no deflection here.
-        """
+        """Where x and y of a node stand, from 0; ValueError for a node that has no deflection here."""
         try:
             return self.coordinates.index(f"x{node}"), self.coordinates.index(f"y{node}")
         except ValueError:
@@ -88,13 +77,7 @@ class MotionSystem:
         return *tables(self.forces), places
 
     def linear(self, speed: float) -> tuple[FloatArray, FloatArray]:
-        """C and K at a speed, rad/s, shape (n, n) each.
-
-        Raises
-        ------
-        ValueError
-            Outside the knots.
-        """
+        """C and K at a speed, rad/s, shape (n, n) each; ValueError outside the knots."""
         if not self.knots[0] <= speed <= self.knots[-1]:
             raise ValueError(
                 f"these equations hold from {self.knots[0]:.6g} to {self.knots[-1]:.6g} rad/s, not at "
@@ -122,25 +105,18 @@ def system(
     unbalance: Mapping[int, complex] | None = None,
     bow: Mapping[str, complex] | None = None,
 ) -> MotionSystem:
-    """Put together what moves.
+    """Put together what moves; ValueError as `linear`, and for nodes that do not move.
 
     Parameters
     ----------
-    linear
-        The equations of motion at a speed, rad/s.
-    knots
-        Speeds where its matrices may change their slope, and the first and the last, at least two.
+    linear, knots
+        The equations of motion at a speed, rad/s; where their matrices may change slope, and both ends.
     forces
         What is not linear.
     weight, bow
         N by coordinate.
     unbalance
         m e e^{iβ} by node, kg·m, β with the rotation.
-
-    Raises
-    ------
-    ValueError
-        As `linear`, and for nodes that do not move.
     """
     motions = [linear(float(speed)) for speed in knots]
     names = motions[0].coordinates

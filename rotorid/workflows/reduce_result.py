@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
-from rotorid.workflows.option_values import one_of, option_name
+from rotorid.workflows.option_values import one_of
 from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
@@ -83,21 +83,11 @@ class ReducedRotor(Parts):
         }
 
     @property
-    def held(self) -> list[int]:
-        """Nodes that were held rigidly while the masses were found."""
-        rotor = self.result.rotor
-        return [] if rotor is None or self.motion_model is None else [s.node for s in rotor.supports]
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return super().to_dict() | ({"held_nodes": self.held} if self.held else {})
-
-    @property
     def answer(self) -> Answer:
         """The ranking where it was asked for, before the masses at its compromise."""
         first = [] if self.placement is None else [self.placement.answer]
-        if self.held:
-            at = listing(map(str, self.held), "and")
+        if self.motion_model is not None and self.result.rotor is not None:
+            at = listing((str(support.node) for support in self.result.rotor.supports), "and")
             first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
         rest = (part for part in self.parts.values() if part not in (None, self.placement))
         return together([*first, *(part.answer for part in rest)])
@@ -149,16 +139,27 @@ class ReducedRotor(Parts):
         return reduce_report(self.to_dict(), self.parts, self.provenance)
 
     def with_small(self) -> ReducedRotor:
-        """The same with the small model, which needs a rotor."""
-        return self if self.small else dataclasses.replace(self, small=self.result.small(self.damping))
+        """The same with the small model, which needs a rotor; that for motion is one."""
+        return (
+            self
+            if self.small or self.motion_model
+            else dataclasses.replace(self, small=self.result.small(self.damping))
+        )
 
     def model_bytes(self, name: str = "") -> bytes:
-        """The small model as a file for `fit` and `identify`; `name` of the rotor for its comment.
+        """The small model as a file for `fit` and `identify`, or that for motion; `name`: of the rotor.
 
-        Dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
+        For `fit` dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
         """
         from rotorid.tables.models.model_writing import ode_model_bytes
+        from rotorid.tables.models.small_model_file import small_model_bytes
 
+        found = (
+            f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
+            f"{counted(self.result.modes, 'mode')})"
+        )
+        if self.motion_model is not None:
+            return small_model_bytes(self.motion_model, [f"{found}, its supports kept, SI"])
         if (self.result.masses.solution <= 0).any():
             raise ValueError(
                 "a model with a mass that is not positive cannot be written: use other nodes or modes"
@@ -177,8 +178,7 @@ class ReducedRotor(Parts):
             )
         which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
         said = [
-            f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
-            f"{counted(self.result.modes, 'mode')}), {which} at {motion.speed:.6g} rad/s, SI",
+            f"{found}, {which} at {motion.speed:.6g} rad/s, SI",
             "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
         ]
         if motion.M.any(axis=0).all() and not inputs:
@@ -213,19 +213,6 @@ class ReducedRotor(Parts):
             # numpy before 2.1 would store allow_pickle= as an array
             np.savez(stream, **arrays)  # type: ignore[arg-type]
         return stream.getvalue()
-
-    def motion_model_bytes(self) -> bytes:
-        """The model for motion as a file, with the command that makes it as a comment."""
-        from rotorid.tables.models.small_model_file import small_model_bytes
-
-        if self.motion_model is None:
-            raise ValueError("a model for motion keeps its supports: give --keep-supports, too")
-        given = [entry["file"] for entry in self.provenance["inputs"][:1]]
-        for name, value in self.provenance["options"].items():
-            text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
-            given.append(option_name(name) if value is True else f"{option_name(name)} {text}")
-        command = f"rotorid reduce {' '.join(given)} --motion-model FILE.toml"
-        return small_model_bytes(self.motion_model, [command, "Masses by formula (50); SI."])
 
     def _motion(self) -> fem.Motion:
         """One plane where nothing couples them; without massless unknowns where no damping acts on them."""

@@ -104,7 +104,10 @@ bearings-linear             bearings {MOTION} --speeds 2000,5000rpm --gravity-di
 bearings-at-rest            bearings {MOTION} --speeds 0:3000:1000rpm
 motion                      motion {MOTION} --speed 4000rpm --time 0.1s --displaced left=3um --rate 500 --output m.csv
 motion-run-up               motion sample_data/motion/unbalanced.toml --run-up 3000:3300rpm --time 0.5s --rate 200 --sensors 12 --plot m.png
+motion-bode                 motion sample_data/motion/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode --plot run_up.png
 motion-from-rest            motion sample_data/motion/small.toml --run-up 0:3000rpm --time 1s
+periodic-jumps              periodic sample_data/motion/damper.toml --speeds 1000:5000rpm --plot jumps.png
+reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
@@ -403,7 +406,14 @@ EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all", "fit-starts"}
 the best and how many iterations it took is rounding."""
 
 
-TEXT_ONLY = ("response-compressor", "fit-run-down-plot", "holes-plot", "influence-rotor23", "validate")
+TEXT_ONLY = (
+    "response-compressor",
+    "fit-run-down-plot",
+    "holes-plot",
+    "influence-rotor23",
+    "validate",
+    "motion-bode",
+)
 """Cases whose document is long, or that of another case."""
 
 

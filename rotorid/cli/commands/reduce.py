@@ -23,8 +23,7 @@ if TYPE_CHECKING:
         "Input": "nodes modes speed measured compliance seals",
         "Method": "rank place masses candidates methods trade_off",
         "Errors": "errors what_if",
-        "Small model": "response stability model state_space damping force both_planes",
-        "Motion": "keep_supports motion_model",
+        "Small model": "response stability model state_space damping force both_planes keep_supports",
         OUTPUT: "view",
         "Expert": "normalise rows nonnegative supports_apart",
     },
@@ -46,22 +45,13 @@ def reduce(
             "--model",
             metavar="FILE.toml",
             help="Write the small model for `rotorid fit` and `identify`, a damper to be estimated at each "
-            "mass.",
+            "mass; with --keep-supports for `rotorid motion` and `periodic`.",
         ),
     ] = None,
     state_space: Annotated[
         Path | None,
         typer.Option(
             "--state-space", metavar="FILE", help="Write A, B, C, D in both planes: .json, .npz or .mat."
-        ),
-    ] = None,
-    motion_model: Annotated[
-        Path | None,
-        typer.Option(
-            "--motion-model",
-            metavar="FILE.toml",
-            help="Write the small model with all supports and forces, for `rotorid motion`; needs "
-            "--keep-supports.",
         ),
     ] = None,
     view: Annotated[
@@ -74,31 +64,24 @@ def reduce(
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
     small model (--response, --stability, --model, --state-space). With --keep-supports bearings, films and
-    other forces stay apart from the masses, for motion (--motion-model).
+    other forces stay apart from the masses, for motion.
 
     Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
 
     Example: rotorid reduce sample_data/rotor23.csv --rank --plot map.png
     """
     used = {
-        "--damping": (
-            options.damping,
-            model or state_space or motion_model,
-            "--model, --state-space or --motion-model",
-        ),
+        "--damping": (options.damping, model or state_space, "--model or --state-space"),
         "--both-planes": (options.both_planes, model, "--model"),
         "--force": (options.force, model, "--model"),
-        "--motion-model": (motion_model, options.keep_supports, "--keep-supports"),
         "--view": (view, to.plot, "--plot"),
     }
     for option, (given, of_use, needed) in used.items():
         if given and not of_use:
             raise ValueError(f"{option} does nothing without {needed}")
 
-    if options.keep_supports and (model or state_space):
-        raise ValueError(
-            "--model and --state-space write the rotor on its supports: leave out --keep-supports"
-        )
+    if options.keep_supports and state_space:
+        raise ValueError("--state-space writes the rotor on its supports: leave out --keep-supports")
 
     def found() -> ReducedRotor:
         masses = work(rotor, options)
@@ -115,6 +98,5 @@ def reduce(
                 STATE_SPACES,
                 lambda found: found.state_space_bytes((state_space or Path()).suffix.lower()),
             ),
-            (motion_model, (".toml",), lambda found: found.motion_model_bytes()),
         ),
     )

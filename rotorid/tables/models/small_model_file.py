@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,15 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.motion.small_model import SmallModel
 from rotorid.tables.reader import units
-from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Key, Kind, take
 from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.reader.value_kinds import TURN, each, number, plain_number
 from rotorid.tables.rotor.bearing import KEYS_OF, NODE, read_support
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, force_tables, read_force
 from rotorid.tables.rotor.rotor_writing import support_table
+
+_HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
 
 def _list(section: Section, key: str) -> FloatArray | None:
@@ -36,15 +39,22 @@ def _matrix(section: Section, key: str) -> FloatArray | None:
 def _array(section: Section, key: str, depth: int, expected: str) -> FloatArray | None:
     value = section.take(key)
     rows = value if depth == 2 else [value]
-    good = isinstance(rows, list) and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows)
-    if not good or not all(_is_number(entry) for row in rows for entry in row):
-        section.complain(key, expected, value=False)
+    if isinstance(rows, list) and all(isinstance(row, list) and len(row) == len(rows[0]) > 0 for row in rows):
+        entries = [None if isinstance(one, str) else plain_number(one) for row in rows for one in row]
+        if entries and None not in entries:
+            return np.array(value, dtype=float)
+    section.complain(key, expected, value=False)
+    return None
+
+
+def _nodes(section: Section, key: str) -> tuple[int, ...] | None:
+    found = _list(section, key)
+    if found is None:
         return None
-    return np.array(value, dtype=float)
-
-
-def _is_number(value: object) -> bool:
-    return not isinstance(value, str) and plain_number(value) is not None
+    if (found % 1).any() or (found < 1).any() or len(np.unique(found)) < found.size:
+        section.complain(key, "different whole numbers from 1 up", value=False)
+        return None
+    return tuple(int(node) for node in found)
 
 
 def _apart(section: Section) -> Section:
@@ -53,6 +63,8 @@ def _apart(section: Section) -> Section:
 
 _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 1}
 _LIST, _MATRIX = Kind(_list, _ROW), Kind(_matrix, {"type": "array", "items": _ROW, "minItems": 1})
+_WHOLE = {"type": "integer", "minimum": 1}
+_NODES = Kind(_nodes, {"type": "array", "items": _WHOLE, "minItems": 1, "uniqueItems": True})
 _ANGLE = Key("angle_deg", TURN, "its angle with the rotation", units.ANGLE, required="the angle")
 UNBALANCE = (
     Key("node", NODE, "the node"),
@@ -65,7 +77,7 @@ BOW = (
     _ANGLE,
 )
 ARRAYS = (
-    Key("nodes", _LIST, "numbers of the nodes", required="a list of the nodes' numbers, nodes = [2, 7, 12]"),
+    Key("nodes", _NODES, "numbers of the nodes", required="a list of the nodes' numbers, nodes = [2, 7, 12]"),
     Key("masses_kg", _LIST, "mass at each node; 0 where only a force acts", required="a mass for each node"),
     Key("weight_N", _LIST, "what weighs at each node; default: the masses"),
     Key(
@@ -118,17 +130,12 @@ def read_small_model(path: str | Path) -> SmallModel:
     path, problems = Path(path), Problems()
     top = Section(str(path), problems.need(read_toml(path, problems)), problems)
     said = take(top, SMALL_MODEL)
-    found = said["nodes"]
-    nodes = () if found is None else tuple(int(node) for node in found)
-    if found is not None and ((found % 1).any() or (found < 1).any() or len(set(nodes)) != len(nodes)):
-        top.complain("nodes", "different whole numbers from 1 up", value=False)
-        found = None
 
     def node(section: Section) -> int | None:
-        value = section.take("node")
+        value, nodes = section.take("node"), said["nodes"] or ()
         if type(value) is int and value in nodes:
             return value
-        if found is not None:
+        if nodes:
             section.complain("node", f"one of the nodes {listing(map(str, nodes))}")
         return None
 
@@ -140,29 +147,36 @@ def read_small_model(path: str | Path) -> SmallModel:
             if where in total and key == "bow":
                 section.complain("node", "a node that no other [[bow]] has")
             if where is not None and size is not None and angle is not None:
-                value = complex(polar(size.si, angle.si))
-                total[where] = total.get(where, 0j) + value
+                total[where] = total.get(where, 0j) + complex(polar(size.si, angle.si))
         return total
 
-    supports = [
+    made: dict[str, Any] = {name: said[key] for name, key in _ATTRIBUTES.items()}
+    made["supports"] = [
         read_support(section, node, path.parent, kind.name, problems)
         for kind in KINDS
         for section in said[kind.name]
     ]
-    forces = [read_force(section, node, kind.name) for kind in FORCES for section in said[kind.name]]
-    made: dict[str, Any] = {name: said[key] for name, key in _ATTRIBUTES.items()} | {"nodes": nodes}
-    if made["weight"] is None and made["masses"] is not None:
-        made["weight"] = GRAVITY * made["masses"]
-    made |= {"supports": [*filter(None, supports)], "forces": [*filter(None, forces)]}
+    made["forces"] = [read_force(section, node, kind.name) for kind in FORCES for section in said[kind.name]]
     made |= {"unbalance": vectors("unbalance", UNBALANCE), "bow": vectors("bow", BOW)}
     problems.stop()
+    if made["weight"] is None:
+        made["weight"] = GRAVITY * made["masses"]
     try:
-        return SmallModel(**made)
+        model = SmallModel(**made)
     except ValueError as error:
         name, _, expected = str(error).partition(": ")
         top.complain(_ATTRIBUTES.get(name, name), expected, value=False)
         problems.stop()
         raise
+    held = float(model.stiffness.sum())
+    if abs(held) > _HELD * np.abs(model.stiffness).max() and (model.supports or model.forces):
+        warnings.warn(
+            f"{path}, key shaft_stiffness_N_per_m: the shaft itself resists a shift with {held:.4g} N/m; "
+            "what holds it stands in tables such as [[bearing]], and the matrix needs all its digits",
+            TableWarning,
+            stacklevel=2,
+        )
+    return model
 
 
 def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
@@ -189,7 +203,7 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
                 f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it "
                 f"out, and write [[{support.kind}]] with node and table, its file, into the small model"
             )
-        tables.setdefault(support.kind, []).append(support_table(support, None, mixed=False))
+        tables.setdefault("bearing", []).append(support_table(support, None, mixed=True))
     tables |= force_tables(model.forces)
     for name, size, vectors in (
         ("unbalance", "unbalance_kg_m", model.unbalance),

@@ -8,6 +8,7 @@ import numpy as np
 
 from balancing.data.conventions import polar
 from fem.model.rotor import Rotor
+from rotorid.motion.small_model import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, read_table
 from rotorid.tables.reader.problems import Problems
@@ -22,7 +23,7 @@ COLUMNS = (
 )
 
 
-def read_bow(path: str | Path, rotor: Rotor) -> dict[int, complex]:
+def read_bow(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
     """Read a bow table with the columns `node`, `bow_<unit>` and `angle_deg`, with the rotation.
 
     Parameters
@@ -30,7 +31,7 @@ def read_bow(path: str | Path, rotor: Rotor) -> dict[int, complex]:
     path
         The file; in a workbook the sheet `bow`, or else the first one.
     rotor
-        Knows the nodes and the names of stations.
+        Knows the nodes and the names of stations; or a small model.
 
     Returns
     -------

@@ -94,25 +94,15 @@ KEYS_OF_FORCE: dict[str, tuple[Key, ...]] = {
 def read_force(section: Section, node: Callable[[Section], int | None], kind: str) -> NodeForce | None:
     """Read one table of a kind of `FORCES`, such as `[[journal_bearing]]`, or None and problems.
 
-    Parameters
-    ----------
-    section
-        Its settings.
-    node
-        Reads its node.
-    kind
-        Which of them.
-
-    Warns
-    -----
-    TableWarning
-        About values that are no machine's, probably in a wrong unit.
+    `node` reads its node. A `TableWarning` is given of values that are no machine's.
     """
     said = take(section, KEYS_OF_FORCE[kind])
     where = node(section)
     made = find(FORCES, kind, "kind").function
-    written = dict(zip((item.name for item in fields(made)), said.values(), strict=True))
-    values = {name: value.si if isinstance(value, Quantity) else value for name, value in written.items()}
+    values = {
+        item.name: value.si if isinstance(value, Quantity) else value
+        for item, value in zip(fields(made), said.values(), strict=True)
+    }
     if values.get("friction") and not values["diameter"] and "diameter_mm" not in section.refused:
         section.missing("diameter_mm", "the shaft's diameter where it rubs: friction acts against the slip")
     if where is None or section.refused:
@@ -122,7 +112,7 @@ def read_force(section: Section, node: Callable[[Section], int | None], kind: st
     except ValueError as error:
         section.refuse(f"a possible {kind.replace('_', ' ')}: {error}")
         return None
-    warn_of_force(section.source, force, written)
+    warn_of_force(section.source, force)
     return force
 
 

@@ -5,20 +5,17 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from fem.model.node_forces import JournalBearing, NodeForce, SqueezeFilm
+from fem.model.node_forces import NodeForce, ShortFilm
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import BoolArray
 from rotorid.base.checks import attachment
 from rotorid.base.text import counted
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import TableWarning
-from rotorid.tables.reader.settings_keys import Quantity
-from rotorid.tables.reader.units import LENGTH, VISCOSITY
 
 _GRAVITY = 9.81
 _SAG = 10.0  # m: of a rotor on its bearings, which then swings below 0.2 Hz
@@ -70,6 +67,7 @@ USUAL = {
     "friction": Usual(0.0, 1.5, "of the normal force", (0.01, 0.9), (("percent", 0.01),)),
 }
 _CLEARANCE_BY_RADIUS = (2e-4, 1e-2)
+_SHORT = 0.5  # length by diameter up to which the film of `fem.forces` is used
 _STIFF = (("N/mm", 1e3), ("N/µm", 1e6))  # by their size in N/m
 
 
@@ -100,31 +98,28 @@ def warn_of_value(source: str, key: str, stem: str, value: float) -> None:
         _warn(f"{source}, {key}: {value:.6g} {USUAL[stem].unit}; {question}")
 
 
-def warn_of_force(source: str, force: NodeForce, written: Mapping[str, Quantity | float]) -> None:
-    """A force at a node whose values are unlike those of any machine; `written` are its numbers by field."""
+def warn_of_force(source: str, force: NodeForce) -> None:
+    """A force at a node whose values are unlike those of any machine."""
     what = f"{source}, {attachment(force)}"
-    for stem, value in written.items():
-        if stem not in USUAL:
-            continue
-        usual = USUAL[stem]
-        if isinstance(value, Quantity):
-            alike = [unit for unit in (*LENGTH.values(), *VISCOSITY.values()) if unit.kind == value.unit.kind]
-            usual = replace(usual, others=tuple((u.name, value.unit.scale / u.scale) for u in alike))
-            question = usual.question(value.si)
-            shown = f"{value.key} = {value.value:.6g} means {value.si:.6g} {usual.unit}"
-        else:
-            question, shown = usual.question(value), f"{stem} = {value:.6g}"
-        if question:
-            _warn(f"{what}: {shown}; {question}")
+    for stem, usual in USUAL.items():
+        value = getattr(force, stem, 0.0)
+        if question := usual.question(value):
+            _warn(f"{what}: {stem} {value:.6g} {usual.unit}; {question}")
             return
-    if isinstance(force, (JournalBearing, SqueezeFilm)):
-        ratio = 2 * force.clearance / force.diameter
-        low, high = _CLEARANCE_BY_RADIUS
-        if not low <= ratio <= high:
-            _warn(
-                f"{what}: the radial clearance is {ratio:.3g} of the journal's radius, in machines {low:g} "
-                f"to {high:g}; is one of them in another unit, or a diameter taken for a radius?"
-            )
+    if not isinstance(force, ShortFilm):
+        return
+    ratio, slender = 2 * force.clearance / force.diameter, force.length / force.diameter
+    low, high = _CLEARANCE_BY_RADIUS
+    if not low <= ratio <= high:
+        _warn(
+            f"{what}: the radial clearance is {ratio:.3g} of the journal's radius, in machines {low:g} "
+            f"to {high:g}; is one of them in another unit, or a diameter taken for a radius?"
+        )
+    elif round(slender, 6) > _SHORT:
+        _warn(
+            f"{what}: its length is {slender:.3g} of its diameter; short films have up to {_SHORT:g}, a "
+            "longer one carries less than is computed, about half as much at 1"
+        )
 
 
 def warn_of_rotor(source: str, rotor: Rotor) -> None:

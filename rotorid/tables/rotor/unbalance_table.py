@@ -9,6 +9,8 @@ import numpy as np
 from balancing.data.conventions import polar
 from fem.model.rotor import Rotor
 from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.motion.small_model import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
@@ -25,7 +27,7 @@ COLUMNS = (
 )
 
 
-def node_at(table: Table, stem: str, index: int, rotor: Rotor) -> int | None:
+def node_at(table: Table, stem: str, index: int, rotor: Rotor | SmallModel) -> int | None:
     """The node in a cell, by number or by the name of a station; None where it is none, which is noted."""
     name = table.texts(stem)[index]
     if not name:
@@ -33,12 +35,15 @@ def node_at(table: Table, stem: str, index: int, rotor: Rotor) -> int | None:
     try:
         return rotor.node(name)
     except ValueError:
-        expected = f"a node from 1 to {rotor.n_nodes} or a station{did_you_mean(name, rotor.stations)}"
+        if isinstance(rotor, Rotor):
+            expected = f"a node from 1 to {rotor.n_nodes} or a station{did_you_mean(name, rotor.stations)}"
+        else:
+            expected = f"one of the nodes {listing(map(str, rotor.nodes))}"
         table.complain(index, stem, expected)
         return None
 
 
-def read_unbalance(path: str | Path, rotor: Rotor) -> dict[int, complex]:
+def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
     """Read an unbalance table.
 
     Its columns are `plane` or `node`; `unbalance_<unit>`, or both `mass_<unit>` and `radius_<unit>`; and
@@ -49,7 +54,7 @@ def read_unbalance(path: str | Path, rotor: Rotor) -> dict[int, complex]:
     path
         The file; in a workbook the sheet `unbalance`, or else the first one.
     rotor
-        Knows the nodes and the names of stations that a plane may be.
+        Knows the nodes and the names of stations that a plane may be; or a small model.
 
     Returns
     -------

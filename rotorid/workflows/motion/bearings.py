@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _ROWS = 14
 """Of the table that is printed with the answer."""
+_AXES = ("xx", "xy", "yx", "yy")
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class BearingEquilibria(Outcome):
             capital(self.stability.summary()) if self.stability else "One speed: no threshold is sought.",
             text(self._columns(shown), width=COLUMNS),
             self.warnings,
-            tables=(text(self._columns(self.found), width=COLUMNS),) if len(shown) < len(self.found) else (),
+            tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),
             more="every speed",
         )
 
@@ -104,33 +105,34 @@ class BearingEquilibria(Outcome):
 
         from rotorid.motion.linear_coefficients import coefficients
 
-        b, walled = len(self.labels), np.isfinite([force.wall for force in found[0].system.forces])
+        bearings, forces = found[0].bearings, found[0].system.forces
+        walled = [k for k, force in enumerate(forces) if force in bearings]
         K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(found))
-        speeds = np.repeat([at.speed for at in found], b)
-
-        def each(name: str) -> Any:  # noqa: ANN401  an array over speeds and bearings
-            return np.concatenate([getattr(at, name) for at in found])
-
+        speeds = np.repeat([at.speed for at in found], len(bearings))
+        load, e, attitude, sommerfeld = (
+            np.concatenate([getattr(at, name) for at in found])
+            for name in ("load", "eccentricity", "attitude", "sommerfeld")
+        )
+        film = np.tile([one.wall for one in bearings], len(found)) * (1 - e)
         return (
             Column("bearing", self.labels * len(found), str),
-            Column("node", [one.node for one in found[0].bearings] * len(found)),
+            Column("node", [one.node for one in bearings] * len(found)),
             Column("speed_rad_s", speeds),
             Column("speed_rpm", speeds * RPM, "{:.6g}".format, "rpm"),
-            Column("load_N", abs(each("load")), figures, "load, N"),
-            Column("eccentricity", each("eccentricity"), "{:.4f}".format),
-            Column("attitude_deg", np.degrees(each("attitude")), "{:.2f}".format, "attitude, °"),
-            Column("film_m", each("film"), lambda film: figures(1e6 * film), "least film, µm"),
-            Column("sommerfeld", each("sommerfeld"), figures, "Sommerfeld"),
+            Column("load_N", abs(load), figures, "load, N"),
+            Column("eccentricity", e, "{:.4f}".format),
+            Column("attitude_deg", np.degrees(attitude), "{:z.2f}".format, "attitude, °"),
+            Column("film_m", film, lambda film: figures(1e6 * film), "least film, µm"),
+            Column("sommerfeld", sommerfeld, figures, "Sommerfeld"),
             *(Column(f"k{n}_N_per_m", values) for n, values in zip(_AXES, K, strict=True)),
             *(Column(f"c{n}_N_s_per_m", values) for n, values in zip(_AXES, C, strict=True)),
         )
 
     def figure(self) -> Figure:
-        """Loci, stability map, coefficients over speed."""
+        """Loci and stability map."""
         from rotorid.motion.bearing_pictures import bearings_figure
 
-        threshold = None if self.stability is None else self.stability.threshold
-        return bearings_figure(self.found, self.labels, threshold)
+        return bearings_figure(self.found, self.labels)
 
     def files(self, path: Path) -> Mapping[Path, bytes]:
         """The linear rotor as a rotor file, .toml, with its tables; or the table, .csv or .xlsx.
@@ -148,9 +150,6 @@ class BearingEquilibria(Outcome):
         if len(self.found) < 2:
             raise ValueError(f"{path}: a table over speed needs two speeds at least (--speeds)")
         return rotor_file_bytes(path, self.linear)
-
-
-_AXES = ("xx", "xy", "yx", "yy")
 
 
 @workflow
@@ -171,7 +170,8 @@ def bearings(rotor: Rotor | Path | str, options: BearingsOptions) -> BearingEqui
     """
     import numpy as np
 
-    from rotorid.motion.equilibrium import equilibria
+    from fem import SqueezeFilm
+    from rotorid.motion.equilibrium import equilibria, named
     from rotorid.motion.linear_coefficients import linear_rotor, threshold
     from rotorid.motion.rotor_system import rotor_system
 
@@ -187,27 +187,11 @@ def bearings(rotor: Rotor | Path | str, options: BearingsOptions) -> BearingEqui
     with phase("stability"):
         stability = threshold(model, system, found) if len(found) > 1 else None
     log_rotor(model, speeds=len(speeds))
+    small = "stiffness and damping are those at its centre, they hold for small orbits about it"
     return BearingEquilibria(
         found=found,
         linear=linear_rotor(model, found),
         stability=stability,
-        warnings=_warnings(model),
+        warnings=tuple(f"{named(f)}: {small}" for f in model.forces if isinstance(f, SqueezeFilm)),
         provenance=provenance(files, options),
     )
-
-
-def _warnings(rotor: Rotor) -> tuple[str, ...]:
-    from fem.model.node_forces import SqueezeFilm
-    from rotorid.motion.equilibrium import named
-
-    said = [
-        f"{named(force)}: stiffness and damping are those at its centre, they hold for small orbits about it"
-        for force in rotor.forces
-        if isinstance(force, SqueezeFilm)
-    ]
-    said += [
-        f"{named(force)}: its fluid is a disc of {force.mass:.4g} kg in the linear rotor, which it loads"
-        for force in rotor.forces
-        if force.mass
-    ]
-    return tuple(said)

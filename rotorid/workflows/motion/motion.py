@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.base.arrays import FloatArray
     from rotorid.motion.reduced_system import ReducedSystem
     from rotorid.motion.run import MotionRun
     from rotorid.motion.small_model import SmallModel
@@ -68,9 +67,9 @@ class MotionOptions:
     acceleration : A
         Of a run-up or a run-down, in place of its time: 300rpm/s.
     unbalance : FILE
-        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
-        Table of the shaft's bow at rest; a small model has its own.
+        Table of the shaft's bow at rest; in place of a small model's own.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     start
@@ -81,7 +80,8 @@ class MotionOptions:
         Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
     modes : N
         Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
-        together; default: those up to 8 times the highest speed; small models keep all.
+        together; default: as many as its natural frequencies up to twice the highest speed need to agree
+        to 0.03 %; small models keep all.
     rate : N
         Samples a second; default: 64 a turn at the highest speed.
     tolerance : T
@@ -130,35 +130,28 @@ class Motion(Outcome):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
+        import numpy as np
+
         motion, end, reduced = self.motion, self.end, self.reduced
-        names = [force.name or f"node {force.node}" for force, _ in motion.bearings]
-        ranges = _ranges(motion) if end is None else end.eccentricity
+        ranges = motion.eccentricity() if end is None else end.eccentricity
+        nodes = [str(node) for node in motion.nodes]
+        deflections = np.stack([motion.z.real, motion.z.imag], axis=2)
         return plain(
             {
                 "time_s": motion.time,
                 "speed_rad_s": motion.speed,
                 "angle_rad": motion.turned,
-                "positions_m": {
-                    str(node): [[z.real, z.imag] for z in motion.z[:, i].tolist()]
-                    for i, node in enumerate(motion.nodes)
-                },
+                "positions_m": {node: deflections[:, i] for i, node in enumerate(nodes)},
                 "steady": end and end.steady,
                 "periodic": end and end.periodic,
-                "period": end and end.period,
+                "period_s": end and end.period,
                 "whirl_ratio": end and end.whirl_ratio,
                 "whirl_frequency_rad_s": end and end.frequency,
-                "amplitude_m": end and dict(zip(map(str, motion.nodes), end.amplitude.tolist(), strict=True)),
-                "eccentricity": dict(zip(names, ranges.tolist(), strict=True)),
-                "multipliers": None,
-                "steps": motion.steps,
+                "amplitude_m": end and dict(zip(nodes, end.amplitude, strict=True)),
+                "eccentricity": dict(zip(self._bearings, ranges.tolist(), strict=True)),
                 "tolerance": motion.tolerance,
                 "position_error": self.error,
-                "reduction": reduced
-                and {
-                    "modes": reduced.modes,
-                    "first_left_out_rad_s": reduced.first_left_out,
-                    "frequency_error": reduced.error,
-                },
+                "reduction": reduced and {"modes": reduced.modes, "frequency_error": reduced.error},
                 "warnings": self.warnings,
             }
         )
@@ -185,18 +178,28 @@ class Motion(Outcome):
     @property
     def answer(self) -> Answer:
         """What it has come to or where it was largest, and each node; how it was found."""
-        motion = self.motion
-        tables = [text(self._largest(), width=COLUMNS)]
-        if motion.bearings:
-            tables.append(text(self._eccentricities(), width=COLUMNS))
+        tables = [text(self._nodes(), width=COLUMNS)]
+        if self._bearings:
+            when = "" if self.end is None else "at the end "
+            least, most = (self.motion.eccentricity() if self.end is None else self.end.eccentricity).T
+            ranges = (
+                Column("bearing", self._bearings, str),
+                Column("least", least, "{:.4f}".format, f"eccentricity {when}from"),
+                Column("most", most, "{:.4f}".format, "to"),
+            )
+            tables.append(text(ranges, width=COLUMNS))
         return Answer(self._judgement(), "\n\n".join(tables), self.warnings, self._notes())
+
+    @property
+    def _bearings(self) -> list[str]:
+        return [force.name or f"node {force.node}" for force, _ in self.motion.bearings]
 
     def _judgement(self) -> str:
         end, motion = self.end, self.motion
+        first, last = motion.speeds
+        if end is None and first == last:
+            return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
         if end is None:
-            first, last = motion.speeds
-            if first == last:
-                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too short to say more."
             size = abs(motion.z)
             k, i = divmod(int(size.argmax()), len(motion.nodes))
             return (
@@ -204,32 +207,34 @@ class Motion(Outcome):
                 f"the line of bearings at node {motion.nodes[i]}, {figures(1e6 * size[k, i])} µm at "
                 f"{rpm_text(motion.speed[k])}."
             )
-        where = f"At {rpm_text(end.speed)}"
+        where = f"At {rpm_text(first)}"
         if end.at_rest:
             return f"{where} it comes to rest."
-        if not end.steady:
-            return (
-                f"{where} it is NOT STEADY yet after {figures(motion.time[-1])} s: amplitude or mean still "
-                f"change by {percent(end.change)} % within its last tenths; give it more --time."
-            )
         whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
         if end.speed:
             way = ", against the rotation" if end.frequency < 0 else ""
             whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
-        unit = " s" if not end.speed else " turn" if round(end.period, 3) == 1 else " turns"
-        again = f"comes again every {end.period:.5g}{unit}" if end.periodic else "does not come again"
-        return f"{where} the motion is steady and {again}; {whirl}."
+        if not end.steady:
+            more = "give it more --time" if end.trend else "with more --time still so, it beats or is chaotic"
+            return (
+                f"{where} it is NOT STEADY after {figures(motion.time[-1])} s: size or mean change by "
+                f"{percent(end.change)} % in its last part; {more}; {whirl}."
+            )
+        again = "does not come again"
+        if end.periodic:
+            turns = end.period * end.speed * RPM / 60
+            unit = "s" if not turns else "turn" if round(turns, 3) == 1 else "turns"
+            again = f"comes again every {turns or end.period:.5g} {unit}"
+        return f"{where} the motion is steady to {percent(end.change)} % and {again}; {whirl}."
 
-    def _largest(self) -> tuple[Column, ...]:
+    def _nodes(self) -> tuple[Column, ...]:
         """A row for each node: where it was furthest from the line of bearings, and what the end is."""
-        import numpy as np
-
         motion, end = self.motion, self.end
         size = abs(motion.z)
         at = size.argmax(axis=0)
         columns = (
             Column("node", motion.nodes, str),
-            Column("largest_m", 1e6 * size[at, np.arange(at.size)], figures, "furthest, µm"),
+            Column("largest_m", 1e6 * size.max(axis=0), figures, "furthest, µm"),
             Column("at_s", motion.time[at], figures, "at, s"),
             Column("at_rpm", motion.speed[at] * RPM, "{:.6g}".format, "at, rpm"),
         )
@@ -242,21 +247,11 @@ class Motion(Outcome):
             Column("y", 1e6 * end.mean.imag, figures, "mean y, µm"),
         )
 
-    def _eccentricities(self) -> tuple[Column, ...]:
-        """A row for each bearing: of the whole motion, or of its end."""
-        motion, end = self.motion, self.end
-        least, most = (_ranges(motion) if end is None else end.eccentricity).T
-        when = "" if end is None else "at the end "
-        return (
-            Column("bearing", [force.name or f"node {force.node}" for force, _ in motion.bearings], str),
-            Column("least", least, "{:.4f}".format, f"eccentricity {when}from"),
-            Column("most", most, "{:.4f}".format, "to"),
-        )
-
     def _notes(self) -> tuple[str, ...]:
         motion, reduced = self.motion, self.reduced
+        step = 1e3 * motion.time[-1] / motion.steps
         found = (
-            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of how far the rotor moves; "
+            f"steps of about {figures(step, 1)} ms, each to {motion.tolerance:g} of how far the rotor moves; "
             f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
         )
         if reduced is None:
@@ -293,9 +288,10 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     """
     import numpy as np
 
+    from rotorid.motion.reduced_system import reduced_system
     from rotorid.motion.run import run
     from rotorid.motion.start import begin
-    from rotorid.motion.steady_end import LEAST_SAMPLES, steady_end
+    from rotorid.motion.steady_end import steady_end
 
     ends, time = _course(options)
     direction = degrees(options.gravity_direction, "--gravity-direction")
@@ -304,13 +300,14 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     system = source.system(low, high if high > low else low * (1 + 1e-6) + 1e-9)
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    with phase("equations"):
-        reduced = _reduced(system, sorted({*shown, *shift, *_loaded(system)}), options.modes)
-        system = system if reduced is None else reduced.system
-    tolerance = options.tolerance
+    reduced, tolerance = None, options.tolerance
+    if options.modes is not None or system.size > _SMALL:
+        with phase("equations"):
+            reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
+        system = reduced.system
     with phase("start"):
-        start = begin(system, ends[0], options.start, shift, tolerance)
-    move = partial(run, system, ends, time, (start.q, start.v), nodes=shown, rate=options.rate)
+        q, v, unsettled = begin(system, ends[0], options.start, shift, tolerance)
+    move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
     with phase("motion"):
         found = move(tolerance=tolerance)
     with phase(f"motion with {_LOOSER:g} times the tolerance"):
@@ -321,13 +318,12 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     k = min(found.time.size, rough.time.size)
     moved = np.abs(found.z - found.z[0]).max()
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
-    constant = ends[0] == ends[1] and found.time.size >= LEAST_SAMPLES
     return Motion(
         motion=found,
         reduced=reduced,
-        end=steady_end(found) if constant else None,
+        end=steady_end(found),
         error=error,
-        warnings=(*start.warnings, *_warnings(found, error, bool(shift))),
+        warnings=(*unsettled, *_warnings(found, error, bool(shift))),
         provenance=provenance(source.files, options),
     )
 
@@ -412,26 +408,15 @@ def _loaded(system: MotionSystem) -> list[int]:
     return found if len(found) <= _SMALL // 2 else []
 
 
-def _reduced(system: MotionSystem, kept: Sequence[int], modes: int | None) -> ReducedSystem | None:
-    from rotorid.motion.reduced_system import reduced_system
-
-    return reduced_system(system, kept, modes) if modes is not None or system.size > _SMALL else None
-
-
-def _ranges(found: MotionRun) -> FloatArray:
-    """Least and largest eccentricity of each bearing in the whole motion, shape (b, 2)."""
-    import numpy as np
-
-    sizes = [np.abs(found.z[:, i]) / force.wall for force, i in found.bearings]
-    return np.array([(size.min(), size.max()) for size in sizes]).reshape(-1, 2)
-
-
 def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
+    if not found.resolved:
+        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
     if error > _UNSURE:
         said.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "
-            "the rotor moves: where it whips, amplitude and frequency of the whirl count, not its phase"
+            "the rotor moves: where it whips, amplitude and frequency of the whirl count, not its phase; "
+            "where it is chaotic, positions cannot be compared"
         )
     if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
         said.append("nothing excites it: no unbalance, no bow (--unbalance)")

@@ -47,9 +47,9 @@ class PeriodicOptions:
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     unbalance : FILE
-        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
-        Table of the shaft's bow at rest; a small model has its own.
+        Table of the shaft's bow at rest; in place of a small model's own.
     modes : N
         Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
         default: those up to 4 times the highest speed, up to 24 unknowns at least; all of a small model.

@@ -21,6 +21,7 @@ FILM = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
         ),
         (lambda: fem.JournalBearing(1, "DE", **FILM | {"length": -1}), "bearing 'DE' at node 1: length must"),
         (lambda: fem.JournalBearing(1, **FILM, film="pi"), "film 'pi' is not known"),
+        (lambda: fem.SqueezeFilm(1, **FILM | {"clearance": 1e-200}), "clearance must be above 0, not 1e-200"),
         (lambda: fem.SqueezeFilm(0, **FILM), "squeeze film: node 0 does not exist"),
         (lambda: fem.SqueezeFilm(1.5, **FILM), "the node of squeeze film must be a whole number"),
         (lambda: fem.MuszynskaSeal(1), "clearance must be above 0"),

@@ -297,13 +297,15 @@ def test_options_without_effect_are_refused(cli, more, message):
 def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeypatch):
     monkeypatch.chdir(sample_data().parent)
     stored = MOTION / "small.toml"
-    command = stored.read_text(encoding="utf-8").splitlines()[0].removeprefix("# rotorid ")
-    made = tmp_path / "made.toml"
-    text = cli(*command.replace("FILE.toml", str(made)).split()).out
+    said = (MOTION / "README.md").read_text(encoding="utf-8")
+    command = said.partition("`rotorid reduce ")[2].partition("small.toml`")[0]
+    made = tmp_path / "small.toml"
+    text = cli("reduce", *command.split(), made).out
     assert "The shaft held rigidly at nodes 2 and 22, without its supports and forces:" in text
-    assert "together 558.53, weight 5477.4 N; journal bearing at nodes 2 and 22" in text
+    assert "together 558.53, weight 5477.4 N; journal bearing at 2" in text
     mine, theirs = read_small_model(made), read_small_model(stored)
-    assert made.read_text(encoding="utf-8").splitlines()[0] == f"# rotorid {command}"
+    first, again = (path.read_text(encoding="utf-8").splitlines()[0] for path in (made, stored))
+    assert first == again
     assert mine.nodes == theirs.nodes == (2, 7, 12, 18, 22)
     assert mine.forces == theirs.forces
     unbalanced = (MOTION / "unbalanced.toml").read_text(encoding="utf-8")
@@ -316,13 +318,12 @@ def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeyp
 
 def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
     document = cli("reduce", MOTION / "rotor.toml", "--place", "book", "--keep-supports", "--json").json
-    assert document["held_nodes"] == [2, 22]
     assert document["motion_model"]["nodes"] == sorted([2, 22, *document["nodes"]])
     assert sum(document["motion_model"]["weight_N"]) == pytest.approx(9.80665 * 558.5346506833)
     ranked = cli("reduce", MOTION / "rotor.toml", "--rank", "--masses", 2, "--keep-supports", "--json").json
     assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
     path = tmp_path / "small.toml"
-    more = ("--keep-supports", "--damping", "1,2", "--motion-model", path, "--report", tmp_path / "page.html")
+    more = ("--keep-supports", "--damping", "1,2", "--model", path, "--report", tmp_path / "page.html")
     cli("reduce", ROTOR, "--nodes", "7,12,18", *more)
     model = read_small_model(path)
     assert model.supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
@@ -333,7 +334,6 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
     ("arguments", "message"),
     [
         ((MOTION / "rotor.toml", "--nodes", "7,12"), "reduce it with --keep-supports"),
-        ((ROTOR, "--nodes", "7", "--motion-model", "m.toml"), "--motion-model does nothing without --keep-s"),
         ((ROTOR, "--nodes", "2,7", "--keep-supports"), "node 2 is held rigidly while the masses are found"),
         (
             (ROTOR, "--nodes", "7", "--keep-supports", "--speed", "10"),
@@ -343,10 +343,10 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
             (ROTOR, "--nodes", "7", "--keep-supports", "--stability", "0:9"),
             "--stability asks for the rotor on",
         ),
-        ((ROTOR, "--nodes", "7", "--keep-supports", "--model", "m.toml"), "leave out --keep-supports"),
+        ((ROTOR, "--nodes", "7", "--keep-supports", "--state-space", "m.npz"), "leave out --keep-supports"),
         (("--compliance", ROTOR, "--measured", ROTOR, "--keep-supports"), "--keep-supports needs a rotor"),
         (
-            (COMPRESSOR, "--nodes", "8,13", "--keep-supports", "--motion-model", "m.toml"),
+            (COMPRESSOR, "--nodes", "8,13", "--keep-supports", "--model", "m.toml"),
             "the bearing at node 4 depend on speed: leave it out, and write [[bearing]] with node and table",
         ),
     ],

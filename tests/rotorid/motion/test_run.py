@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import fem
 from fem.model.node_forces import CubicSpring, JournalBearing, MuszynskaSeal
-from rotorid.motion.run import run
+from rotorid.motion.run import MotionRun, run
 from rotorid.motion.start import begin
 from rotorid.motion.steady_end import steady_end
 from rotorid.motion.synchronous_part import synchronous_part
@@ -63,8 +63,8 @@ def test_run_up_of_a_jeffcott_rotor(zeta, alpha, size, speed):
 )
 def test_run_down_of_a_jeffcott_rotor_from_steady_motion(alpha, size, speed):
     rotor = jeffcott(0.02)
-    start = begin(rotor, 2.5, "steady")
-    found = run(rotor, (2.5, 0.5), 2.0 / alpha, (start.q, start.v), tolerance=1e-8)
+    q, v, _ = begin(rotor, 2.5, "steady")
+    found = run(rotor, (2.5, 0.5), 2.0 / alpha, (q, v), tolerance=1e-8)
     assert largest(found) == pytest.approx((size, speed), rel=1e-6, abs=1e-5)
 
 
@@ -124,7 +124,7 @@ def test_the_steady_end_on_linear_supports_is_the_response():
     np.testing.assert_allclose(X[-1], x, atol=1e-5 * np.abs(x).max())
     end = steady_end(found)
     assert end.periodic
-    assert end.period == 1
+    assert end.period * speed == pytest.approx(2 * np.pi)
     assert end.frequency == pytest.approx(speed, rel=1e-4)
 
 
@@ -169,8 +169,8 @@ def rigid(mass, film, **more):
 
 def moved(mass, film, turns, tolerance=1e-6, by=5e-6, **more):
     made = rigid(mass, film, **more)
-    start = begin(made, SPEED, shift={1: by})
-    return run(made, (SPEED, SPEED), turns * 2 * np.pi / SPEED, (start.q, start.v), tolerance=tolerance)
+    q, v, _ = begin(made, SPEED, shift={1: by})
+    return run(made, (SPEED, SPEED), turns * 2 * np.pi / SPEED, (q, v), tolerance=tolerance)
 
 
 @pytest.mark.parametrize("film", ["pressure", "line of centres"])
@@ -186,7 +186,7 @@ def test_above_its_critical_mass_a_rotor_ends_on_a_limit_cycle():
     ends = [steady_end(moved(8.0, "pressure", 800, tolerance)) for tolerance in (1e-6, 1e-5)]
     for end in ends:
         assert end.periodic
-        assert end.period == pytest.approx(1 / 0.4982, abs=1e-3)
+        assert end.period * SPEED / (2 * np.pi) == pytest.approx(1 / 0.4982, abs=1e-3)
     assert ends[0].whirl_ratio == pytest.approx(0.4982, abs=5e-5)
     assert ends[0].eccentricity == pytest.approx(np.array([[0.8287, 0.8411]]), abs=5e-5)
     assert ends[1].amplitude == pytest.approx(ends[0].amplitude, rel=1e-3)
@@ -202,8 +202,53 @@ def test_limit_cycle_with_the_film_of_the_textbook():
 def test_the_end_is_not_called_steady_while_it_changes():
     end = steady_end(moved(7.0, "pressure", 40))
     assert not end.steady
+    assert end.trend
     assert not end.periodic
     assert end.change > 0.01
+
+
+def told(z, turns=100.0, speed=100.0, rate=64):
+    """A motion of one node that was not computed, z over the angle of rotation."""
+    angle = np.linspace(0, 2 * np.pi * turns, int(rate * turns) + 1)
+    made = one_mass(1.0, 0.0, 1.0, unbalance={1: 1.0})
+    values = np.asarray(z(angle), dtype=complex)[:, None]
+    rest = np.zeros(2)
+    return MotionRun(made, (1,), angle / speed, (speed, speed), values, rest, rest, 0.0, 1, 0, 1e-6, "")
+
+
+@pytest.mark.parametrize(
+    ("z", "steady", "trend", "turns"),
+    [
+        (lambda a: np.exp(1j * a), True, None, 1),
+        (lambda a: 2 + np.exp(1j * a) + 0.1 * np.exp(-0.5j * a), True, None, 2),
+        (lambda a: np.exp(1j * a) + 0.3 * np.exp(0.4j * a), True, None, 5),
+        (lambda a: np.exp(1j * a) + np.exp(0.1j * np.sqrt(26) * a), True, None, None),  # never again
+        (lambda a: (1 + 3e-4 * np.sin(a / 40)) * np.exp(1j * a), True, None, 1),
+        (lambda a: (1 + np.exp(-a / 200)) * np.exp(1j * a), False, True, None),  # decays
+        (lambda a: a / 1e4 + np.exp(1j * a), False, True, None),  # goes aside
+        (lambda a: (1 + 0.5 * np.sin(a / 13)) * np.exp(1j * a), False, False, None),  # beats
+        (lambda a: a * 0 + 3, True, None, None),
+    ],
+)
+@pytest.mark.parametrize("rate", [64, 9])
+def test_what_is_called_steady(z, steady, trend, turns, rate):
+    end = steady_end(told(z, rate=rate))
+    assert end.steady is steady
+    if trend is not None:
+        assert end.trend is trend
+    if turns is None:
+        assert not end.periodic or end.at_rest
+    elif rate > 9:
+        assert end.periodic
+        assert end.period * end.speed == pytest.approx(2 * np.pi * turns)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.4982, -1.0, -0.31, 3.0, 0.27123])
+def test_the_frequency_of_a_whirl_with_other_lines_beside_it(ratio):
+    end = steady_end(
+        told(lambda a: np.exp(1j * ratio * a) + 0.4 * np.exp(-1j * ratio * a) + 0.2 * np.exp(0.75j * a))
+    )
+    assert end.whirl_ratio == pytest.approx(ratio, abs=1e-4)
 
 
 def test_three_masses_in_two_bearings_without_mass():
@@ -224,8 +269,8 @@ def test_three_masses_in_two_bearings_without_mass():
         unbalance={3: m * e},
     )
     first, last, time = 100.0, 300.0, 0.15
-    start = begin(made, first)
-    found = run(made, (first, last), time, (start.q, start.v))
+    q, v, _ = begin(made, first)
+    found = run(made, (first, last), time, (q, v))
     alpha = (last - first) / time
 
     nodes, weights = np.polynomial.legendre.leggauss(64)
@@ -257,7 +302,6 @@ def test_three_masses_in_two_bearings_without_mass():
         a[1] += e * (speed**2 - 1j * alpha) * np.exp(1j * phi)
         return np.concatenate([dz.real, dz.imag, a.real, a.imag])
 
-    q, v = start.q, start.v
     s0 = np.concatenate([q[:5], q[5:], v[1:4], v[6:9]])
     exact = solve_ivp(slope, (0, time), s0, "LSODA", found.time[::50], rtol=1e-8, atol=1e-12)
     z = (exact.y[:5] + 1j * exact.y[5:10]).T
@@ -274,8 +318,8 @@ def test_a_shaft_that_touches_its_wall_stops_the_motion():
     assert found.time[-1] < 1.0
     assert np.isfinite(found.z).all()
     assert np.abs(found.z).max() == pytest.approx(2e-4, rel=0.05)
-    told = float(found.stopped.split(" after ")[1].split(" s")[0])
-    assert found.time[-1] <= told <= found.time[-1] + found.time[1]
+    touches = float(found.stopped.split(" after ")[1].split(" s")[0])
+    assert found.time[-1] <= touches <= found.time[-1] + found.time[1]
 
 
 def test_a_motion_that_begins_beyond_a_wall_ends_at_once():
@@ -316,9 +360,9 @@ def test_interpreted_and_compiled_agree(monkeypatch):
     plain = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(plain)
     made = rigid(7.5, "pressure", unbalance={1: 1e-3})
-    start = begin(made, SPEED)
-    found = [run(made, (SPEED, 2 * SPEED), 0.1, (start.q, start.v))]
+    q, v, _ = begin(made, SPEED)
+    found = [run(made, (SPEED, 2 * SPEED), 0.1, (q, v))]
     monkeypatch.setattr("rotorid.motion.run.advance", plain.advance)
-    found.append(run(made, (SPEED, 2 * SPEED), 0.1, (start.q, start.v)))
+    found.append(run(made, (SPEED, 2 * SPEED), 0.1, (q, v)))
     assert found[0].steps == found[1].steps
     np.testing.assert_allclose(found[0].z, found[1].z, rtol=1e-9)

@@ -5,6 +5,7 @@ import pytest
 
 from fem import JournalBearing, Rotor
 from rotorid.motion.small_model import SmallModel
+from rotorid.tables import InputError
 from rotorid.tables.models.small_model_file import small_model_bytes
 from rotorid.workflows.motion.moving_system import moving
 
@@ -44,8 +45,20 @@ def test_a_small_model_has_its_own(tmp_path):
     assert found.node("3") == 3
     x, y = (system := found.system(10.0, 500.0)).index(3)
     np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4 + 2e-5j, 2e-5 - 1e-4j])
-    with pytest.raises(ValueError, match="no node 2: the small model has 1, 3, 5"):
+    with pytest.raises(ValueError, match="node 2 does not exist: the small model has 1, 3 and 5"):
         found.node("2")
-    (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n3,100,90\n")
-    with pytest.raises(ValueError, match=r"in its own file, as \[\[unbalance\]\]"):
-        moving(path, tmp_path / "u.csv")
+
+
+def test_tables_stand_in_place_of_a_small_model_s_own(tmp_path):
+    """The same tables as of the rotor; nodes that the small model has not are refused with their row."""
+    (tmp_path / "u.csv").write_text("plane,mass_g,radius_mm,angle_deg\n3,2,50,90\n3,1,100,0\n")
+    (tmp_path / "b.csv").write_text("node,bow_um,angle_deg\n1,0,0\n3,20,0\n5,0,0\n")
+    found = moving(SMALL, tmp_path / "u.csv", tmp_path / "b.csv")
+    x, y = (system := found.system(10.0, 500.0)).index(3)
+    np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4 + 1e-4j, 1e-4 - 1e-4j], rtol=1e-12)
+    whole = moving(ROTOR, tmp_path / "u.csv").system(10.0, 500.0)
+    np.testing.assert_array_equal(whole.unbalance[[*whole.index(3)]], system.unbalance[[x, y]])
+    assert system.bow[x].real == pytest.approx(4e7 * 20e-6)
+    (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n4,2,0\n")
+    with pytest.raises(InputError, match=r"row 2, column plane: .* one of the nodes 1, 3 or 5"):
+        moving(SMALL, tmp_path / "u.csv")

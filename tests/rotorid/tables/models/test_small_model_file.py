@@ -15,7 +15,7 @@ from fem.model.node_forces import (
     Stop,
 )
 from rotorid.motion.small_model import SmallModel
-from rotorid.tables import InputError
+from rotorid.tables import InputError, TableWarning
 from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes
 from tests.helpers.cases import each_of
 
@@ -56,6 +56,7 @@ def written(tmp_path, text):
 def some(seed):
     rng = np.random.default_rng(seed)
     half = rng.normal(size=(4, 3, 3))
+    half[0] -= half[0].mean(axis=0)  # a shaft resists no shift
     K, B, G, C = half @ half.swapaxes(1, 2)
     return SmallModel(
         nodes=(2, 7, 30),
@@ -69,7 +70,8 @@ def some(seed):
             fem.Support(
                 2, ((1e7, 2e5), (-2e5, 3e7)), 1e3, "drive", pedestal=fem.Pedestal(5.0, (1e8, 2e8), 10.0)
             ),
-            fem.Support(7, -1e5, kind="seal"),
+            fem.Support(7, -1e5, kind="seal", pedestal=fem.Pedestal(1.0, (1e6, 1e6))),
+            fem.Support(30, 1e6),
         ],
         forces=[
             JournalBearing(30, "far", 0.05, 0.11, 1.5e-4, 0.004, "line of centres"),
@@ -125,15 +127,16 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
         ("[1, 5, 9]", "[1, 5, 5]", r"key nodes: expected different whole numbers from 1 up"),
         ("[1, 5, 9]", "[1, 5, 9.5]", r"key nodes: expected different whole numbers from 1 up"),
         ("[1, 5, 9]", "[0, 5, 9]", r"key nodes: expected different whole numbers from 1 up"),
+        ("[1, 5, 9]", "[]", r"^[^\n]*key nodes: expected a list of finite numbers, one for each node$"),
         ("[1, 5, 9]", "7", r"key nodes: expected a list of finite numbers"),
         ("masses_kg", "mass_kg", r"key masses_kg: expected a mass for each node"),
-        ("80.5, 12", "80.5", r"key masses_kg: expected 3 numbers for 3 nodes"),
+        ("80.5, 12", "80.5", r"key masses_kg: expected 3 finite numbers for 3 nodes"),
         ("80.5", "-80.5", r"key masses_kg: expected 0 or more"),
         ("80.5", "nan", r"key masses_kg: expected a list of finite numbers"),
         ("80.5", "true", r"key masses_kg: expected a list of finite numbers"),
         ("80.5", '"80.5"', r"key masses_kg: expected a list of finite numbers"),
         ("[-2e6, 4e6", "[-2.1e6, 4e6", r"key shaft_stiffness_N_per_m: expected a symmetric matrix"),
-        (", [1e6, -2e6, 1e6]]", "]", r"key shaft_stiffness_N_per_m: expected 3 × 3 numbers"),
+        (", [1e6, -2e6, 1e6]]", "]", r"key shaft_stiffness_N_per_m: expected 3 × 3 finite"),
         (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: expected a square matrix"),
         ("shaft_stiffness", "stiffness", r"shaft_stiffness_N_per_m: expected the shaft's stiffness"),
         (
@@ -143,7 +146,11 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
         ),
         ("node = 9\n", "", r"key journal_bearing\[1\].node: expected one of the nodes 1, 5 or 9"),
         ("node = 9\n", "node = [9]\n", r"key journal_bearing\[1\].node: found"),
-        ("[-2e6, 4e6", "[-2e6, -4e6", r"key shaft_stiffness_N_per_m: expected a matrix that no motion makes"),
+        (
+            "[-2e6, 4e6",
+            "[-2e6, -4e6",
+            r"key shaft_stiffness_N_per_m: .* no negative eigenvalue",
+        ),
         ("node = 1\n", "node = 1.0\n", r"key bearing\[1\].node: found '1.0', expected one of the nodes"),
         ("node = 5\n", "node = true\n", r"key unbalance\[1\].node: found 'true', expected one of the nodes"),
         ("clearance_um = 150", "clearance_um = 0", r"clearance_um.*above 0"),
@@ -162,6 +169,18 @@ def test_bad_files_are_refused_with_file_and_key(tmp_path, old, new, message):
     with pytest.raises(InputError, match=message) as raised:
         read_small_model(path)
     assert str(path) in str(raised.value)
+
+
+def test_a_shaft_that_resists_a_shift_is_asked_about(tmp_path):
+    """Supports that stand twice, and a matrix of few digits, are motions on other supports."""
+    held = PLAIN.replace("[[1e6, -2e6", "[[1.1e7, -2e6")
+    with pytest.warns(TableWarning, match=r"key shaft_stiffness_N_per_m: .* a shift with 1e\+07 N/m"):
+        read_small_model(written(tmp_path, held))
+    few = PLAIN.replace("4e6", "3.99999e6")
+    with pytest.warns(TableWarning, match=r"a shift with -10 N/m; .* needs all its digits"):
+        read_small_model(written(tmp_path, few))
+    alone = PLAIN.replace("[[1e6, -2e6", "[[1.1e7, -2e6").split("[[bearing]]")[0]
+    assert read_small_model(written(tmp_path, alone)).motion().K[0, 0] == 1.1e7
 
 
 def test_a_model_that_was_changed_is_another(tmp_path):

@@ -115,15 +115,28 @@ def test_all_problems_at_once(file):
 
 
 UNLIKELY = [
-    ("journal_bearing", [*BEARING[:2], "clearance_m = 100", BEARING[3]], "means 100 m; is this in um?"),
-    ("journal_bearing", [*BEARING[:2], "clearance_mm = 100", BEARING[3]], "means 0.1 m; is this in um?"),
-    ("journal_bearing", [*BEARING[:2], "clearance_um = 0.1", BEARING[3]], "is this in mm?"),
-    ("journal_bearing", [*BEARING[:3], "viscosity_Pa_s = 28"], "means 28 Pa·s; is this in mPa_s?"),
-    ("squeeze_film", [*BEARING[:3], "viscosity_mPa_s = 0.005"], "is this in Pa_s?"),
-    ("squeeze_film", ["length_m = 300", *BEARING[1:]], "length_m = 300 means 300 m; is this in mm?"),
+    (
+        "journal_bearing",
+        [*BEARING[:2], "clearance_m = 100", BEARING[3]],
+        "clearance 100 m; is this in another unit?",
+    ),
+    ("journal_bearing", [*BEARING[:2], "clearance_mm = 100", BEARING[3]], "clearance 0.1 m; is this in"),
+    (
+        "journal_bearing",
+        [*BEARING[:2], "clearance_um = 0.1", BEARING[3]],
+        "clearance 1e-07 m; is this in another",
+    ),
+    ("journal_bearing", [*BEARING[:3], "viscosity_Pa_s = 28"], "viscosity 28 Pa·s; is this in another unit?"),
+    ("squeeze_film", [*BEARING[:3], "viscosity_mPa_s = 0.005"], "viscosity 5e-06 Pa·s; is this"),
+    ("squeeze_film", ["length_m = 300", *BEARING[1:]], "length 300 m; is this in mm?"),
     ("squeeze_film", [*BEARING[:2], "clearance_um = 2000", BEARING[3]], "is 0.04 of the journal's radius"),
-    ("annular_seal", [*SEAL[:2], "swirl_ratio = 40", SEAL[3]], "swirl_ratio = 40; is this in percent?"),
-    ("stop", ["gap_m = 0.2", "stiffness_N_per_m = 1e7"], "is this in mm?"),
+    ("journal_bearing", ["length_mm = 90", *BEARING[1:]], "its length is 0.9 of its diameter; short films"),
+    (
+        "annular_seal",
+        [*SEAL[:2], "swirl_ratio = 40", SEAL[3]],
+        "swirl_ratio 40 of the shaft's speed; is this in percent?",
+    ),
+    ("stop", ["gap_m = 0.2", "stiffness_N_per_m = 1e7"], "gap 0.2 m; is this in another unit?"),
 ]
 
 
