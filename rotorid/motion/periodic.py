@@ -175,7 +175,10 @@ class _Search:
         """Follow what motion in time comes to and no branch shows; what is not followed, in words."""
         said: dict[str, list[str]] = {}
         for speed in self._asked(branches):
-            end = self.reached(speed)
+            try:
+                end = self.reached(speed)
+            except ValueError as problem_met:
+                end = f"is not known: {problem_met}"
             if isinstance(end, Orbit):
                 own = round(end.period * speed / (2 * np.pi)) if self.forced else 0
                 if _known(own, end, branches):
@@ -220,20 +223,23 @@ class _Search:
             if motion.stopped:
                 return f"from rest ends: {motion.stopped.split(' after ')[0]}"
             q, v, end = motion.q, motion.v, steady_end(motion)
+            if end is None:
+                return _NOTHING
             sizes.append(float(end.amplitude.max()))
-            if end.periodic or sizes[-1] < _STILL * sizes[0]:
-                break
-        if not self.forced and (end.at_rest or sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]):
+            if not self.forced and (end.at_rest or sizes[-1] < _STILL * sizes[0]):
+                return ""
+            if np.isfinite(end.period) and (found := self._repeating(speed, end.period, q, v)):
+                return found.orbit
+        if not self.forced and sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]:
             return ""
-        turns = max(round(end.period), 1) if end.periodic else 1
-        found = self._repeating(speed, turns * turn if self.forced else 2 * np.pi / abs(end.frequency), q, v)
-        if end.periodic or (found and (np.abs(found.multipliers) < 1).all()):
-            return found.orbit if found else _NOT_AGAIN
-        return _NOTHING
+        found = self._repeating(speed, turn if self.forced else 2 * np.pi / abs(end.frequency), q, v)
+        stable = found is not None and (np.abs(found.multipliers) < 1).all()
+        return found.orbit if found and stable else _NOTHING
 
     def _repeating(self, speed: float, period: float, q: FloatArray, v: FloatArray) -> Linearised | None:
         """The periodic motion near that in time from a state at the angle 0; None where there is none."""
         turns = round(period * speed / (2 * np.pi)) if self.forced else 0
+        period = 2 * np.pi * turns / speed if turns else period
         problem = Periodic(self.system, turns)
         try:
             guess = _one_period(self.system, speed, period, LEAST_STEPS * max(turns, 1), q, v)
@@ -284,7 +290,8 @@ def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[fl
     zero = np.zeros((n, n))
     left = np.block([[zero, eye], [F_q - K, F_v - C]])
     values, vectors = scipy.linalg.eig(left, np.block([[eye, zero], [zero, system.M]]))
-    whirls = np.isfinite(values) & (values.imag > 0)
+    finite = np.isfinite(values)
+    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
     k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
     shape = vectors[:n, k] * np.exp(-0.5j * np.angle(np.sum(vectors[:n, k] ** 2)))
     places = np.array([system.index(node) for node in system.nodes])

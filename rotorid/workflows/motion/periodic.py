@@ -172,8 +172,8 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     low, high = band(options.speeds, "--speeds") or (0.0, 0.0)
     if low <= 0:
         raise ValueError("--speeds: periodic motion needs a turning rotor, so speeds above 0")
-    if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 12:
-        raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 12")
+    if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 8:
+        raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 8")
     direction = degrees(options.gravity_direction, "--gravity-direction")
     what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)

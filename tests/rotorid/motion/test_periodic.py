@@ -368,6 +368,15 @@ def test_too_few_steps_are_said(monkeypatch):
     assert any("too few steps" in warning for warning in found.warnings)
 
 
+def test_a_rotor_that_does_not_whirl_and_one_without_mass_and_damping():
+    """Overdamped it rests; what motion in time cannot follow is said, the branch is found all the same."""
+    told = periodic_motion(disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=9.0, weight=1.0), 1.0, 2.0)
+    assert told.branches[0].stable.all()
+    assert len(told.warnings) == 1
+    told = periodic_motion(disc(0.0, [CubicSpring(1, "", 1.0, 0.1)], weight=1.0, unbalance=0.1), 1.0, 2.0)
+    assert "neither mass nor damping" in told.warnings[-1]
+
+
 def test_motions_that_no_branch_shows_are_said():
     """A period doubling and self-excited whirl, not asked for."""
     damping = 0.04
