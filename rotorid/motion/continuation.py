@@ -16,7 +16,7 @@ _UNITY = 1.0 + 1e-9  # a multiplier up to this is not outside the unit circle: r
 _CORNER = 1e-4  # a shorter step may turn sharply: where a shaft meets its stop, the branch has a corner
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
 _NEAR = 0.999  # of a clearance is at the wall
-_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 32, 256, 1500  # steps in a revolution or cycle
+LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 32, 512, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -120,31 +120,16 @@ def at_speed(problem: Periodic, guess: Orbit, sign: float = 1.0) -> Start:
     return Start(guess, rows, rows @ y)
 
 
-def follow(
-    problem: Periodic, start: Start, low: float, high: float, kind: str, *, fixed_steps: bool = False
-) -> Branch:
-    """Follow a branch until it leaves a range of speeds.
-
-    Parameters
-    ----------
-    problem
-        What is sought.
-    start
-        Where the branch begins.
-    low, high
-        rad/s.
-    kind
-        Of the branch.
-    fixed_steps
-        Keep the steps in time of the guess.
+def follow(problem: Periodic, start: Start, low: float, high: float, kind: str) -> Branch:
+    """Follow a branch until it leaves a range of speeds, rad/s.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         If there is no solution at the start.
     """
-    at, _ = _solved(problem, start.guess, start.rows, start.values, fixed_steps)
-    walk = _Walk(problem, low, high, fixed_steps, kind)
+    at, _ = _solved(problem, start.guess, start.rows, start.values)
+    walk = _Walk(problem, low, high, kind)
     tangent = walk.onwards(at, start.rows[-1])
     points, found, length = [walk.point(at)], list[Bifurcation](), _LONGEST / 4
     origin, first, ended = problem.unknowns(at.orbit), at.orbit.scale, ""
@@ -183,7 +168,6 @@ class _Walk:
     problem: Periodic
     low: float
     high: float
-    fixed_steps: bool
     kind: str
 
     def weights(self, at: Linearised) -> FloatArray:
@@ -213,7 +197,7 @@ class _Walk:
         values = rows @ self.problem.unknowns(at.orbit)
         values[-1] += length
         guess = at.moved(tangent * length)
-        new, iterations = _solved(self.problem, guess, rows, values, self.fixed_steps)
+        new, iterations = _solved(self.problem, guess, rows, values)
         return new, self.onwards(new, rows[-1]), iterations
 
     def onwards(self, at: Linearised, along: FloatArray) -> FloatArray:
@@ -240,7 +224,7 @@ class _Walk:
             last[-1] = np.eye(tangent.size)[-1]
             values = last @ y
             values[-1] = end
-            new, _ = _solved(self.problem, new.orbit, last, values, self.fixed_steps)
+            new, _ = _solved(self.problem, new.orbit, last, values)
             onwards = self.onwards(new, rows[-1])
             length = float(rows[-1] @ (self.problem.unknowns(new.orbit) - y))
         return new, onwards, iterations, length
@@ -312,15 +296,13 @@ def _root(test: Callable[[float], float], length: float) -> float:
     return float(brentq(test, 0.0, length, xtol=1e-9 * length))
 
 
-def _solved(
-    problem: Periodic, guess: Orbit, rows: FloatArray, values: FloatArray, fixed: bool
-) -> tuple[Linearised, int]:
+def _solved(problem: Periodic, guess: Orbit, rows: FloatArray, values: FloatArray) -> tuple[Linearised, int]:
     """A solution, its steps in time short enough, and longer again where they may be."""
     steps, turns = len(guess.velocities), max(problem.turns, 1)
-    if not fixed and guess.roughness < _ROUGH / 100 and steps >= 2 * _LEAST_STEPS * turns:
+    if guess.roughness < _ROUGH / 100 and steps >= 2 * LEAST_STEPS * turns:
         guess = guess.resampled(steps // 2)
     at, iterations = problem.solve(guess, rows, values)
-    while not fixed and at.orbit.roughness > _ROUGH:
+    while at.orbit.roughness > _ROUGH:
         steps = 2 * len(at.orbit.velocities)
         if steps > _MOST_STEPS * turns:
             break

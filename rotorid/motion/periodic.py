@@ -15,6 +15,7 @@ from rotorid.motion.collocation import POINTS, Linearised, Orbit, Periodic
 from rotorid.motion.continuation import (
     DOUBLING,
     HOPF,
+    LEAST_STEPS,
     Bifurcation,
     Branch,
     Start,
@@ -27,7 +28,6 @@ from rotorid.motion.start import at_rest, steady_linear
 from rotorid.motion.steady_end import steady_end
 from rotorid.motion.system import MotionSystem
 
-_STEPS = 32  # in one revolution, or one period of a motion's own, to begin with
 _COARSE = 1e-3
 """Of `Orbit.roughness`."""
 _SAME = 0.02  # of the motion: what differs by less is no other motion
@@ -73,7 +73,6 @@ def periodic_motion(
     *,
     subsynchronous: int | None = None,
     limit_cycle: bool = False,
-    steps: int | None = None,
 ) -> PeriodicMotion:
     """Periodic motions over a range of speeds, their stability and bifurcations.
 
@@ -88,8 +87,6 @@ def periodic_motion(
         the motion in time comes to at a speed of the range.
     limit_cycle
         Self-excited motions from the Hopf points of the rotor at rest.
-    steps
-        In time, in a revolution or a cycle, kept; default: from 32 up, as the motion needs them.
 
     Raises
     ------
@@ -103,7 +100,7 @@ def periodic_motion(
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
-    search = _Search(system, low, high, steps, forced)
+    search = _Search(system, low, high, forced)
     branches, problems = search.main()
     warnings = [] if forced else ["there is no unbalance and no bow: what is synchronous is rest"]
     turns = 0 if limit_cycle else subsynchronous if forced else None
@@ -127,20 +124,13 @@ class _Search:
     system: MotionSystem
     low: float
     high: float
-    steps: int | None
     forced: bool
-
-    @property
-    def count(self) -> int:
-        """Steps in one revolution or cycle to begin with."""
-        return self.steps or _STEPS
 
     def follow(self, problem: Periodic, start: Start) -> list[Branch]:
         """The branch, if it begins."""
         kind = {0: "limit cycle", 1: "synchronous" if self.forced else "rest"}.get(problem.turns)
-        kind, fixed = kind or f"period {problem.turns}", self.steps is not None
         try:
-            return [follow(problem, start, self.low, self.high, kind, fixed_steps=fixed)]
+            return [follow(problem, start, self.low, self.high, kind or f"period {problem.turns}")]
         except np.linalg.LinAlgError:
             return []
 
@@ -162,7 +152,7 @@ class _Search:
         """Steady motion of the rotor made linear about its equilibrium; without one rest at the centres."""
         _, rests, responses = steady_linear(self.system, [speed])
         rest, response = (rests[0], responses[0]) if len(rests) else (np.zeros(self.system.size), 0.0)
-        turning = np.exp(2j * np.pi * (np.arange(self.count)[:, None] + POINTS) / self.count)[..., None]
+        turning = np.exp(2j * np.pi * (np.arange(LEAST_STEPS)[:, None] + POINTS) / LEAST_STEPS)[..., None]
         velocities = (1j * speed * turning * response).real * np.ones(self.system.size)
         return Orbit(speed, 2 * np.pi / speed, rest + np.real(response), velocities)
 
@@ -185,7 +175,10 @@ class _Search:
         """Follow what motion in time comes to and no branch shows; what is not followed, in words."""
         said: dict[str, list[str]] = {}
         for speed in self._asked(branches):
-            end = self.reached(speed)
+            try:
+                end = self.reached(speed)
+            except ValueError as problem_met:
+                end = f"is not known: {problem_met}"
             if isinstance(end, Orbit):
                 own = round(end.period * speed / (2 * np.pi)) if self.forced else 0
                 if _known(own, end, branches):
@@ -230,23 +223,26 @@ class _Search:
             if motion.stopped:
                 return f"from rest ends: {motion.stopped.split(' after ')[0]}"
             q, v, end = motion.q, motion.v, steady_end(motion)
+            if end is None:
+                return _NOTHING
             sizes.append(float(end.amplitude.max()))
-            if end.periodic or sizes[-1] < _STILL * sizes[0]:
-                break
-        if not self.forced and (end.at_rest or sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]):
+            if not self.forced and (end.at_rest or sizes[-1] < _STILL * sizes[0]):
+                return ""
+            if np.isfinite(end.period) and (found := self._repeating(speed, end.period, q, v)):
+                return found.orbit
+        if not self.forced and sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]:
             return ""
-        turns = max(round(end.period), 1) if end.periodic else 1
-        found = self._repeating(speed, turns * turn if self.forced else 2 * np.pi / abs(end.frequency), q, v)
-        if end.periodic or (found and (np.abs(found.multipliers) < 1).all()):
-            return found.orbit if found else _NOT_AGAIN
-        return _NOTHING
+        found = self._repeating(speed, turn if self.forced else 2 * np.pi / abs(end.frequency), q, v)
+        stable = found is not None and (np.abs(found.multipliers) < 1).all()
+        return found.orbit if found and stable else _NOTHING
 
     def _repeating(self, speed: float, period: float, q: FloatArray, v: FloatArray) -> Linearised | None:
         """The periodic motion near that in time from a state at the angle 0; None where there is none."""
         turns = round(period * speed / (2 * np.pi)) if self.forced else 0
+        period = 2 * np.pi * turns / speed if turns else period
         problem = Periodic(self.system, turns)
         try:
-            guess = _one_period(self.system, speed, period, self.count * max(turns, 1), q, v)
+            guess = _one_period(self.system, speed, period, LEAST_STEPS * max(turns, 1), q, v)
             start = at_speed(problem, guess)
             at, _ = problem.solve(guess, start.rows, start.values)
         except np.linalg.LinAlgError:
@@ -274,7 +270,7 @@ class _Search:
         orbit = point.point.orbit
         whirl, shape = whirl_at_rest(self.system, orbit.start, orbit.speed)
         shape = _FIRST * shape
-        t = 2 * np.pi * (np.arange(self.count)[:, None] + POINTS) / self.count
+        t = 2 * np.pi * (np.arange(LEAST_STEPS)[:, None] + POINTS) / LEAST_STEPS
         moved = (1j * whirl * shape * np.exp(1j * t)[..., None]).real
         n = shape.size
         rows = np.zeros((2, 2 * n + 2))
@@ -294,7 +290,8 @@ def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[fl
     zero = np.zeros((n, n))
     left = np.block([[zero, eye], [F_q - K, F_v - C]])
     values, vectors = scipy.linalg.eig(left, np.block([[eye, zero], [zero, system.M]]))
-    whirls = np.isfinite(values) & (values.imag > 0)
+    finite = np.isfinite(values)
+    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
     k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
     shape = vectors[:n, k] * np.exp(-0.5j * np.angle(np.sum(vectors[:n, k] ** 2)))
     places = np.array([system.index(node) for node in system.nodes])
@@ -353,7 +350,6 @@ def _doubts(branches: list[Branch]) -> list[str]:
         worst = max(point.orbit.roughness for point in branch.points)
         if worst > _COARSE:
             said.append(
-                f"the {branch.kind} branch has too few steps in time: {percent(worst)} % of it may be "
-                "wrong (--steps)"
+                f"the {branch.kind} branch has too few steps in time: {percent(worst)} % of it may be wrong"
             )
     return said

@@ -15,8 +15,8 @@ from rotorid.workflows.motion.periodic import periodic as work
 
 @command(
     PeriodicOptions,
-    least={"subsynchronous": 2, "steps": 4, "modes": 0},
-    panels={"Motion": "subsynchronous limit_cycle", "Method": "steps modes"},
+    least={"subsynchronous": 2, "modes": 0},
+    panels={"Motion": "subsynchronous limit_cycle", "Method": "modes"},
 )
 def periodic(
     model: Annotated[

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from rotorid.motion.small_model import SmallModel
     from rotorid.motion.system import MotionSystem
 
-_MOST_STEPS = 4096
 _SMALL = 24
 """Unknowns above which a rotor is reduced, to so many or more."""
 
@@ -47,8 +46,6 @@ class PeriodicOptions:
         Also motions that repeat after K revolutions.
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
-    steps : N
-        Steps in time of one revolution or cycle; default: 32 or more, as the motion needs them.
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
@@ -64,7 +61,6 @@ class PeriodicOptions:
     sensors: str | Sequence[Sensor] | None = None
     subsynchronous: int | None = None
     limit_cycle: bool = False
-    steps: int | None = None
     unbalance: Path | str | Mapping[int, complex] | None = None
     bow: Path | str | Mapping[int, complex] | None = None
     modes: int | None = None
@@ -176,10 +172,8 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     low, high = band(options.speeds, "--speeds") or (0.0, 0.0)
     if low <= 0:
         raise ValueError("--speeds: periodic motion needs a turning rotor, so speeds above 0")
-    if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 12:
-        raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 12")
-    if options.steps is not None and not 4 <= options.steps <= _MOST_STEPS:
-        raise ValueError(f"--steps takes a whole number from 4 to {_MOST_STEPS}")
+    if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 8:
+        raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 8")
     direction = degrees(options.gravity_direction, "--gravity-direction")
     what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
@@ -196,12 +190,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     with phase("periodic motion"):
         motion = periodic_motion(
-            system,
-            low,
-            high,
-            subsynchronous=options.subsynchronous,
-            limit_cycle=options.limit_cycle,
-            steps=options.steps,
+            system, low, high, subsynchronous=options.subsynchronous, limit_cycle=options.limit_cycle
         )
     readings = Readings(motion, labels, directions)
     return PeriodicMotions(readings=readings, reduced=reduced, provenance=provenance(what.files, options))

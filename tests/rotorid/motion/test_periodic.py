@@ -361,7 +361,28 @@ def test_what_cannot_be_sought_is_refused(low, high, options, words):
         periodic_motion(damper(0.05, 0.3), low, high, **options)
 
 
-def test_too_few_steps_are_said():
-    found = periodic_motion(damper(0.05, 0.3), 0.5, 1.5, steps=4)
+def test_too_few_steps_are_said(monkeypatch):
+    monkeypatch.setattr("rotorid.motion.continuation._MOST_STEPS", 4)
+    monkeypatch.setattr("rotorid.motion.periodic.LEAST_STEPS", 4)
+    found = periodic_motion(damper(0.05, 0.3), 0.5, 1.5)
     assert any("too few steps" in warning for warning in found.warnings)
-    assert all(len(p.orbit.velocities) == 4 for p in found.branches[0].points)
+
+
+def test_a_rotor_that_does_not_whirl_and_one_without_mass_and_damping():
+    """Overdamped it rests; what motion in time cannot follow is said, the branch is found all the same."""
+    told = periodic_motion(disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=9.0, weight=1.0), 1.0, 2.0)
+    assert told.branches[0].stable.all()
+    assert len(told.warnings) == 1
+    told = periodic_motion(disc(0.0, [CubicSpring(1, "", 1.0, 0.1)], weight=1.0, unbalance=0.1), 1.0, 2.0)
+    assert "neither mass nor damping" in told.warnings[-1]
+
+
+def test_motions_that_no_branch_shows_are_said():
+    """A period doubling and self-excited whirl, not asked for."""
+    damping = 0.04
+    problem = disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=damping, **SAGGING)
+    (told,) = periodic_motion(problem, 2.1, 2.7).warnings
+    assert "2 revolutions only (--subsynchronous 2)" in told
+    given = [CubicSpring(1, "", 1.0, 0.5), InternalDamping(1, "", 0.1)]
+    told = periodic_motion(disc(1.0, given, damping=0.1), 1.0, 3.0).warnings[-1]
+    assert "(--limit-cycle), at 23.8732 and 28.6479 rpm" in told  # 2.5 and 3 rad/s; below 2 it rests
