@@ -89,7 +89,7 @@ def main() -> dict[str, float]:
     return {
         "mass_kg": float(small.masses.sum()),
         "load_N": float(loads[0][0]),
-        "threshold_rpm": round(float(thresholds[0]), 2),
+        "threshold_rpm": round(float(thresholds[0]), 1),
         "rotor_threshold_rpm": round(float(thresholds[1]), 1),
         "damped_threshold_rpm": round(float(lost.point.orbit.speed / RPM), 1),
         "whip_rpm": round(float(whip[0])),

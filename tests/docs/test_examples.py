@@ -68,7 +68,7 @@ PINNED = {
     "reduce_and_run_up": {
         "mass_kg": 558.534651,
         "load_N": 2789.69582,
-        "threshold_rpm": 6407.82,
+        "threshold_rpm": 6407.8,
         "rotor_threshold_rpm": 6407.0,
         "damped_threshold_rpm": 11748.1,
         "whip_rpm": 1302,
