@@ -204,7 +204,7 @@ class _Search:
             ways = (way for branch in branches for way in branch.at((a + b) / 2, branch.speeds[:, None]))
             if b - a > apart and not any(stable for _, stable in ways):
                 asked.append((a + b) / 2)
-        return sorted(asked)[:_ASKED]
+        return sorted({*asked})[:_ASKED]
 
     def reached(self, speed: float) -> Orbit | str:
         """What motion in time from rest comes to: one period of it, what else in words, or "" for rest."""
