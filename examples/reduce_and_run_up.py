@@ -12,6 +12,7 @@ import numpy as np
 
 from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.periodic import periodic_motion
+from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.run import run
 from rotorid.motion.start import at_rest
 from rotorid.motion.steady_end import steady_end
@@ -34,12 +35,11 @@ def main() -> dict[str, float]:
 
     # The bearings carry what they carry in the whole rotor, and it loses stability where that does.
     whole = bearings(read_rotor(ROTOR), BearingsOptions(speeds="5000:8000:1000rpm"))
-    resting = equilibrium(small.system(500 * RPM, 9000 * RPM), 5000 * RPM)
+    system = rotor_system(small, 500 * RPM, 9000 * RPM)
+    resting = equilibrium(system, 5000 * RPM)
     loads = np.abs(resting.load), np.abs(whole.found[0].load)
     print("loads in N, of the small model and of the rotor:", *(np.round(load, 3) for load in loads))
-    (lost,) = (
-        periodic_motion(small.system(500 * RPM, 9000 * RPM), 5000 * RPM, 8000 * RPM).branches[0].bifurcations
-    )
+    (lost,) = periodic_motion(system, 5000 * RPM, 8000 * RPM).branches[0].bifurcations
     assert whole.stability is not None
     thresholds = lost.point.orbit.speed / RPM, (whole.stability.threshold or np.nan) / RPM
     print("stable up to {:.1f} rpm; the rotor up to {:.1f} rpm".format(*thresholds), end="\n\n")
@@ -49,8 +49,8 @@ def main() -> dict[str, float]:
         ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)
     ).motion_model
     assert damped is not None
-    system, speed = damped.system(500 * RPM, 13000 * RPM), 9000 * RPM
-    rest, cycle = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
+    system, speed = rotor_system(damped, 500 * RPM, 13000 * RPM), 9000 * RPM
+    rest, cycle, *_ = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
     (lost,) = rest.bifurcations
     print(f"with 0.5 % of damping: stable up to {lost.point.orbit.speed / RPM:.0f} rpm; its limit cycle:")
     for one in cycle.bifurcations:
@@ -72,7 +72,7 @@ def main() -> dict[str, float]:
     print("it whips at {:.0f} rpm, its journals up to {:.2f} of their clearance".format(*whip), end="\n\n")
 
     # Run-up through both critical speeds.
-    system = damped.system(500 * RPM, 7000 * RPM, unbalance=UNBALANCE)
+    system = rotor_system(damped, 500 * RPM, 7000 * RPM, unbalance=UNBALANCE)
     q = at_rest(system, 600 * RPM)
     motion = run(system, (600 * RPM, 6200 * RPM), 10.0, (q, np.zeros_like(q)))
     peaks = {}

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 import fem
+from fem.growth_check import unstable_windows
 from fem.model.node_forces import SqueezeFilm, Stop, kind_of
 from rotorid.base.arrays import FloatArray
+from rotorid.base.rpm import speed_text
 from rotorid.motion.equilibrium import Equilibrium, each_force, equilibria
 from rotorid.motion.system import MotionSystem
 
@@ -17,8 +19,8 @@ _STEP = 0.05
 """Between speeds at which coefficients are known, by the speed."""
 _MANY = 200
 """Of the speeds asked for, between which stability is looked for."""
-_AROUND = (1e-2, 1e-4)
-"""How far from the threshold, by its speed, the equilibria beside it are, time after time."""
+_AROUND = ((1e-2, 40), (1e-4, 1))
+"""How far from the threshold, by its speed, the equilibria beside it are, time after time; steps between."""
 
 
 def coefficients(found: Sequence[Equilibrium]) -> tuple[FloatArray, FloatArray]:
@@ -77,15 +79,24 @@ def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibriu
     start = max(lowest, 1e-3 * highest)
     more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1].tolist()
     known = {one.speed: one for one in (*found[:: 1 + len(found) // _MANY], found[-1])}
-    known |= {one.speed: one for one in equilibria(system, more)}
+    known |= {one.speed: one for one in equilibria(system, sorted({*more, *system.knots[1:-1].tolist()}))}
     every = [known[speed] for speed in sorted(known)]
-    stable = fem.stability_threshold(linear_rotor(rotor, every), highest, lowest=lowest)
-    for share in _AROUND:
-        if stable.threshold is None:
-            break
-        a, b = (float(np.clip(stable.threshold * (1 + s), lowest, highest)) for s in (-share, share))
-        near = fem.stability_threshold(linear_rotor(rotor, equilibria(system, (a, b))), b, lowest=a, steps=1)
+    linear = linear_rotor(rotor, every)
+    stable = fem.stability_threshold(linear, highest, lowest=lowest)
+    first = unstable_windows(linear, np.array(sorted(known)))[:1]
+    guesses = [one.first for one in first if one.begins] + [stable.threshold or highest]
+    for share, steps in _AROUND:
+        a, b = (float(np.clip(min(guesses) * (1 + s), lowest, highest)) for s in (-share, share))
+        beside = linear_rotor(rotor, equilibria(system, (a, b)))
+        near = fem.stability_threshold(beside, b, lowest=a, steps=steps)
         if near.threshold is None:
             break
         stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
-    return stable
+        guesses = [near.threshold]
+    again = tuple(
+        f"about {speed_text(one.last)} it is stable again; `rotorid campbell` of the file that --output "
+        "writes shows all such ranges"
+        for one in first
+        if one.ends
+    )
+    return replace(stable, warnings=again)

@@ -56,9 +56,11 @@ def rotor_system(
     if isinstance(rotor, SmallModel):
         unbalance = rotor.unbalance if unbalance is None else unbalance
         bow = rotor.bow if bow is None else bow
-    weight: dict[str, float] = {}
-    for axis, part in zip("xy", weight_along(gravity, direction), strict=True):
-        weight |= {_in(name, axis): part * mass for name, mass in zip(names, load, strict=True)}
+    weight = {
+        name.replace("x", axis, 1): part * mass
+        for axis, part in zip("xy", weight_along(gravity, direction), strict=True)
+        for name, mass in zip(names, load, strict=True)
+    }
     at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
     bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
     return system(
@@ -68,7 +70,7 @@ def rotor_system(
         weight=weight,
         unbalance=unbalance,
         bow={
-            _in(names[i], axis): turned * force
+            names[i].replace("x", axis, 1): turned * force
             for i, force in zip(at, bent, strict=True)
             for axis, turned in (("x", 1), ("y", -1j))
         },
@@ -80,24 +82,18 @@ def _parts(
 ) -> tuple[Callable[[float], fem.Motion], tuple[str, ...], FloatArray, FloatArray]:
     """Linear equations at a speed; of the shaft alone in x: unknowns, stiffness, N/m, and what weighs, kg."""
     if isinstance(rotor, SmallModel):
-        return (
-            rotor.motion,
-            tuple(f"x{node}" for node in rotor.nodes),
-            rotor.stiffness,
-            rotor.weight / GRAVITY,
-        )
+        names = tuple(f"x{node}" for node in rotor.nodes)
+        return rotor.motion, names, rotor.stiffness, rotor.weight / GRAVITY
     straight = dataclasses.replace(
         rotor.linear, supports=(), material_damping=np.zeros_like(rotor.material_damping)
     )
     plane = fem.equations_of_motion(straight, plane="x")
     deflections = np.array([name[:1] == "x" for name in plane.coordinates], dtype=float)
-    linear = rotor.linear
-    return (
-        lambda speed: fem.equations_of_motion(linear, speed=speed),
-        plane.coordinates,
-        plane.K,
-        plane.M @ deflections,
-    )
+
+    def motion(speed: float) -> fem.Motion:
+        return fem.equations_of_motion(rotor.linear, speed=speed)
+
+    return motion, plane.coordinates, plane.K, plane.M @ deflections
 
 
 def weight_along(gravity: float, direction: float) -> tuple[float, float]:
@@ -139,8 +135,3 @@ def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> Comp
         across = stiffness[np.ix_(others, at)]
         K = K - across.T @ np.linalg.solve(stiffness[np.ix_(others, others)], across)
     return np.asarray(K @ bow)
-
-
-def _in(name: str, axis: str) -> str:
-    """The same unknown of the plane x in x or in y."""
-    return name.replace("x", axis, 1) if name[0] == "x" else name.replace("_x", f"_{axis}", 1)

@@ -13,17 +13,18 @@ from fem.model.node_forces import JournalBearing, NodeForce
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import rpm_text
+from rotorid.base.text import counted
 from rotorid.motion.equilibrium import named
 from rotorid.motion.rosenbrock import DONE, TOUCHES, Equations, Turning, advance, evaluate
 from rotorid.motion.system import MotionSystem
 
-TOLERANCE = 1e-6
+TOLERANCE, LOOSEST = 1e-6, 1e-2
 A_TURN = 64
 """Samples a turn at the highest speed, where no rate is given."""
 LEAST_A_TURN = 8
 """Samples a turn below which what the shaft does in a turn is not seen."""
-_BLOCK = 10_000
-"""Samples that are computed at once: the memory that all unknowns take."""
+_BLOCK, _TURNS = 10_000, 500
+"""Samples and turns at most that are computed at once: what memory takes, and how long Ctrl-C waits."""
 _MOST = 10_000_000
 """Positions that are kept, x and y of one node counted as one: 160 MB, some times over."""
 _MASSLESS = 1e-12
@@ -144,8 +145,8 @@ def run(
     first, last = (number(speed, "speed") for speed in speeds)
     if not number(time, "time") > 0:
         raise ValueError("time must be above 0 s")
-    if not 1e-13 <= tolerance <= 1e-2:
-        raise ValueError(f"tolerance must be from 1e-13 to 1e-2, not {tolerance:g}")
+    if not 1e-13 <= tolerance <= LOOSEST:
+        raise ValueError(f"tolerance must be from 1e-13 to {LOOSEST:g}, not {tolerance:g}")
     for speed in (first, last):
         system.linear(speed)  # refuses what lies outside the knots
     _check_journals(system, first, last)
@@ -159,7 +160,7 @@ def run(
     count = int(np.ceil(rate * time * (1 - 1e-12))) or 1
     if count * max(len(names), 1) > _MOST:
         raise ValueError(
-            f"{count:,} samples at {len(names)} nodes are more than memory should hold: give fewer nodes, a "
+            f"{count:,} samples at {counted(len(names), 'node')} are more than memory should hold: give fewer nodes, a "
             f"shorter time or a lower rate than {rate:.6g} samples a second"
         )
     times = np.linspace(0.0, time, count + 1)
@@ -249,7 +250,8 @@ def _pieces(
     first, last = speeds
     alpha = (last - first) / time
     inner = system.knots[(system.knots > min(speeds)) & (system.knots < max(speeds))]
-    blocks = np.linspace(0.0, time, count // _BLOCK + 2)
+    turns = (first + last) / 2 * time / (2 * np.pi)
+    blocks = np.linspace(0.0, time, int(max(count / _BLOCK, turns / _TURNS)) + 2)
     ends = np.unique(np.concatenate([blocks, (inner - first) / alpha if alpha else []]))
     for begin, end in itertools.pairwise(ends):
         speed = first + alpha * begin

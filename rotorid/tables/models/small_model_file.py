@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -98,13 +99,7 @@ SMALL_MODEL = (
     Key("unbalance", each(UNBALANCE, _apart), "unbalance at a node; several are added", default=()),
     Key("bow", each(BOW, _apart), "bow of the shaft, at three nodes or more", default=()),
 )
-_ATTRIBUTES = dict(
-    zip(
-        ("nodes", "masses", "weight", "stiffness", "material_damping", "gyroscopic", "damping"),
-        (key.name for key in ARRAYS),
-        strict=True,
-    )
-)
+_ATTRIBUTES = {item.name: key.name for item, key in zip(fields(SmallModel), ARRAYS, strict=False)}
 
 
 def is_small_model(path: Path) -> bool:
@@ -205,15 +200,11 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
             )
         tables.setdefault("bearing", []).append(support_table(support, None, mixed=True))
     tables |= force_tables(model.forces)
-    for name, size, vectors in (
-        ("unbalance", "unbalance_kg_m", model.unbalance),
-        ("bow", "bow_m", model.bow),
-    ):
-        if vectors:
-            tables[name] = [
-                {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
-                for node, value in vectors.items()
-            ]
+    for name, size in (("unbalance", "unbalance_kg_m"), ("bow", "bow_m")):
+        tables[name] = [
+            {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
+            for node, value in getattr(model, name).items()
+        ]
     for name, sections in tables.items():
         lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
     return ("\n".join(lines) + "\n").encode("utf-8")

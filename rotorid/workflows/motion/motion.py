@@ -225,7 +225,7 @@ class Motion(Outcome):
             turns = end.period * end.speed * RPM / 60
             unit = "s" if not turns else "turn" if round(turns, 3) == 1 else "turns"
             again = f"comes again every {turns or end.period:.5g} {unit}"
-        return f"{where} the motion is steady to {percent(end.change)} % and {again}; {whirl}."
+        return f"{where} the motion is steady to {percent(max(end.change, 1e-4))} % and {again}; {whirl}."
 
     def _nodes(self) -> tuple[Column, ...]:
         """A row for each node: where it was furthest from the line of bearings, and what the end is."""
@@ -289,7 +289,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     import numpy as np
 
     from rotorid.motion.reduced_system import reduced_system
-    from rotorid.motion.run import run
+    from rotorid.motion.run import LOOSEST, run
     from rotorid.motion.start import begin
     from rotorid.motion.steady_end import steady_end
 
@@ -301,6 +301,8 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
     reduced, tolerance = None, options.tolerance
+    if tolerance > LOOSEST / _LOOSER:
+        raise ValueError(f"--tolerance {tolerance:g}: {LOOSEST / _LOOSER:.0e} at most")
     if options.modes is not None or system.size > _SMALL:
         with phase("equations"):
             reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
@@ -311,7 +313,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     with phase("motion"):
         found = move(tolerance=tolerance)
     with phase(f"motion with {_LOOSER:g} times the tolerance"):
-        rough = move(tolerance=min(_LOOSER * tolerance, 1e-2))
+        rough = move(tolerance=_LOOSER * tolerance)
     if found.stopped:
         until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
         raise ValueError(found.stopped + until)

@@ -143,6 +143,8 @@ def test_pictures_of_a_run_up(unbalance):
         ((*SHORT, "--sensors", "77"), "node 77 does not exist"),
         ((*SHORT, "--modes", "500"), "from 0 to 92"),
         ((*SHORT, "--rate", "0"), "rate must be above 0"),
+        ((*SHORT, "--tolerance", "1e-2"), "--tolerance 0.01: 3e-04 at most"),
+        ((*SHORT, "--rate", "1e9", "--sensors", "2"), "at 2 nodes are more than memory should hold"),
     ],
 )
 def test_what_is_impossible(cli, given, message):

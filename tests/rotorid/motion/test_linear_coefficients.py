@@ -1,6 +1,7 @@
 """Coefficients at the equilibrium, the linear rotor made of them, its threshold, and the stability map."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -204,3 +205,16 @@ def test_the_threshold_of_a_flexible_rotor_by_dense_eigenvalues(speeds):
     stable = threshold(rotor, made, equilibria(made, speeds))
     np.testing.assert_allclose(stable.threshold, there, rtol=1e-7)
     assert (stable.lowest, stable.highest) == (20.0, 1500.0)
+
+
+@pytest.mark.parametrize("highest", [1490.0, 1500.0])
+def test_an_unstable_range_between_the_speeds_asked_for_is_found_and_where_it_ends(highest):
+    """A seal drives the shaft at 203 rad/s alone: its table stands between the speeds."""
+    driving = [[[1e7, q], [-q, 1e7]] for q in (0.0, 0.0, 2e7, 0.0, 0.0)]
+    seal = fem.Support(3, driving, 20.0, speeds=(20.0, 200.0, 203.0, 206.0, 1500.0), kind="seal")
+    rotor = rotor_on([JournalBearing(n, "", **BEARING) for n in (1, 5)], [seal])
+    made = rotor_system(rotor, 20.0, highest)
+    stable = threshold(rotor, made, equilibria(made, [20.0, 100.0, highest]))
+    assert 200 < stable.threshold < 203
+    (said,) = stable.warnings
+    assert re.search(r"about 20[3-6]\.\d+ rad/s = .* stable again", said)
