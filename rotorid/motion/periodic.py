@@ -32,13 +32,10 @@ _COARSE = 1e-3
 """Of `Orbit.roughness`."""
 _SAME = 0.02  # of the motion: what differs by less is no other motion
 _FIRST, _FAR = 0.01, 0.5  # amplitudes of what is free: where a branch begins, and motion in time
-_STILL, _FADES = (
-    1e-4,
-    0.7,
-)  # of its size at the beginning: it is at rest; of that half the time ago: it will be
+_STILL, _FADES = 1e-4, 0.95  # of its size at the beginning, and half the time ago: it comes to rest
 _NEAR = 0.3  # of its size: the periodic motion that a motion in time comes to
 _TURNS, _BLOCKS = 100, 8  # revolutions of motion in time, and how often so many more
-_ASKED = 8
+_ASKED = 12
 _NOT_AGAIN = "comes to a periodic motion that Newton's method does not find again"
 _NOTHING = f"comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
 
@@ -202,22 +199,19 @@ class _Search:
         edges = {self.low, self.high}
         for branch in branches:
             edges |= {*branch.speeds[[0, -1]], *(b.point.orbit.speed for b in branch.bifurcations)}
-        middles = [
-            (a + b) / 2 for a, b in itertools.pairwise(sorted(edges)) if b - a > 1e-3 * (self.high - self.low)
-        ]
-        bare = [
-            speed
-            for speed in middles
-            if not any(stable for b in branches for _, stable in b.at(speed, b.speeds[:, None]))
-        ]
-        return sorted({self.low, (self.low + self.high) / 2, self.high, *bare[:_ASKED]})
+        asked, apart = [self.low, (self.low + self.high) / 2, self.high], 1e-3 * (self.high - self.low)
+        for a, b in itertools.pairwise(sorted(edges)):
+            ways = (way for branch in branches for way in branch.at((a + b) / 2, branch.speeds[:, None]))
+            if b - a > apart and not any(stable for _, stable in ways):
+                asked.append((a + b) / 2)
+        return sorted({*asked})[:_ASKED]
 
     def reached(self, speed: float) -> Orbit | str:
         """What motion in time from rest comes to: one period of it, what else in words, or "" for rest."""
         q, v = _at_rest(self.system, speed), np.zeros(self.system.size)
         if not self.forced:
             q = q + _FAR * whirl_at_rest(self.system, q, speed)[1].real
-        sizes, turn = list[float](), 2 * np.pi / speed
+        sizes, turn, period = list[float](), 2 * np.pi / speed, 0.0
         for _ in range(_BLOCKS):
             motion = run(self.system, (speed, speed), _TURNS * turn, (q, v))
             if motion.stopped:
@@ -230,9 +224,10 @@ class _Search:
                 return ""
             if np.isfinite(end.period) and (found := self._repeating(speed, end.period, q, v)):
                 return found.orbit
+            period = turn if self.forced else 2 * np.pi / abs(end.frequency)
         if not self.forced and sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]:
             return ""
-        found = self._repeating(speed, turn if self.forced else 2 * np.pi / abs(end.frequency), q, v)
+        found = self._repeating(speed, period, q, v)
         stable = found is not None and (np.abs(found.multipliers) < 1).all()
         return found.orbit if found and stable else _NOTHING
 
