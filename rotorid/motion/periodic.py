@@ -92,7 +92,7 @@ def periodic_motion(
     """
     if not 0 < low < high:
         raise ValueError("periodic motion needs speeds above 0, the lower one first")
-    forced = bool(np.abs(system.unbalance).any() or np.abs(system.bow).any())
+    forced = _forced(system)
     if limit_cycle and forced:
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
@@ -222,30 +222,14 @@ class _Search:
             sizes.append(float(end.amplitude.max()))
             if not self.forced and (end.at_rest or sizes[-1] < _STILL * sizes[0]):
                 return ""
-            if np.isfinite(end.period) and (found := self._repeating(speed, end.period, q, v)):
+            if np.isfinite(end.period) and (found := repeating(self.system, speed, end.period, q, v)):
                 return found.orbit
             period = turn if self.forced else 2 * np.pi / abs(end.frequency)
         if not self.forced and sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]:
             return ""
-        found = self._repeating(speed, period, q, v)
+        found = repeating(self.system, speed, period, q, v)
         stable = found is not None and (np.abs(found.multipliers) < 1).all()
         return found.orbit if found and stable else _NOTHING
-
-    def _repeating(self, speed: float, period: float, q: FloatArray, v: FloatArray) -> Linearised | None:
-        """The periodic motion near that in time from a state at the angle 0; None where there is none."""
-        turns = round(period * speed / (2 * np.pi)) if self.forced else 0
-        period = 2 * np.pi * turns / speed if turns else period
-        problem = Periodic(self.system, turns)
-        try:
-            guess = _one_period(self.system, speed, period, LEAST_STEPS * max(turns, 1), q, v)
-            start = at_speed(problem, guess)
-            at, _ = problem.solve(guess, start.rows, start.values)
-        except np.linalg.LinAlgError:
-            return None
-        if turns > 1 and at.orbit.repeats(turns):
-            return self._repeating(speed, 2 * np.pi / speed, q, v)
-        away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
-        return at if away.max() < _NEAR else None
 
     def doubled(self, point: Bifurcation) -> Start:
         """Of the branch of twice the period that begins at a period doubling."""
@@ -272,6 +256,40 @@ class _Search:
         rows[0, :n], rows[1, :n] = shape.imag, shape.real
         values = rows[:, :n] @ orbit.start + [0.0, shape.real @ shape.real]
         return Start(Orbit(orbit.speed, 2 * np.pi / whirl, orbit.start + shape.real, moved), rows, values)
+
+
+def repeating(
+    system: MotionSystem, speed: float, period: float, q: FloatArray, v: FloatArray
+) -> Linearised | None:
+    """The periodic motion near that in time from a state at the angle 0; None where there is none.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speed, period
+        rad/s and s.
+    q, v
+        All unknowns and their velocities, (n,) each.
+    """
+    turns = round(period * speed / (2 * np.pi)) if _forced(system) else 0
+    period = 2 * np.pi * turns / speed if turns else period
+    problem = Periodic(system, turns)
+    try:
+        guess = _one_period(system, speed, period, LEAST_STEPS * max(turns, 1), q, v)
+        start = at_speed(problem, guess)
+        at, _ = problem.solve(guess, start.rows, start.values)
+    except np.linalg.LinAlgError:
+        return None
+    if turns > 1 and at.orbit.repeats(turns):
+        return repeating(system, speed, 2 * np.pi / speed, q, v)
+    away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
+    return at if away.max() < _NEAR else None
+
+
+def _forced(system: MotionSystem) -> bool:
+    """Whether unbalance or bow drive it."""
+    return bool(system.unbalance.any() or system.bow.any())
 
 
 def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:

@@ -147,6 +147,7 @@ class Motion(Outcome):
                 "period_s": end and end.period,
                 "whirl_ratio": end and end.whirl_ratio,
                 "whirl_frequency_rad_s": end and end.frequency,
+                "multipliers": [[value.real, value.imag] for value in self._multipliers()] or None,
                 "amplitude_m": end and dict(zip(nodes, end.amplitude, strict=True)),
                 "eccentricity": dict(zip(self._bearings, ranges.tolist(), strict=True)),
                 "tolerance": motion.tolerance,
@@ -155,6 +156,24 @@ class Motion(Outcome):
                 "warnings": self.warnings,
             }
         )
+
+    def _multipliers(self) -> list[complex]:
+        """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
+        import numpy as np
+
+        from rotorid.motion.periodic import repeating
+        from rotorid.motion.run import run
+
+        motion, end = self.motion, self.end
+        if end is None or end.at_rest or not end.periodic or not end.speed:
+            return []
+        angle = float(motion.turned[-1]) % (2 * np.pi)
+        on = run(  # to the angle 0
+            *(motion.system, (end.speed, end.speed), (2 * np.pi - angle) / end.speed, (motion.q, motion.v)),
+            angle=angle,
+        )
+        found = repeating(motion.system, end.speed, end.period, on.q, on.v)
+        return [] if found is None else found.multipliers.tolist()
 
     def to_frame(self) -> pd.DataFrame:
         """One row a sample: time, speed, angle, deflections."""

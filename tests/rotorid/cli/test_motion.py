@@ -9,6 +9,7 @@ import pytest
 
 import fem
 from fem.model.node_forces import JournalBearing, MuszynskaSeal
+from rotorid.motion.small_model import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
 from rotorid.workflows import MotionOptions, motion
@@ -186,3 +187,28 @@ def test_few_samples_a_turn_are_not_judged(cli):
     told = cli("motion", sample_data() / "motion" / "unbalanced.toml", *SHORT, "--rate", "100")
     assert "too few samples a turn (--rate)" in told.out
     assert "steady" not in told.out.lower()
+
+
+def test_multipliers_of_linear_supports_are_those_of_its_eigenvalues():
+    """After a turn of T a free motion e^{λt} is e^{λT} times what it was."""
+    supports = [fem.Support(node, ((2e6, 4e5), (-4e5, 3e6)), 3e3) for node in (1, 3)]
+    model = SmallModel(
+        (1, 2, 3),
+        [2.0, 20.0, 3.0],
+        [19.6, 196.0, 29.4],
+        1e6 * np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]]),
+        gyroscopic=np.diag([0.0, 0.8, 0.0]),
+        supports=supports,
+        unbalance={2: 1e-3},
+    )
+    told = motion(model, MotionOptions(speed=300.0, time=3.0, start="steady")).to_dict()
+    at = model.motion(300.0)
+    n = len(at.M)
+    A = np.block(
+        [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(at.M, at.K), -np.linalg.solve(at.M, at.C)]]
+    )
+    expected = np.exp(np.linalg.eigvals(A) * 2 * np.pi / 300.0)
+    found = np.array(told["multipliers"]) @ [1, 1j]
+    assert len(found) == 2 * n
+    for value in expected[np.abs(expected) > 0.01]:
+        assert np.abs(found - value).min() < 1e-5
