@@ -33,7 +33,8 @@ class SteadyEnd:
     amplitude
         Largest distance from the mean, m, shape (m,).
     change
-        Of root mean square and mean from the first to the last half of this part, by the largest root mean square.
+        Of root mean square and mean from the first to the last half of this part, by the largest of the
+        former.
     trend
         Whether what changes most goes one way, up or down.
     at_rest
