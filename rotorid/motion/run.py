@@ -160,8 +160,8 @@ def run(
     count = int(np.ceil(rate * time * (1 - 1e-12))) or 1
     if count * max(len(names), 1) > _MOST:
         raise ValueError(
-            f"{count:,} samples at {counted(len(names), 'node')} are more than memory should hold: give fewer "
-            f"nodes, a shorter time or a lower rate than {rate:.6g} samples a second"
+            f"{count:,} samples at {counted(len(names), 'node')} are more than memory should hold: give "
+            f"fewer nodes, a shorter time or a lower rate than {rate:.6g} samples a second"
         )
     times = np.linspace(0.0, time, count + 1)
     z = np.empty((count + 1, len(names)), dtype=complex)
