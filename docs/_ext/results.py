@@ -33,6 +33,8 @@ ANSWERS = (
         "response-compressor",
         "influence-compressor",
         "bearings",
+        "motion",
+        "periodic-jumps",
         "reduce-report",
         "reduce-rank",
         "identify-task_5_1",

@@ -52,7 +52,7 @@ class PeriodicOptions:
         Table of the shaft's bow at rest; in place of a small model's own.
     modes : N
         Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
-        default: those up to 4 times the highest speed, up to 24 unknowns at least; all of a small model.
+        default: as of `motion`; small models keep all.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     """
@@ -115,7 +115,7 @@ class PeriodicMotions(Outcome):
         where = f"stable at {listing(parts, 'and')}" if parts else "unstable"
         where = "stable throughout" if branch.stable.all() else where
         return (
-            f"{k + 1} {branch.kind}, {range_text(low, high)}, up to {sizes.max():.4g} µm at "
+            f"Branch {k + 1}, {branch.kind}, {range_text(low, high)}, up to {sizes.max():.4g} µm at "
             f"{self.readings.labels[0]}: {where}."
         )
 
@@ -182,8 +182,6 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
     few = full.size <= _SMALL and options.modes is None
     reduced = None if few else reduced_system(full, kept, options.modes)
-    if reduced is not None and options.modes is None and reduced.system.size < _SMALL:
-        reduced = reduced_system(full, kept, reduced.modes + _SMALL - reduced.system.size)
     system = full if reduced is None else reduced.system
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
