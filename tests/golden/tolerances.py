@@ -58,7 +58,7 @@ TOLERANCES: tuple[Tolerance, ...] = (
         "bearings", "stability.smallest_log_decrement", "0 where the mode begins to grow", absolute=1e-10
     ),
     Tolerance("motion*", "position_error", "the difference of two integrations", absolute=1e-9),
-    Tolerance("motion*", "reduction.frequency_error", "of frequencies that differ by little, by their rounding", absolute=1e-10),
+    Tolerance("motion*", "reduction.frequency_error", "rounding of frequencies", absolute=1e-10),
     Tolerance("bk*", "*chi_square*", "as many readings as weights leave nothing", absolute=1e-20),
     # certificates, and what an iterative solver leaves
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
