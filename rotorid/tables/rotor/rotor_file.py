@@ -119,8 +119,12 @@ def read_rotor(path: str | Path) -> Rotor:
 
 def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
-    top = Section(str(path), problems.need(read_toml(path, problems)), problems)
-    said = take(top, ROTOR)
+    data = problems.need(read_toml(path, problems))
+    if "shaft" not in data and "masses_kg" in data:
+        expected = "a rotor file; this is a small model, for `rotorid motion` and `rotorid periodic`"
+        problems.add(str(path), None, "shaft", None, expected)
+        problems.stop()
+    said = take(Section(str(path), data, problems), ROTOR)
     shaft = read_shaft(path.parent / said["shaft"], said["material"], problems) if said["shaft"] else None
     n_nodes = len(shaft.length) + 1 if shaft else sys.maxsize
     names = _stations(said["station"], n_nodes)

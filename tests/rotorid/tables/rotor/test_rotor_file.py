@@ -426,3 +426,8 @@ def test_reading_a_sample_warns_of_nothing(tmp_path):
         write_rotor(tmp_path / "copy.toml", rotor)
         assert read_rotor(tmp_path / "copy.toml") == rotor
         assert np.isfinite(rotor.positions).all()
+
+
+def test_a_small_model_is_no_rotor_and_said_so_once():
+    (found,) = complaints(read_rotor, sample_data() / "motion" / "small.toml")
+    assert "this is a small model, for `rotorid motion`" in str(found)
