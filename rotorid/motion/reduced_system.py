@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted, percent
 from rotorid.motion.system import MotionSystem
 
 ENOUGH = 3e-4
@@ -42,6 +43,15 @@ class ReducedSystem:
     system: MotionSystem
     modes: int
     error: float
+
+    @property
+    def note(self) -> str:
+        """How many unknowns move, and what that costs."""
+        size, modes = counted(self.system.size, "unknown"), counted(self.modes, "mode")
+        high = f"natural frequencies without films are high by {percent(self.error)} % at most"
+        if self.error == np.inf:
+            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        return f"of the rotor {size} move, {modes} among them; {high}"
 
 
 def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> ReducedSystem:

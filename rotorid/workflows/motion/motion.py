@@ -12,7 +12,7 @@ from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import counted, figures, percent
+from rotorid.base.text import figures, percent
 from rotorid.tables.reader import units
 from rotorid.workflows.motion.moving_system import moving
 from rotorid.workflows.option_quantities import quantity
@@ -273,13 +273,7 @@ class Motion(Outcome):
             f"steps of about {figures(step, 1)} ms, each to {motion.tolerance:g} of how far the rotor moves; "
             f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
         )
-        if reduced is None:
-            return found
-        high = f"natural frequencies without films are high by {percent(reduced.error)} % at most"
-        if reduced.error == float("inf"):
-            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
-        size, modes = counted(reduced.system.size, "unknown"), counted(reduced.modes, "mode")
-        return (*found, f"of the rotor {size} move, {modes} among them; {high}")
+        return found if reduced is None else (*found, reduced.note)
 
     def figure(self, view: View = "motion") -> Figure:
         """Orbits, time and spectrum, Bode or polar picture of a run-up, loci in the clearance circles."""

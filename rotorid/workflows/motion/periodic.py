@@ -11,7 +11,7 @@ from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import cell
 from rotorid.base.result import frame, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.text import counted, listing, percent
+from rotorid.base.text import listing
 from rotorid.workflows.motion.moving_system import Moving, moving
 from rotorid.workflows.option_values import Band, Sensor, band, degrees, sensors
 from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
@@ -90,7 +90,7 @@ class PeriodicMotions(Outcome):
             text(bifurcations, width=COLUMNS) if bifurcations[0].values else "No bifurcation.",
             motion.warnings,
             (
-                *self._reduction(),
+                *([] if self.reduced is None else [self.reduced.note]),
                 *(
                     f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
                     f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
@@ -98,15 +98,6 @@ class PeriodicMotions(Outcome):
                 ),
             ),
         )
-
-    def _reduction(self) -> tuple[str, ...]:
-        if self.reduced is None:
-            return ()
-        size, modes = counted(self.reduced.system.size, "unknown"), counted(self.reduced.modes, "mode")
-        high = f"natural frequencies without films are high by {percent(self.reduced.error)} % at most"
-        if self.reduced.error == float("inf"):
-            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
-        return (f"of the rotor {size} move, {modes} among them; {high}",)
 
     def _judgement(self, k: int) -> str:
         branch, sizes = self.readings.motion.branches[k], 1e6 * self.readings.along[k][:, 0]
