@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Quantity = Literal["displacement", "velocity", "acceleration"]
 
-_DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
 def model_influence(  # noqa: PLR0913
@@ -88,13 +88,13 @@ def model_influence(  # noqa: PLR0913
 
     if not (np.isfinite(relative_error) and relative_error >= 0):
         raise ValueError(f"the relative error of the model must be a finite number ≥ 0, not {relative_error}")
-    if quantity not in _DERIVATIVES:
-        raise ValueError(f"quantity must be one of {', '.join(_DERIVATIVES)}, not {quantity!r}")
+    if quantity not in DERIVATIVES:
+        raise ValueError(f"quantity must be one of {', '.join(DERIVATIVES)}, not {quantity!r}")
     if not np.isfinite(key_phasor):
         raise ValueError(f"the angle of the key phasor must be finite, not {key_phasor}")
     model = influence(rotor, list(planes.values()), list(sensors.values()), speeds)
     W = np.asarray(model.W) * np.exp(1j * np.radians(key_phasor))
-    W = W * ((1j * model.speeds) ** _DERIVATIVES[quantity])[:, None, None] * _radii(planes, radii)
+    W = W * ((1j * model.speeds) ** DERIVATIVES[quantity])[:, None, None] * _radii(planes, radii)
     default = Labels(weight_unit="kg_m" if radii is None else "kg")
     return Influence(
         speeds=model.speeds,

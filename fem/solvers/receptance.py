@@ -30,7 +30,7 @@ _CHUNK, _ROWS = 256, 64  # speeds at a time up to so many rows, to stay in the p
 
 
 @dataclass(frozen=True, eq=False)
-class _Series:
+class Series:
     """Σ over modes and powers of the conservative receptance between rows and columns."""
 
     factors: FloatArray  # (rows·columns, m + p): modes with the sign of their mass, then powers
@@ -82,8 +82,8 @@ class Receptance:
     loads: FloatArray
     reference: dict[int, float]
     moving: IndexArray
-    forward: _Series | None
-    backward: _Series | None
+    forward: Series | None
+    backward: Series | None
     spectra: tuple[Spectrum, ...]
     beta: float
 
@@ -103,10 +103,10 @@ class Receptance:
         at = supported(self.rotor, speeds)
         if self.forward is None:
             return Amplitudes(*solve_banded(self.rotor, self.A, at, self.rows, self.loads, speeds))
-        change = _change(at, self.reference)[:, self.moving]
+        change = support_change(at, self.reference)[:, self.moving]
         near = np.zeros(speeds.size, dtype=bool)
         for spectrum in self.spectra:
-            near |= _near(spectrum, speeds)
+            near |= near_resonance(spectrum, speeds)
         directions = [self.forward.at(speeds * speeds, near)]
         D = np.moveaxis(change, 0, -1)
         if self.backward is not None:
@@ -165,35 +165,35 @@ def prepare(
         At a critical speed that no damping limits, or outside a bearing table.
     """
     at = supported(rotor, speeds)
-    reference = _reference(rotor, A, at)
+    reference = reference_springs(rotor, A, at)
     held = np.array([A.deflection(node) for node in reference], dtype=np.intp)
     varies = {support.node for support in rotor.supports if not support.plain}
-    change = np.abs(_change(at, reference)).max(axis=(0, 2, 3), initial=0.0) > 0
+    change = np.abs(support_change(at, reference)).max(axis=(0, 2, 3), initial=0.0) > 0
     moving = np.flatnonzero(change | np.array([node in varies for node in reference], dtype=bool))
     held = held[moving]
     top = float(speeds.max())
 
     pencil = one_plane(rotor, A, 1, reference)
-    spectra = [_modes_for(pencil, top)]
+    spectra = [modes_up_to(pencil, top)]
     both = np.concatenate((rows, held))
-    forward = None if exact else _series(pencil, spectra[0], both, np.hstack((loads, _units(A, held))), top)
+    forward = None if exact else receptance_series(pencil, spectra[0], both, np.hstack((loads, unit_loads(A, held))), top)
     backward = None
-    beta = _uniform(rotor)
+    beta = uniform_damping(rotor)
     if at.planes == 2 and forward is not None and held.size:
         if beta is None:
             forward = None
         else:
             behind = pencil if not rotor.model.gyroscopic else one_plane(rotor, A, -1, reference)
             if behind is not pencil:
-                spectra.append(_modes_for(behind, top))
-            backward = _series(behind, spectra[-1], both, _units(A, held), top)
+                spectra.append(modes_up_to(behind, top))
+            backward = receptance_series(behind, spectra[-1], both, unit_loads(A, held), top)
             forward = None if backward is None else forward
     return Receptance(
         rotor, A, rows, loads, reference, moving, forward, backward, tuple(spectra), beta or 0.0
     )
 
 
-def _reference(rotor: Rotor, A: Matrices, at: Supported) -> dict[int, float]:
+def reference_springs(rotor: Rotor, A: Matrices, at: Supported) -> dict[int, float]:
     """Springs {node: N/m} of the conservative rotor; a gyroscopic one may have to be held."""
     springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
     hold = rigid_scale(rotor) * rotor.total_mass
@@ -208,7 +208,7 @@ def _reference(rotor: Rotor, A: Matrices, at: Supported) -> dict[int, float]:
     return springs
 
 
-def _change(at: Supported, reference: dict[int, float]) -> ComplexArray:
+def support_change(at: Supported, reference: dict[int, float]) -> ComplexArray:
     """What the supports do besides the reference springs, shape (S, s, 2, 2)."""
     change = np.zeros((at.stiffness.shape[0], len(reference), 2, 2), dtype=complex)
     change[:, : len(at.nodes)] = at.stiffness
@@ -218,13 +218,13 @@ def _change(at: Supported, reference: dict[int, float]) -> ComplexArray:
     return change
 
 
-def _units(A: Matrices, unknowns: IndexArray) -> FloatArray:
+def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
     unit = np.zeros((A.size, unknowns.size))
     unit[unknowns, np.arange(unknowns.size)] = 1.0
     return unit
 
 
-def _uniform(rotor: Rotor) -> float | None:
+def uniform_damping(rotor: Rotor) -> float | None:
     """The material damping if it is the same everywhere, so that B = β K; else None."""
     beta = rotor.material_damping
     if not beta.any():
@@ -233,7 +233,7 @@ def _uniform(rotor: Rotor) -> float | None:
     return None if tilting or (beta != beta[0]).any() else float(beta[0])
 
 
-def _modes_for(pencil: Pencil, top: float) -> Spectrum:
+def modes_up_to(pencil: Pencil, top: float) -> Spectrum:
     """All modes of a small model, else those up to three times the highest speed."""
     rotor, A, available = pencil.rotor, pencil.matrices, finite_modes(pencil)
     if pencil.size <= DENSE:
@@ -250,7 +250,7 @@ def _modes_for(pencil: Pencil, top: float) -> Spectrum:
         m = min(available, 2 * m)
 
 
-def _near(spectrum: Spectrum, speeds: FloatArray) -> BoolArray:
+def near_resonance(spectrum: Spectrum, speeds: FloatArray) -> BoolArray:
     squared = speeds * speeds
     # Rigid-body motions have λ = 0 without rounding.
     moving = spectrum.squares != 0
@@ -260,9 +260,9 @@ def _near(spectrum: Spectrum, speeds: FloatArray) -> BoolArray:
     return np.asarray((gap <= margin[within, None]).any(axis=0))
 
 
-def _series(
+def receptance_series(
     pencil: Pencil, spectrum: Spectrum, rows: IndexArray, columns: FloatArray, top: float
-) -> _Series | None:
+) -> Series | None:
     """Modes and static corrections; None where the series does not reach its tolerance."""
     from scipy.linalg.lapack import dpbtrs
 
@@ -271,9 +271,9 @@ def _series(
     modal = (V[rows][:, None, :] * participation.T[None, :, :]).reshape(-1, shifted.size)
     powers: list[FloatArray] = []
 
-    def series() -> _Series:
+    def series() -> Series:
         factors = np.column_stack((modal, *powers))
-        return _Series(factors, squares, spectrum.shift, (rows.size, columns.shape[1]))
+        return Series(factors, squares, spectrum.shift, (rows.size, columns.shape[1]))
 
     if shifted.size == pencil.size:
         return series()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from balancing import Influence, Trials
+    from balancing.coefficients.coefficients_from_model import Quantity
+    from fem import Sensor
     from rotorid.tables import Job
 
 KINDS = ("measured", "computed", "combined")
@@ -44,6 +47,8 @@ def choose(
     has_trials = bool(job.trials.weights.any())
     if kind is None:
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
+        if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
+            kind = "combined"
     if kind == "measured" and model_error is not None:
         raise ValueError(
             "--model-error is for computed coefficients: add --coefficients computed or combined"
@@ -56,6 +61,8 @@ def choose(
     measured = job.influence or estimate_influence(job.trials)
     if kind == "combined":
         error = MODEL_ERROR if model_error is None else model_error
+        if model_error is None and job.rotor is not None and job.rotor.calibration:
+            error = 0.0  # it states its own
         measured = combine(measured, computed(job, error))
     return measured, baseline
 
@@ -78,17 +85,27 @@ def _refined(job: Job, kind: str) -> Influence:
     return refine(job.trials, job.check, corrections=mounted)
 
 
-def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:
-    """Coefficients from the rotor model of the job, at its planes, or per unbalance at given stations.
+@dataclass(frozen=True)
+class ModelPlaces:
+    """Where the planes and sensors of a job are in its rotor model, and what the sensors read.
+
+    Radii are those that make an unbalance, kg·m, of the job's masses; None where its weights are unbalances.
+    """
+
+    nodes: Mapping[str, int]
+    sensors: Mapping[str, Sensor]
+    radii: Mapping[str, float] | None
+    quantity: Quantity
+
+
+def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPlaces:
+    """The places of all planes, or of given stations per unbalance, and of all sensors.
 
     Raises
     ------
     ValueError
         Where the job has no rotor, or no place in it for a plane or sensor.
     """
-    from dataclasses import replace
-
-    from balancing.coefficients.coefficients_from_model import model_influence
     from rotorid.tables.reader.units import weight
 
     if job.rotor is None:
@@ -101,29 +118,55 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
             "computed coefficients need the place of every sensor and plane in the model: node = … (or "
             f"station) in {', '.join(missing) or 'a [planes.NAME]'}"
         )
-    labels = job.trials.labels
-    by_mass = stations is None and weight(labels.weight_unit).kind == "mass"
-    if stations is not None:
-        labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
+    by_mass = stations is None and weight(job.trials.labels.weight_unit).kind == "mass"
     if by_mass and (lost := [p for p in job.planes if p not in job.radii]):
         raise ValueError(
             f"weights as masses need the radius of every plane: radius_mm in [planes.{lost[0]}], or weights "
             "as unbalances"
         )
-    return model_influence(
-        job.rotor,
+    return ModelPlaces(
         nodes,
         {s: job.sensor_places[s] for s in job.trials.sensors},
-        job.trials.speeds,
-        radii={p: job.radii[p] for p in job.planes} if by_mass else None,
-        relative_error=error_percent / 100,
-        quantity=_quantity(labels.vibration_unit),
-        key_phasor=job.key_phasor,
-        labels=labels,
+        {p: job.radii[p] for p in job.planes} if by_mass else None,
+        _quantity(job.trials.labels.vibration_unit),
     )
 
 
-def _quantity(unit: str) -> Literal["displacement", "velocity", "acceleration"]:
+def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:
+    """Coefficients from the rotor model of the job, at its planes, or per unbalance at given stations.
+
+    Those of a calibrated rotor have its errors.
+
+    Raises
+    ------
+    ValueError
+        As `model_places`.
+    """
+    from dataclasses import replace
+
+    from balancing.coefficients.coefficients_from_model import model_influence
+    from rotorid.workflows.calibration.one_shot import calibrated
+
+    places = model_places(job, stations)
+    assert job.rotor is not None
+    labels = job.trials.labels
+    if stations is not None:
+        labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
+    found = model_influence(
+        job.rotor,
+        places.nodes,
+        places.sensors,
+        job.trials.speeds,
+        radii=places.radii,
+        relative_error=error_percent / 100,
+        quantity=places.quantity,
+        key_phasor=job.key_phasor,
+        labels=labels,
+    )
+    return found if job.rotor.calibration is None else calibrated(found, job.rotor, places, job.key_phasor)
+
+
+def _quantity(unit: str) -> Quantity:
     """What an amplitude in this unit is.
 
     Raises
@@ -133,7 +176,7 @@ def _quantity(unit: str) -> Literal["displacement", "velocity", "acceleration"]:
     """
     from rotorid.tables.reader.units import vibration
 
-    kinds: dict[str, Literal["displacement", "velocity", "acceleration"]] = {
+    kinds: dict[str, Quantity] = {
         "length": "displacement",
         "displacement": "displacement",
         "velocity": "velocity",

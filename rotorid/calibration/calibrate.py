@@ -1,0 +1,267 @@
+"""Numbers of a rotor from readings of runs, critical speeds and modes together, K θ = Y step by step.
+
+Rows of all data, each divided by its error, and of what is known beforehand go through the nonlinear driver
+of `rotorid.regression` with exact derivatives. χ² of data and priors together, m + p − n degrees of freedom,
+tells whether the model explains the data: a model that lacks something pulls the numbers away from what is
+known of them as well as leaving residuals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fem.model.calibration import Calibration
+from fem.model.rotor import Rotor
+from fem.model.rotor_parameters import is_reading, with_parameters
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.calibration.calibrated_rotor import CalibratedRotor
+from rotorid.calibration.frequencies import MeasuredFrequencies
+from rotorid.calibration.run_readings import ReadingRows, RunReadings
+from rotorid.calibration.unknowns import Unknown
+from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.prior import Prior, effect, prior_rows
+from rotorid.regression.search import search_from
+
+LEVEL = 0.01
+"""Probability of a χ² as large, below which the model does not explain the data."""
+SPREAD = 0.3
+"""Relative spread of starting values without a prior."""
+LIMIT = 40
+"""Evaluations of a search from one of several starts."""
+SAME = 0.1
+"""Standard deviations within which two ends of searches are one."""
+
+
+class _Equations:
+    """Residuals of all data at the numbers θ (n,), in standard deviations, and their derivatives."""
+
+    def __init__(
+        self,
+        rotor: Rotor,
+        unknowns: Sequence[Unknown],
+        readings: Sequence[RunReadings],
+        frequencies: Sequence[MeasuredFrequencies],
+    ) -> None:
+        self.rotor, self.readings, self.frequencies = rotor, readings, frequencies
+        self.paths = [unknown.path for unknown in unknowns]
+        self.rows: list[ReadingRows] = []
+
+    def values(self, theta: FloatArray) -> dict[str, float]:
+        return dict(zip(self.paths, theta.tolist(), strict=True))
+
+    def weigh(self, theta: FloatArray) -> None:
+        """Take the errors of the readings as they are at these numbers."""
+        self.rows = [data.rows(self.coefficients(data, theta)) for data in self.readings]
+
+    def coefficients(self, data: RunReadings, theta: FloatArray) -> ComplexArray:
+        return data.coefficients(self.rotor, self.values(theta))[0]
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        values = self.values(theta)
+        try:
+            parts = [rows.residual(self.coefficients(rows.data, theta))[0] for rows in self.rows]
+            parts += [data.residual(self.rotor, values) for data in self.frequencies]
+        except (ValueError, np.linalg.LinAlgError):
+            if not self.known:
+                raise
+            return np.full(self.known, np.inf)  # no rotor: the search shortens its step
+        found = np.concatenate(parts)
+        self.known = found.size
+        return found
+
+    known = 0
+
+    def jacobian(self, theta: FloatArray) -> FloatArray:
+        values = self.values(theta)
+        parts = [
+            rows.jacobian(*rows.data.coefficients(self.rotor, values, self.paths)) for rows in self.rows
+        ]
+        parts += [data.jacobian(self.rotor, values, self.paths) for data in self.frequencies]
+        return np.vstack(parts)
+
+
+def calibrate(
+    rotor: Rotor,
+    unknowns: Sequence[Unknown],
+    readings: Sequence[RunReadings] = (),
+    frequencies: Sequence[MeasuredFrequencies] = (),
+    *,
+    starts: int = 3,
+    seed: int = 0,
+) -> CalibratedRotor:
+    """Estimate numbers of a rotor, with their errors and what the data do not determine.
+
+    Parameters
+    ----------
+    rotor
+        As it is believed to be.
+    unknowns
+        Its n unknown numbers.
+    readings, frequencies
+        The data, of any mixture.
+    starts
+        Searches: from the starting values, and from others drawn by priors (or 30 % of the value).
+    seed
+        Of the drawn starts.
+
+    Raises
+    ------
+    ValueError
+        Without data or unknowns, for unknowns that the rotor does not have, and data that it cannot show.
+    """
+    if not unknowns or not (readings or frequencies):
+        raise ValueError("a calibration needs data and at least one unknown number")
+    for path in (unknown.path for unknown in unknowns if is_reading(unknown.path)):
+        probes = [f"probe[{sensor}].angle" for data in readings for sensor in data.trials.sensors]
+        if path not in (*probes, "key_phasor.angle") or not readings:
+            raise ValueError(f"no data have readings of {path}: {', '.join(probes) or 'there are no runs'}")
+    equations = _Equations(rotor, unknowns, readings, frequencies)
+    names = tuple(unknown.label for unknown in unknowns)
+    first = np.array([unknown.first(rotor) for unknown in unknowns])
+    known = {unknown.label: unknown.prior for unknown in unknowns if unknown.prior}
+    prior = prior_rows(names, known)
+    equations.weigh(first)
+    equations.residual(first)
+    begin, others = _best_start(equations, unknowns, prior, first, starts, seed)
+    bounds = {unknown.label: unknown.limits(rotor) for unknown in unknowns}
+
+    def solve(begin: FloatArray, *, near: bool = False) -> NonlinearEstimate:
+        return nonlinear_least_squares(
+            equations.residual,
+            equations.jacobian,
+            begin,
+            names=names,
+            sigma_stated=True,
+            bounds=bounds,
+            near=near,
+            prior=prior,
+        )
+
+    found = solve(begin)
+    equations.weigh(found.estimate.solution)
+    found = solve(found.estimate.solution, near=True)
+    return _judged(equations, unknowns, prior, found, others)
+
+
+def _best_start(
+    equations: _Equations,
+    unknowns: Sequence[Unknown],
+    prior: Prior,
+    first: FloatArray,
+    starts: int,
+    seed: int,
+) -> tuple[FloatArray, list[tuple[float, FloatArray]]]:
+    """Where the lowest of several short searches ends, and the ends (half χ², θ) of all."""
+    random = np.random.default_rng(seed)
+    residual, jacobian = prior.beside(equations.residual, equations.jacobian)
+    spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
+    spread = np.where(spread > 0, spread, SPREAD * np.abs(first))
+    ends = []
+    for k in range(starts):
+        begin = first + (spread * random.uniform(-1.0, 1.0, first.size) if k else 0.0)
+        if starts > 1 and np.isfinite(residual(begin)).all():
+            end = search_from(residual, begin, jacobian, limit=LIMIT)
+            ends += [] if end is None else [end]
+    ends.sort(key=lambda end: end[0])
+    return (ends[0][1] if ends else first), ends
+
+
+def _judged(
+    equations: _Equations,
+    unknowns: Sequence[Unknown],
+    prior: Prior,
+    found: NonlinearEstimate,
+    others: Sequence[tuple[float, FloatArray]],
+) -> CalibratedRotor:
+    """The rotor with these numbers, and whether the model explains the data."""
+    from scipy.special import chdtrc
+
+    theta = found.estimate.solution
+    K, r = equations.jacobian(theta), equations.residual(theta)
+    projected = sum(rows.residual(equations.coefficients(rows.data, theta))[1].shape[1] for rows in equations.rows)
+    chi_square = float(r @ r + np.sum(prior.residual(theta) ** 2))
+    dof = r.size + len(prior) - projected - found.estimate.rank
+    chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
+    misfit = chance < LEVEL
+    covariance = found.estimate.solution_covariance
+    covariance = np.zeros((theta.size,) * 2) if covariance is None else np.nan_to_num(covariance)
+    if misfit:
+        covariance = covariance * chi_square / dof
+    values = equations.values(theta)
+    excess = chi_square / dof if misfit else 0.0
+    calibration = Calibration(
+        names=tuple(equations.paths),
+        values=theta,
+        covariance=_as_it_stands(equations.paths, theta, covariance),
+        readings={path: value for path, value in values.items() if is_reading(path)},
+        **_lack_of_fit(equations, theta, excess),
+        needs_trial_run=misfit or not found.converged,
+    )
+    std = np.sqrt(np.diag(covariance))
+    apart = [
+        end
+        for cost, end in others
+        if 2 * cost < chi_square + 4 and (np.abs(end - theta) > 1 + SAME * std + 3 * std).any()
+    ]
+    return CalibratedRotor(
+        rotor=replace(with_parameters(equations.rotor, values), calibration=calibration),
+        unknowns=tuple(unknowns),
+        found=found,
+        covariance=covariance,
+        prior=effect(prior, K, r, theta, stated=True, at_bounds=found.at_bounds),
+        jacobian=K,
+        chi_square=chi_square,
+        dof=dof,
+        chance=chance,
+        unbalance=tuple(
+            rows.residual(equations.coefficients(rows.data, theta))[2] for rows in equations.rows
+        ),
+        readings=tuple(equations.readings),
+        stated=all(rows.stated for rows in equations.rows),
+        other_ends=tuple(apart),
+    )
+
+
+def _as_it_stands(paths: Sequence[str], theta: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Covariance of the numbers as they stand in the new rotor, where every scale is 1."""
+    scales = np.array([value if path.endswith(".scale") else 1.0 for path, value in zip(paths, theta, strict=True)])
+    return np.asarray(covariance / np.outer(scales, scales))
+
+
+def _lack_of_fit(equations: _Equations, theta: FloatArray, excess: float) -> dict[str, object]:
+    """What the model leaves of what weights do beyond the errors, by speed and sensor: relative deviations.
+
+    Zero where χ² tells of none. Else the mean over all readings, and at each speed and sensor what its own
+    rows say, as two more of them.
+    """
+    if not equations.rows:
+        return {"speeds": np.zeros(0), "sensors": (), "lack_of_fit": np.zeros((0, 0))}
+    speeds, sensors, table = [], list(dict.fromkeys(s for d in equations.readings for s in d.trials.sensors)), []
+    for rows in equations.rows:
+        W = equations.coefficients(rows.data, theta)
+        left = rows.raw(W)
+        bare = rows.residual(W)[2]
+        if bare.size:
+            left = left + np.einsum("scq,q->sc", W[..., len(rows.data.nodes) :], bare)[:, None]
+        S, x, C = left.shape
+        size = np.abs(rows.effect(W)) ** 2 if not rows.data.modelled else np.abs(rows.data.trials.mean.swapaxes(0, 1)) ** 2
+        variance = rows.variance.reshape(S, x, C, 2).mean(axis=3)
+        square = np.abs(left) ** 2 / 2
+        more, size = (square - variance).sum(axis=1), size.sum(axis=1)
+        mean = max(float(more.sum() / size.sum()), 0.0)
+        each = (2 * mean * size / x + np.maximum(more, 0.0)) / (size * (1 + 2 / x))
+        relative = np.sqrt(each) if excess else np.zeros((S, C))
+        for s, speed in enumerate(rows.data.trials.speeds.tolist()):
+            row = np.zeros(len(sensors))
+            row[[sensors.index(name) for name in rows.data.trials.sensors]] = relative[s]
+            speeds.append(speed)
+            table.append(row)
+    order = np.argsort(speeds, kind="stable")
+    return {
+        "speeds": np.array(speeds)[order],
+        "sensors": tuple(sensors),
+        "lack_of_fit": np.array(table)[order],
+    }

@@ -1,0 +1,223 @@
+"""Readings of runs as rows of a calibration: what a rotor with other numbers would have read.
+
+A run reads Y = Y₀ + W(θ) T with the weights T that were mounted. The bare rotor's Y₀ is either free at every
+speed and sensor, so that only differences between runs count, or it is what unknown unbalances u at given
+nodes and amplitudes of a bow do, Y₀ = W_u(θ) u with the same u in all runs and at all speeds: u is
+eliminated for each θ (variable projection, Kaufman's Jacobian P ∂r of the projected residual P r, whose
+gradient is exact). Rows are divided by the root of the joint covariance of reading and run errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from balancing.coefficients.run_error_estimate import given
+from balancing.coefficients.run_errors import RunErrors, assumed, run_columns, runs_of
+from balancing.data.reading_errors import error_model, mean_covariance
+from balancing.data.trials import Trials
+from balancing.solvers.error_propagation import real_columns, whitening
+from fem.matrices.banded_matrices import assemble, multiply
+from fem.model.rotor import Rotor
+from fem.model.rotor_parameters import is_reading, parameter_value, typical_size, with_parameters
+from fem.model.sensors import Sensor
+from fem.solvers.eigen import lowest_modes
+from fem.solvers.receptance import unit_loads
+from fem.solvers.receptance_derivatives import MatrixChange, matrix_change, receptance_with_derivatives
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import solution, stretch
+
+STEP = 1e-4
+"""Of a number's typical size, for differences of matrices."""
+NO_ERROR = 1e-9
+"""Of the largest reading: the least error, for data that state none."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunReadings:
+    """Runs of one machine in one state, and where its planes and sensors are in the model.
+
+    Attributes
+    ----------
+    trials
+        Readings (SI, phase lead) and mounted weights.
+    nodes, radii
+        Node of each plane of the trials and what its weights are multiplied by to be kg·m, (P,).
+    sensors
+        Of each sensor of the trials.
+    derivative
+        0: they read displacements, 1: velocities, 2: accelerations.
+    key_phasor
+        Direction of the key phasor, degrees from x with the rotation.
+    unbalance, bow
+        Nodes of the bare rotor's unknown unbalances and number of its bow's shapes, the lowest modes at rest;
+        none: the bare rotor's readings are free.
+    """
+
+    trials: Trials
+    nodes: tuple[int, ...]
+    radii: FloatArray
+    sensors: tuple[Sensor, ...]
+    derivative: int = 0
+    key_phasor: float = 0.0
+    unbalance: tuple[int, ...] = ()
+    bow: int = 0
+
+    @property
+    def size(self) -> int:
+        """Number of real rows."""
+        R, S, C = self.trials.mean.shape
+        return 2 * S * C * (R if self.modelled else R - 1)
+
+    @property
+    def modelled(self) -> bool:
+        """Whether the bare rotor's readings are those of unknown unbalances."""
+        return bool(self.unbalance or self.bow)
+
+    def coefficients(
+        self, start: Rotor, values: Mapping[str, float], derivatives: Sequence[str] = ()
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """What weights in the planes, then unbalances and bows, do: (S, C, P + q), and its derivatives by names.
+
+        Parameters
+        ----------
+        start
+            The rotor whose numbers are changed.
+        values
+            All numbers, by path.
+        derivatives
+            n paths; the second array has the shape (n, S, C, P + q).
+        """
+        rotor, speeds = with_parameters(start, values), self.trials.speeds
+        A = assemble(rotor)
+        names = [f"probe[{sensor}].angle" for sensor in self.trials.sensors]
+        turned = np.array([values.get(name, 0.0) for name in names])
+        angles = np.radians([sensor.angle for sensor in self.sensors] + turned)
+        rows = np.array([A.deflection(rotor.node(sensor.node)) for sensor in self.sensors], dtype=np.intp)
+        at = np.array([A.deflection(node) for node in (*self.nodes, *self.unbalance)], dtype=np.intp)
+        loads = [unit_loads(A, at)]
+        if self.bow:
+            shapes = lowest_modes(rotor, A, self.bow).vectors
+            loads.append(multiply(A.shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0)))
+
+        def change(path: str) -> MatrixChange:
+            def other(value: float) -> Rotor:
+                return with_parameters(rotor, {path: value})
+
+            return matrix_change(other, parameter_value(rotor, path), STEP * typical_size(rotor, path), speeds)
+
+        own = [path for path in derivatives if not is_reading(path)]
+        found = receptance_with_derivatives(
+            rotor, np.hstack(loads), rows, angles, speeds, [change(path) for path in own]
+        )
+        clock = np.exp(1j * np.radians(self.key_phasor + values.get("key_phasor.angle", 0.0)))
+        factor = np.ones((speeds.size, loads[0].shape[1] + self.bow), dtype=complex)
+        factor[:, : at.size] = (speeds**2)[:, None]
+        factor[:, : len(self.nodes)] *= self.radii
+        factor *= clock * ((1j * speeds) ** self.derivative)[:, None]
+        W = found.H * factor[:, None]
+        out = np.zeros((len(derivatives), *W.shape), dtype=complex)
+        for k, path in enumerate(derivatives):
+            if path in own:
+                out[k] = found.by_number[own.index(path)] * factor[:, None]
+                out[k] /= values[path] if path.endswith(".scale") else 1.0  # which is 1 in this rotor
+            elif path == "key_phasor.angle":
+                out[k] = W * np.radians(1j)
+            elif path in names:
+                c = names.index(path)
+                out[k, :, c] = found.by_angle[:, c] * factor * np.radians(1.0)
+        return W, out
+
+    def rows(self, W: ComplexArray) -> ReadingRows:
+        """The rows with their errors, which coefficients W (S, C, P + q) of about this size tell."""
+        trials, P = self.trials, len(self.nodes)
+        Y = trials.mean
+        R, S, C = Y.shape
+        model = error_model(trials)
+        reading = mean_covariance(trials, model.errors)
+        runs = runs_of(Y, trials.weights, W[..., :P])
+        run = _run_errors(trials, runs, stated=model.source == "stated")
+        columns = run_columns(run, runs)
+        take = np.eye(R) if self.modelled else np.column_stack((-np.ones(R - 1), np.eye(R - 1)))
+        n, least = len(take) * C, (NO_ERROR * np.abs(Y).max()) ** 2
+        each = reading + (columns.own + least)[..., None, None] * np.eye(2)
+        own = np.einsum("xr,rscij,yr,cd->sxciydj", take, each, take, np.eye(C)).reshape(S, 2 * n, 2 * n)
+        # a column of a run stands in all rows that the run is part of
+        common = np.einsum("xr,krmsc->krmsxc", take, columns.common).reshape(2, -1, S, n)
+        white, _ = whitening(own, real_columns(common[1]), real_columns(common[0]))
+        return ReadingRows(self, take, white, np.einsum("sii->si", own), model.source != "assumed")
+
+
+def _run_errors(trials: Trials, runs: object, *, stated: bool) -> RunErrors:
+    """As stated; none beside stated errors of a reading; else assumed."""
+    if trials.run_errors is not None:
+        return given([], runs, *trials.run_errors, "stated")  # type: ignore[arg-type]
+    return RunErrors() if stated else assumed(runs)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingRows:
+    """Residuals of `RunReadings` in standard deviations.
+
+    Attributes
+    ----------
+    data
+        What they are of.
+    take
+        How rows are made of the runs: these themselves, or differences from the first, (x, R).
+    white
+        Divides vectors (S, 2 x C, j) by the root of their covariance.
+    variance
+        Of single rows by errors of their own, (S, 2 x C).
+    stated
+        Whether the errors are stated or measured, not assumed.
+    """
+
+    data: RunReadings
+    take: FloatArray
+    white: Callable[[FloatArray], FloatArray]
+    variance: FloatArray
+    stated: bool
+
+    def raw(self, W: ComplexArray) -> ComplexArray:
+        """What weights do less what was read, (S, x, C)."""
+        trials, P = self.data.trials, len(self.data.nodes)
+        left = np.einsum("scp,rp->rsc", W[..., :P], trials.weights) - trials.mean
+        return np.moveaxis(np.einsum("xr,rsc->xsc", self.take, left), 1, 0)
+
+    def effect(self, W: ComplexArray) -> ComplexArray:
+        """What weights do by W or changes of W (…, S, C, P), (…, S, x, C)."""
+        P, take = len(self.data.nodes), self.take @ self.data.trials.weights
+        return np.einsum("...scp,xp->...sxc", W[..., :P], take)
+
+    def residual(self, W: ComplexArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
+        """Residuals (m,), the basis (m, 2q) that was projected out of them, and the unknowns u (q,)."""
+        return self._project(W, self._white(self.raw(W)[..., None])[:, 0])
+
+    def jacobian(self, W: ComplexArray, dW: ComplexArray) -> FloatArray:
+        """Derivatives (m, n) of the residuals by n numbers, dW (n, S, C, P + q)."""
+        _, basis, u = self.residual(W)
+        change = self.effect(dW)
+        if u.size:
+            bare = np.einsum("nscq,q->nsc", dW[..., len(self.data.nodes) :], u)
+            change = change + bare[:, :, None, :] * self.take.sum(axis=1)[:, None]
+        J = self._white(np.moveaxis(change, 0, -1))
+        return J - basis @ solution(basis, J) if u.size else J
+
+    def _project(self, W: ComplexArray, r: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
+        if not self.data.modelled:
+            return r, np.zeros((r.size, 0)), np.zeros(0, dtype=complex)
+        each = W[..., len(self.data.nodes) :]  # (S, C, q), the same in all rows of runs
+        both = np.repeat(each[:, None], len(self.take), axis=1)
+        basis = self._white(np.stack((both, 1j * both), axis=-1).reshape(*both.shape[:3], -1))
+        u = solution(basis, -r)
+        return r + basis @ u, basis, u[::2] + 1j * u[1::2]
+
+    def _white(self, columns: ComplexArray) -> FloatArray:
+        """Complex columns (S, x, C, j) as whitened real ones, (m, j)."""
+        S, x, C, j = columns.shape
+        flat = np.moveaxis(columns.reshape(S, x * C, j), -1, 1)
+        real = np.moveaxis(stretch(flat[..., None])[..., 0], 1, -1)
+        return self.white(real).reshape(-1, j)

@@ -1,0 +1,63 @@
+"""Unknown numbers of a rotor: what is to be estimated, what is known of it beforehand, and its bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.model.rotor import Rotor
+from fem.model.rotor_parameters import is_reading, parameter_value
+
+_SIGNED = ("kxy", "kyx", "cxy", "cyx", "slope", "curve", "angle")
+"""Last words of paths of numbers that may have either sign."""
+_ABOVE_ZERO = ("youngs_modulus", "density", "pedestal_stiffness")
+LEAST = 1e-3
+"""Of its value: the lower bound of what must be above zero."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number of the rotor file that is to be estimated.
+
+    Attributes
+    ----------
+    path
+        As in `fem.model.rotor_parameters`: "bearing[1].kxx", "disc[2].scale", "probe[p1].angle".
+    name
+        To print; default: the path.
+    start
+        Where the search begins; default: the prior value, or that of the file.
+    prior
+        Value and one standard deviation that are known beforehand; None: nothing.
+    bounds
+        Lowest and largest value; None: 0 where the number cannot be negative.
+    """
+
+    path: str
+    name: str = ""
+    start: float | None = None
+    prior: tuple[float, float] | None = None
+    bounds: tuple[float, float] | None = None
+
+    @property
+    def label(self) -> str:
+        """What it is called in print."""
+        return self.name or self.path
+
+    def first(self, rotor: Rotor) -> float:
+        """Where the search begins."""
+        if self.start is not None:
+            return self.start
+        return self.prior[0] if self.prior else parameter_value(rotor, self.path)
+
+    def limits(self, rotor: Rotor) -> tuple[float | None, float | None]:
+        """Bounds for the search."""
+        if self.bounds is not None:
+            return self.bounds
+        words = self.path.split(".")
+        value = parameter_value(rotor, self.path)
+        if is_reading(self.path) or words[-1] in _SIGNED or value < 0:
+            return None, None
+        positive = words[-1] == "scale" or words[-1].startswith(_ABOVE_ZERO)
+        return (LEAST * value if positive and np.isfinite(value) else 0.0), None

@@ -1,0 +1,51 @@
+"""`rotorid calibrate`: numbers of a rotor file from what the machine tells."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.common_options import RotorArgument, command
+from rotorid.cli.output import TABLES, Destination
+from rotorid.workflows.calibration.calibrate import CalibrateOptions
+from rotorid.workflows.calibration.calibrate import calibrate as work
+
+
+@command(
+    CalibrateOptions,
+    panels={
+        "What is unknown": "estimate prior bounds exact unbalance_at bow",
+        "How to search, or what to measure": "starts design speeds",
+    },
+)
+def calibrate(
+    rotor: RotorArgument,
+    data: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DATA...",
+            help="Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.",
+        ),
+    ],
+    options: CalibrateOptions,
+    to: Destination,
+) -> None:
+    """Numbers of a rotor file from trial runs, critical speeds and modes, with ±.
+
+    --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
+    critical, campbell and response show bands.
+
+    Example: rotorid calibrate sample_data/calibration/rotor.toml sample_data/calibration/trial.toml
+    --estimate "bearing[*].*" --prior "bearing[*].*=20%" --output calibrated.toml
+
+    Example: rotorid calibrate sample_data/calibration/rotor.toml sample_data/calibration/trial.toml
+    --estimate "bearing[*].*" --prior "bearing[*].*=20%" --design 4 --speeds 2000:7000:500rpm
+    """
+    dataclasses.replace(to, output=None).deliver(
+        "calibration",
+        lambda: dataclasses.replace(work(rotor, data, options), written=to.output),
+        more=((to.output, (*TABLES, ".toml"), lambda found: found.files(to.output or Path())),),
+    )

@@ -1,0 +1,84 @@
+"""Data of a calibration, from files: jobs with runs, critical speeds, natural frequencies with shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing.coefficients.coefficients_from_model import DERIVATIVES
+from rotorid.base.text import counted
+from rotorid.calibration import MeasuredFrequencies, RunReadings
+from rotorid.workflows.coefficients import model_places
+
+if TYPE_CHECKING:
+    from fem import Rotor
+    from rotorid.tables import Job
+
+
+
+def read_data(
+    files: Sequence[Path], rotor: Rotor, unbalance: Sequence[int], bow: int, *, candidates: bool = False
+) -> tuple[list[RunReadings], list[MeasuredFrequencies], list[Path], list[str]]:
+    """Readings and frequencies of these files, all files that were read, and what was assumed.
+
+    Parameters
+    ----------
+    files
+        Jobs (.toml, or a workbook), tables of critical speeds or natural frequencies, tables of modes.
+    rotor
+        Knows the nodes.
+    unbalance, bow
+        As `RunReadings`, of all jobs.
+    candidates
+        The runs of jobs need not say anything: only their places count.
+    """
+    from rotorid.tables import read_job
+    from rotorid.tables.data.frequency_table import is_job, read_frequencies
+
+    readings, frequencies, read, said = [], [], list[Path](), list[str]()
+    for file in files:
+        if is_job(file):
+            job = read_job(file)
+            readings.append(run_readings(job, rotor, unbalance, bow, candidates=candidates))
+            read += job.files
+        else:
+            found = read_frequencies(file, rotor)
+            frequencies.append(found.data)
+            read.append(file)
+            said += [f"{file.name}: {assumed}" for assumed in found.assumed]
+    return readings, frequencies, read, said
+
+
+def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0, *, candidates: bool = False) -> RunReadings:
+    """The runs of a job at their places in the model.
+
+    Raises
+    ------
+    ValueError
+        Where a plane or a sensor has no place in the model, or the runs say nothing of it.
+    """
+    trials = job.trials
+    places = model_places(job)
+    if job.rotor is not None and job.rotor.n_nodes != rotor.n_nodes:
+        raise ValueError(
+            f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, and this one has {rotor.n_nodes}: "
+            "its planes and sensors would be elsewhere"
+        )
+    if not (candidates or unbalance or bow or (len(trials.runs) > 1 and trials.weights.any())):
+        raise ValueError(
+            "these runs say nothing of the rotor: no weights change between them; runs with a trial weight are "
+            "needed, or nodes at which the unbalance may stand (--unbalance-at)"
+        )
+    return RunReadings(
+        trials,
+        tuple(places.nodes[plane] for plane in trials.planes),
+        np.array([1.0 if places.radii is None else places.radii[plane] for plane in trials.planes]),
+        tuple(places.sensors[sensor] for sensor in trials.sensors),
+        DERIVATIVES[places.quantity],
+        job.key_phasor,
+        tuple(unbalance),
+        bow,
+    )

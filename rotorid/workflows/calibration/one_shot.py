@@ -1,0 +1,139 @@
+"""Balancing with a calibrated rotor: coefficients with its errors, and the trial run that would narrow them.
+
+The parameters of the rotor err by L ε with L Lᵀ their covariance and independent real ε; a coefficient by
+Σ ∂W/∂θ L ε, the same ε at all speeds and sensors, and by the lack of fit at its own speed and sensor.
+
+A trial run adds rows K to what is known of the parameters: C becomes C − C Kᵀ (1 + K C Kᵀ)⁻¹ K C, whatever
+it will read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
+from balancing.data.trials import ReadingErrors, Trials
+from fem.model.rotor_parameters import is_reading, parameter_value
+from rotorid.calibration import RunReadings
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from balancing import Influence
+    from fem import Rotor
+    from rotorid.base.arrays import ComplexArray
+    from rotorid.tables import Job
+    from rotorid.workflows.coefficients import ModelPlaces
+
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
+
+
+def calibrated(influence: Influence, rotor: Rotor, places: ModelPlaces, key_phasor: float) -> Influence:
+    """Computed coefficients as those of a calibrated rotor: at the angles it found, with its errors."""
+    calibration = rotor.calibration
+    assert calibration is not None
+    W, dW = _derivatives(_runs(influence, places, key_phasor), rotor)
+    L = calibration.columns()
+    columns = np.einsum("nscp,nm->mscp", dW, L)
+    lack = calibration.lack_at(influence.speeds, influence.sensors)
+    found = with_parameters(replace(influence, W=W), columns, lack)
+    return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
+
+
+def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
+    """One bare run at these places, to ask for coefficients."""
+    S, C, P = influence.W.shape
+    trials = Trials(
+        ("bare",), influence.speeds, influence.sensors, influence.planes, np.ones((1, S, C)), np.zeros((1, P))
+    )
+    radii = np.array([1.0 if places.radii is None else places.radii[plane] for plane in influence.planes])
+    return RunReadings(
+        trials,
+        tuple(places.nodes[plane] for plane in influence.planes),
+        radii,
+        tuple(places.sensors[sensor] for sensor in influence.sensors),
+        DERIVATIVES[places.quantity],
+        key_phasor,
+    )
+
+
+def _values(rotor: Rotor) -> Mapping[str, float]:
+    """The calibrated numbers as they stand."""
+    assert rotor.calibration is not None
+    angles = dict(rotor.calibration.readings)
+    return {
+        path: angles.get(path, 0.0) if is_reading(path) else parameter_value(rotor, path)
+        for path in dict.fromkeys((*rotor.calibration.names, *angles))
+    }
+
+
+def _derivatives(runs: RunReadings, rotor: Rotor) -> tuple[ComplexArray, ComplexArray]:
+    """Coefficients and their derivatives by the calibrated numbers that act on these sensors."""
+    assert rotor.calibration is not None
+    return runs.coefficients(rotor, _values(rotor), rotor.calibration.names)
+
+
+@dataclass(frozen=True)
+class NextTrial:
+    """The trial run that would tell most: its plane and weight, and the prediction's error before and after.
+
+    Errors are half widths of 95 %, root mean square over the readings, by the parameters of the model alone.
+    """
+
+    plane: str
+    weight: complex
+    before: float
+    after: float
+
+
+def next_trial(job: Job, influence: Influence, weights: ComplexArray, planes: tuple[str, ...]) -> NextTrial | None:
+    """Of trial runs with the correction of one plane, the one after which the correction is known best.
+
+    Parameters
+    ----------
+    job
+        With a calibrated rotor.
+    influence
+        Its computed coefficients.
+    weights, planes
+        The correction.
+    """
+    from rotorid.workflows.coefficients import model_places
+
+    rotor = job.rotor
+    if rotor is None or rotor.calibration is None or not rotor.calibration.names or not weights.any():
+        return None
+    runs = _runs(influence, model_places(job), job.key_phasor)
+    W, dW = _derivatives(runs, rotor)
+    D = np.zeros(len(influence.planes), dtype=complex)
+    D[[influence.planes.index(plane) for plane in planes]] = weights
+    moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
+
+    def error(C: ComplexArray) -> float:
+        return float(1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1]))
+
+    C = np.asarray(rotor.calibration.covariance)
+    bare = job.trials.mean[0]
+    found = []
+    for p in np.flatnonzero(D):
+        one = np.zeros_like(D)
+        one[p] = D[p]
+        two = Trials(
+            ("bare", "trial"),
+            influence.speeds,
+            influence.sensors,
+            influence.planes,
+            np.stack((bare, bare + W @ one)),
+            np.stack((0 * one, one)),
+            errors=influence.errors or job.trials.errors or ReadingErrors(0.02, np.radians(2.0)),
+            run_errors=job.trials.run_errors,
+        )
+        rows = replace(runs, trials=two).rows(W)
+        K = rows.jacobian(W, dW)
+        CK = C @ K.T
+        after = C - CK @ np.linalg.solve(np.eye(len(K)) + K @ CK, CK.T)
+        found.append(NextTrial(influence.planes[p], complex(one[p]), error(C), error(after)))
+    return min(found, key=lambda trial: trial.after)
