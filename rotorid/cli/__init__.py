@@ -16,6 +16,7 @@ from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
     bearings,
+    calibrate,
     campbell,
     critical,
     demo,
@@ -71,6 +72,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "fit": fit.fit,
         "simulate": simulate.simulate,
         "modes": modes.modes,
+        "calibrate": calibrate.calibrate,
     },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
