@@ -14,6 +14,7 @@ from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
 from fem.mesh import MeshCheck, mesh_check, refined
+from fem.model.calibration import Calibration
 from fem.model.node_forces import (
     CubicSpring,
     InternalDamping,
@@ -43,6 +44,7 @@ __all__ = [
     "STEEL_MODULUS",
     "STEEL_POISSON",
     "BearingForces",
+    "Calibration",
     "Campbell",
     "CubicSpring",
     "Disc",

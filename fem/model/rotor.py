@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from fem.model.calibration import Calibration
 from fem.model.disc import STEEL_DENSITY, Disc
 from fem.model.node_forces import NodeForce, in_order
 from fem.model.supports import Pedestal, Support
@@ -79,6 +80,8 @@ class Rotor:
     forces
         At nodes, those that are not linear (`fem.model.node_forces`), kept in the order of their kinds: for
         equilibrium and motion; what is linear refuses them, see `linear`.
+    calibration
+        What a fit to readings found of its parameters, None without one; equal rotors may differ in it.
 
     Raises
     ------
@@ -98,6 +101,7 @@ class Rotor:
     material_damping: FloatArray = field(default_factory=lambda: np.array(0.0))
     model: Model = Model()
     forces: Sequence[NodeForce] = ()
+    calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
         for name, value in zip(PER_ELEMENT, _broadcast(self), strict=True):
@@ -108,6 +112,8 @@ class Rotor:
         object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
         if not isinstance(self.model, Model):
             raise ValueError(f"model must be a Model, not {self.model!r}")
+        if not isinstance(self.calibration, Calibration | None):
+            raise ValueError(f"calibration must be a Calibration, not {self.calibration!r}")
 
     __hash__ = None  # type: ignore[assignment]  # compared by value, and arrays have no hash
 

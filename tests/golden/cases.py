@@ -165,6 +165,7 @@ bk-weighted                 balance sample_data/bk_two_plane/job.toml --method w
 left-in                     balance sample_data/left_in/job.toml --history
 left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
 rk4                         balance sample_data/rk4/job.toml
+rk4-1004                    balance sample_data/rk4/job_1004.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
 template                    balance --template job.xlsx
 schema-job                  schema job

@@ -11,14 +11,18 @@ from rotorid.tables import read_job
 FOLDER = sample_data() / "rk4"
 
 
-def test_what_the_tables_hold():
-    trials = read_job(FOLDER / "job.toml").trials
+@pytest.mark.parametrize(
+    ("job", "rpm", "amplitude_mil", "phase_deg"),
+    [("job.toml", 1206, 0.24863, 70.722), ("job_1004.toml", 1005, 0.13481, 74.639)],
+)
+def test_what_the_tables_hold(job, rpm, amplitude_mil, phase_deg):
+    trials = read_job(FOLDER / job).trials
     assert trials.readings.shape == (3, 11, 1, 4)
     assert not np.isnan(trials.readings).any()
     assert (trials.sensors, trials.planes) == (("p1x", "p1y", "p2x", "p2y"), ("disk 1", "disk 2"))
     assert trials.runs[0] == "BASE"
     assert trials.labels.vibration_unit == "mil"
-    np.testing.assert_allclose(trials.speeds, [1206 * np.pi / 30], rtol=1e-12)
+    np.testing.assert_allclose(trials.speeds, [rpm * np.pi / 30], rtol=1e-12)
     grams = 1e6 * trials.weights.real
     assert dict(zip(trials.runs, map(tuple, grams.round(9)), strict=True)) == {
         "BASE": (0, 0),
@@ -34,13 +38,14 @@ def test_what_the_tables_hold():
         "A020": (24, 24),
     }
     assert trials.readings[0, 0, 0, 0] == pytest.approx(
-        0.24863 * 25.4e-6 * np.exp(1j * np.deg2rad(70.722)), rel=1e-12
+        amplitude_mil * 25.4e-6 * np.exp(1j * np.deg2rad(phase_deg)), rel=1e-12
     )
 
 
-def test_digits_are_those_of_the_table():
+@pytest.mark.parametrize("job", ["job.toml", "job_1004.toml"])
+def test_digits_are_those_of_the_table(job):
     """Five decimals of a mil and three of a degree, zeros at the end or not."""
-    steps = read_job(FOLDER / "job.toml").trials.steps
+    steps = read_job(FOLDER / job).trials.steps
     np.testing.assert_allclose(steps[0], 1e-5 * 25.4e-6, rtol=1e-12)
     np.testing.assert_allclose(steps[1], np.deg2rad(1e-3), rtol=1e-12)
 
