@@ -176,7 +176,11 @@ def prepare(
     pencil = one_plane(rotor, A, 1, reference)
     spectra = [modes_up_to(pencil, top)]
     both = np.concatenate((rows, held))
-    forward = None if exact else receptance_series(pencil, spectra[0], both, np.hstack((loads, unit_loads(A, held))), top)
+    forward = (
+        None
+        if exact
+        else receptance_series(pencil, spectra[0], both, np.hstack((loads, unit_loads(A, held))), top)
+    )
     backward = None
     beta = uniform_damping(rotor)
     if at.planes == 2 and forward is not None and held.size:
@@ -219,6 +223,7 @@ def support_change(at: Supported, reference: dict[int, float]) -> ComplexArray:
 
 
 def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
+    """A load 1 on each of these unknowns, (size, m)."""
     unit = np.zeros((A.size, unknowns.size))
     unit[unknowns, np.arange(unknowns.size)] = 1.0
     return unit
@@ -251,6 +256,7 @@ def modes_up_to(pencil: Pencil, top: float) -> Spectrum:
 
 
 def near_resonance(spectrum: Spectrum, speeds: FloatArray) -> BoolArray:
+    """At which speeds the fast formula would lose half of the digits."""
     squared = speeds * speeds
     # Rigid-body motions have λ = 0 without rounding.
     moving = spectrum.squares != 0

@@ -20,7 +20,7 @@ import numpy as np
 
 from fem.matrices.banded_matrices import Matrices, assemble, dense, multiply
 from fem.matrices.support_dynamic_stiffness import Supported, supported
-from fem.matrices.undamped_matrices import one_plane
+from fem.matrices.undamped_matrices import Whirl, one_plane
 from fem.model.rotor import Rotor
 from fem.solvers.receptance import (
     PIVOT,
@@ -35,14 +35,15 @@ from fem.solvers.receptance import (
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 _CHUNK = 256  # speeds at a time, so that memory does not grow with them
+_DIRECTIONS: tuple[Whirl, Whirl] = (1, -1)
 BANDS = ("shaft", "mass", "gyroscopic", "material")
 
 
 @dataclass(frozen=True, eq=False)
 class MatrixChange:
-    """∂D by one number of a rotor: bands of shaft and discs (None: unchanged), supports at nodes (S, k, 2, 2).
+    """∂D by one number of a rotor: bands of shaft and discs (None: unchanged), and supports at nodes.
 
-    The latter as in `Supported`, acting on (F, b).
+    The latter, (S, k, 2, 2), act on (F, b) as in `Supported`.
     """
 
     bands: dict[str, FloatArray] | None
@@ -155,7 +156,7 @@ def _solver(
     u: ComplexArray,
     speeds: FloatArray,
 ) -> Callable[[slice], Pair]:
-    """q and p at some of the speeds, the fast way where there is one."""
+    """Q and p at some of the speeds, the fast way where there is one."""
     beta, top = uniform_damping(rotor), float(speeds.max())
     springs = reference_springs(rotor, A, at)
     held = np.array([A.deflection(node) for node in springs], dtype=np.intp)
@@ -163,14 +164,16 @@ def _solver(
     columns = np.hstack((loads, unit_loads(A, seen), unit_loads(A, held)))
     places = np.concatenate((ports.unknowns, held))
     b, a, n = loads.shape[1], len(u), ports.unknowns.size
-    series, spectra = [], []
-    for whirl in (1, -1) if beta is not None else ():
-        pencil = one_plane(rotor, A, whirl, springs)  # type: ignore[arg-type]
-        spectra.append(modes_up_to(pencil, top))
-        series.append(receptance_series(pencil, spectra[-1], places, columns, top))
+    pencils = [one_plane(rotor, A, whirl, springs) for whirl in _DIRECTIONS]
+    spectra = [modes_up_to(pencil, top) for pencil in pencils]
+    both = zip(pencils, spectra, strict=True)
+    ahead, behind = (receptance_series(pencil, modes, places, columns, top) for pencil, modes in both)
 
     def full(omega: FloatArray, stiffness: ComplexArray) -> Pair:
         return _full_solution(A, ports, loads, u, Supported(at.nodes, stiffness, at.reference, 2), omega)
+
+    if beta is None or ahead is None or behind is None:
+        return lambda part: full(speeds[part], at.stiffness[part])
 
     def fast(part: slice) -> Pair:
         omega = speeds[part]
@@ -180,7 +183,7 @@ def _solver(
         stiffer = 1.0 + 2j * beta * omega if beta else np.ones(omega.size)
         D = support_change(Supported(at.nodes, at.stiffness[part], at.reference, 2), springs)
         D[:, :, 1, 1] -= np.array(list(springs.values())) * (stiffer - 1.0)[:, None]
-        directions = [series[0].at(omega**2, near), series[1].at(omega**2 / stiffer, near) / stiffer]
+        directions = [ahead.at(omega**2, near), behind.at(omega**2 / stiffer, near) / stiffer]
         H = np.moveaxis(np.stack(directions), -1, 0)  # (S, 2, places, columns)
         of_loads, of_sensors, of_held = H[..., :b], H[..., b : b + a] * u.T[:, None], H[..., b + a :]
         s, S = held.size, omega.size
@@ -199,8 +202,6 @@ def _solver(
             q[lost], p[lost] = full(omega[lost], at.stiffness[part][lost])
         return q, p
 
-    if any(each is None for each in series) or not series:
-        return lambda part: full(speeds[part], at.stiffness[part])
     return fast
 
 
@@ -216,22 +217,25 @@ def _spread(D: ComplexArray) -> ComplexArray:
 def _full_solution(
     A: Matrices, ports: _Ports, loads: FloatArray, u: ComplexArray, at: Supported, omega: FloatArray
 ) -> Pair:
-    """q and p from the whole matrices, speed by speed."""
+    """Q and p from the whole matrices, speed by speed."""
     K, M, G, B = (dense(getattr(A, name)) for name in BANDS)
     size, held = A.size, np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
     f, seen = (np.zeros((2 * size, k), dtype=complex) for k in (loads.shape[1], len(u)))
     f[:size] = loads
+    both = np.concatenate((held, size + held))
     rows, each = ports.unknowns[ports.rows], np.arange(len(u))
     seen[rows, each], seen[size + rows, each] = u.T
     q, p = [], []
     for w, supports in zip(omega, _spread(at.stiffness), strict=True):
         D = np.zeros((2, size, 2, size), dtype=complex)
         D[0, :, 0], D[1, :, 1] = K - w * w * (M - G), K + 2j * w * B - w * w * (M + G)
-        D[np.ix_((0, 1), held, (0, 1), held)] += supports.reshape(2, held.size, 2, held.size)
         whole = D.reshape(2 * size, 2 * size)
+        whole[np.ix_(both, both)] += supports
         q.append(np.linalg.solve(whole, f))
         p.append(np.linalg.solve(whole.T, seen))
-    return tuple(np.stack(each).reshape(len(omega), 2, size, -1)[:, :, ports.unknowns] for each in (q, p))
+    shape = (len(omega), 2, size, -1)
+    q_ports, p_ports = (np.array(each, complex).reshape(shape)[:, :, ports.unknowns] for each in (q, p))
+    return q_ports, p_ports
 
 
 def _derivatives(
@@ -265,4 +269,5 @@ def _applied(band: FloatArray, q: ComplexArray) -> AnyArray:
     if not band.any():
         return np.zeros((*q.shape[:2], 1, 1))
     flat = np.moveaxis(q, 2, 0)
-    return np.moveaxis(multiply(band, flat.reshape(len(flat), -1)).reshape(flat.shape), 0, 2)
+    product: AnyArray = multiply(band, flat.reshape(len(flat), -1))  # type: ignore[arg-type]
+    return np.moveaxis(product.reshape(flat.shape), 0, 2)

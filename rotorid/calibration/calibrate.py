@@ -8,7 +8,7 @@ known of them as well as leaving residuals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -76,9 +76,7 @@ class _Equations:
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         values = self.values(theta)
-        parts = [
-            rows.jacobian(*rows.data.coefficients(self.rotor, values, self.paths)) for rows in self.rows
-        ]
+        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, self.paths)) for rows in self.rows]
         parts += [data.jacobian(self.rotor, values, self.paths) for data in self.frequencies]
         return np.vstack(parts)
 
@@ -181,9 +179,9 @@ def _judged(
 
     theta = found.estimate.solution
     K, r = equations.jacobian(theta), equations.residual(theta)
-    projected = sum(rows.residual(equations.coefficients(rows.data, theta))[1].shape[1] for rows in equations.rows)
+    unbalance = [rows.residual(equations.coefficients(rows.data, theta))[2] for rows in equations.rows]
     chi_square = float(r @ r + np.sum(prior.residual(theta) ** 2))
-    dof = r.size + len(prior) - projected - found.estimate.rank
+    dof = r.size + len(prior) - 2 * sum(u.size for u in unbalance) - found.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
     misfit = chance < LEVEL
     covariance = found.estimate.solution_covariance
@@ -191,13 +189,16 @@ def _judged(
     if misfit:
         covariance = covariance * chi_square / dof
     values = equations.values(theta)
-    excess = chi_square / dof if misfit else 0.0
+    lack = _lack_of_fit(equations, theta) if misfit else {}
+    speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
     calibration = Calibration(
         names=tuple(equations.paths),
         values=theta,
         covariance=_as_it_stands(equations.paths, theta, covariance),
         readings={path: value for path, value in values.items() if is_reading(path)},
-        **_lack_of_fit(equations, theta, excess),
+        speeds=np.array(speeds),
+        sensors=tuple(sensors),
+        lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),
         needs_trial_run=misfit or not found.converged,
     )
     std = np.sqrt(np.diag(covariance))
@@ -216,9 +217,7 @@ def _judged(
         chi_square=chi_square,
         dof=dof,
         chance=chance,
-        unbalance=tuple(
-            rows.residual(equations.coefficients(rows.data, theta))[2] for rows in equations.rows
-        ),
+        unbalance=tuple(unbalance),
         readings=tuple(equations.readings),
         stated=all(rows.stated for rows in equations.rows),
         other_ends=tuple(apart),
@@ -227,41 +226,29 @@ def _judged(
 
 def _as_it_stands(paths: Sequence[str], theta: FloatArray, covariance: FloatArray) -> FloatArray:
     """Covariance of the numbers as they stand in the new rotor, where every scale is 1."""
-    scales = np.array([value if path.endswith(".scale") else 1.0 for path, value in zip(paths, theta, strict=True)])
+    scales = np.array(
+        [value if path.endswith(".scale") else 1.0 for path, value in zip(paths, theta, strict=True)]
+    )
     return np.asarray(covariance / np.outer(scales, scales))
 
 
-def _lack_of_fit(equations: _Equations, theta: FloatArray, excess: float) -> dict[str, object]:
+def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, str], float]:
     """What the model leaves of what weights do beyond the errors, by speed and sensor: relative deviations.
 
-    Zero where χ² tells of none. Else the mean over all readings, and at each speed and sensor what its own
-    rows say, as two more of them.
+    The mean over all readings of a job counts as two more rows of each speed and sensor.
     """
-    if not equations.rows:
-        return {"speeds": np.zeros(0), "sensors": (), "lack_of_fit": np.zeros((0, 0))}
-    speeds, sensors, table = [], list(dict.fromkeys(s for d in equations.readings for s in d.trials.sensors)), []
+    found: dict[tuple[float, str], float] = {}
     for rows in equations.rows:
-        W = equations.coefficients(rows.data, theta)
-        left = rows.raw(W)
-        bare = rows.residual(W)[2]
-        if bare.size:
-            left = left + np.einsum("scq,q->sc", W[..., len(rows.data.nodes) :], bare)[:, None]
-        S, x, C = left.shape
-        size = np.abs(rows.effect(W)) ** 2 if not rows.data.modelled else np.abs(rows.data.trials.mean.swapaxes(0, 1)) ** 2
-        variance = rows.variance.reshape(S, x, C, 2).mean(axis=3)
-        square = np.abs(left) ** 2 / 2
-        more, size = (square - variance).sum(axis=1), size.sum(axis=1)
-        mean = max(float(more.sum() / size.sum()), 0.0)
-        each = (2 * mean * size / x + np.maximum(more, 0.0)) / (size * (1 + 2 / x))
-        relative = np.sqrt(each) if excess else np.zeros((S, C))
-        for s, speed in enumerate(rows.data.trials.speeds.tolist()):
-            row = np.zeros(len(sensors))
-            row[[sensors.index(name) for name in rows.data.trials.sensors]] = relative[s]
-            speeds.append(speed)
-            table.append(row)
-    order = np.argsort(speeds, kind="stable")
-    return {
-        "speeds": np.array(speeds)[order],
-        "sensors": tuple(sensors),
-        "lack_of_fit": np.array(table)[order],
-    }
+        data, W = rows.data, equations.coefficients(rows.data, theta)
+        left, u = rows.raw(W), rows.residual(W)[2]
+        bare = np.einsum("scq,q->sc", W[..., len(data.nodes) :], u)
+        left = left + bare[:, None]
+        square = (np.abs(left) ** 2 / 2 - rows.variance.reshape(*left.shape, 2).mean(axis=3)).sum(axis=1)
+        effect = np.abs(bare[:, None] + rows.effect(W)) if data.modelled else np.abs(rows.effect(W))
+        size, share = (effect**2).sum(axis=1), 2 / left.shape[1]
+        mean = max(float(square.sum() / size.sum()), 0.0)
+        relative = np.sqrt((share * mean + np.maximum(square, 0.0) / size) / (1 + share))
+        for (s, c), value in np.ndenumerate(relative):
+            key = float(data.trials.speeds[s]), data.trials.sensors[c]
+            found[key] = max(found.get(key, 0.0), float(value))
+    return found

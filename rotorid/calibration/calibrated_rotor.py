@@ -1,4 +1,4 @@
-"""A calibrated rotor: its numbers with their errors, what the data determine, whether the model explains them."""
+"""A calibrated rotor: numbers with their errors, what the data determine, whether the model explains them."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.model.rotor import Rotor
-from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import range_text
-from rotorid.base.text import counted, listing, percent
+from rotorid.base.text import capital, counted, listing
 from rotorid.calibration.run_readings import RunReadings
 from rotorid.calibration.unknowns import Unknown
-from rotorid.regression.estimate import parameter_columns, parameter_dict, parameter_text
+from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
 from rotorid.regression.nonlinear import NonlinearEstimate
 from rotorid.regression.prior import PriorEffect
 from rotorid.regression.undetermined_combinations import combination_words
@@ -26,15 +26,12 @@ from rotorid.regression.undetermined_combinations import combination_words
 if TYPE_CHECKING:
     import pandas as pd
 
-SEEN = 3.0
-"""Times that data must tell a combination better than what is known beforehand, to be named as seen."""
-LITTLE = 0.1
-"""Share of the data below which a number is known by its prior only."""
+SEEN, VAGUE = 1 / 3, 2 / 3
+"""Deviations, in those known before: a combination below the first is seen, a number above the second not."""
 TERM = 0.3
 """Of the largest term of a combination, relative to what is known of each: smaller ones are not named."""
-CORRELATED = 0.9
 GUESS = 0.2
-"""Of a number without a prior, for the size of a combination."""
+"""Of a number without a prior, in place of its deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +79,6 @@ class CalibratedRotor(Answered):
     stated: bool
     other_ends: tuple[FloatArray, ...]
 
-    errors_stated = True
-
     @property
     def names(self) -> tuple[str, ...]:
         """Of the numbers."""
@@ -102,31 +97,38 @@ class CalibratedRotor(Answered):
         return np.where(np.isnan(unknown), np.nan, np.sqrt(np.diag(self.covariance)))
 
     @property
-    def ci95(self) -> FloatArray:
-        """95 % intervals (n, 2)."""
-        return np.stack((self.values - 1.96 * self.std, self.values + 1.96 * self.std), axis=1)
-
-    @property
     def explained(self) -> bool:
         """Whether the model explains the data within their errors."""
         return not (self.rotor.calibration and self.rotor.calibration.needs_trial_run)
 
     @cached_property
-    def seen(self) -> tuple[str, ...]:
-        """Combinations that the data see much better than what is known beforehand, in words, the best first."""
-        scale = np.array(
-            [u.prior[1] if u.prior else GUESS * abs(v) or 1.0 for u, v in zip(self.unknowns, self._all, strict=True)]
-        )
-        K = self.jacobian * scale
-        squares, vectors = np.linalg.eigh(K.T @ K)
-        found = []
-        for square, vector in zip(squares[::-1], vectors.T[::-1], strict=True):
-            if square < SEEN**2:
-                break
+    def seen(self) -> str:
+        """Of wished numbers that the data do not tell apart, the combinations that they do tell, in words."""
+        prior = [unknown.prior for unknown in self.unknowns]
+        size = np.array([p[1] if p else GUESS * abs(v) or 1.0 for p, v in zip(prior, self._all, strict=True)])
+        K = self.jacobian * size
+        C = np.linalg.inv(K.T @ K + np.eye(len(size)))  # in units of what is known
+        wished = np.array([not unknown.beside for unknown in self.unknowns])
+        weak = np.flatnonzero(wished & (np.diag(C) > VAGUE**2))
+        if not weak.size:
+            return ""
+        variances, vectors = np.linalg.eigh(C[np.ix_(weak, weak)])
+        names = [self.names[k] for k in weak]
+        told = []
+        for vector in vectors.T[variances < SEEN**2]:
             largest = int(np.argmax(np.abs(vector)))
-            kept = np.where(np.abs(vector) >= TERM * abs(vector[largest]), vector / scale, 0.0)
-            found.append(combination_words(np.round(kept / kept[largest], 3), self.names))
-        return tuple(found)
+            kept = np.where(np.abs(vector) >= TERM * abs(vector[largest]), vector / size[weak], 0.0)
+            told.append(combination_words(np.round(kept / kept[largest], 2), names))
+        only = (
+            f"only {listing(told, 'and')} {'is' if len(told) == 1 else 'are'} seen"
+            if told
+            else "nothing is seen"
+        )
+        return f"of {listing(names, 'and')} {only}"
+
+    @property
+    def _every(self) -> BoolArray:
+        return np.ones(len(self.names), dtype=bool)
 
     @property
     def _all(self) -> FloatArray:
@@ -140,9 +142,9 @@ class CalibratedRotor(Answered):
             times = np.sqrt(self.chi_square / self.dof)
             errors = "the stated errors explain" if self.stated else "the assumed errors explain"
             found.append(
-                f"the model does not explain the data: what is left is {times:.2g} times what {errors}; intervals "
-                "are that much wider, and balancing with it needs a trial run: free more numbers, state larger "
-                "errors, or look for what the model lacks (a bow, a bearing, a loose part)"
+                f"what is left is {times:.2g} times what {errors}: intervals are that much wider, and "
+                "balancing with this rotor needs a trial run; free more numbers, state larger errors, or "
+                "look for what the model lacks (a bow, a bearing, a loose part)"
             )
         if self.prior is not None:
             found += self.prior.warnings
@@ -156,48 +158,33 @@ class CalibratedRotor(Answered):
         return {} if self.prior is None else self.prior.why
 
     @property
-    def weak(self) -> tuple[str, ...]:
-        """Numbers of which the data say next to nothing: the prior stays."""
-        if self.prior is None:
-            return ()
-        pairs = zip(self.prior.rows.own, self.prior.share, strict=True)
-        return tuple(name for name, share in pairs if share < LITTLE)
-
-    @property
     def answer(self) -> Answer:
-        """Whether the model explains the data; the numbers; what the data see."""
-        n, seen = len(self.names), len(self.seen)
-        fits = "explains" if self.explained else "does not explain"
-        first = f"The model {fits} the data (χ² {self.chi_square:.4g}, {counted(self.dof, 'degree')} of freedom)."
+        """Whether the model explains the data; the wished numbers; what the data do not tell."""
+        fits = "explains" if self.explained else "does NOT explain"
+        chi = f"χ² {self.chi_square:.4g} with {counted(self.dof, 'degree')} of freedom"
+        first = [f"The model {fits} the data ({chi})."]
         speeds = [speed for data in self.readings for speed in data.trials.speeds.tolist()]
-        at = f" at {range_text(min(speeds), max(speeds))}" if speeds else ""
-        if seen < n:
-            which = f"{counted(seen, 'combination')} of the {counted(n, 'number')}"
-            first += f"\nThe data{at} see {which} well" + (f": {listing(self.seen[:3], 'and')}" if seen else "")
-            first += ", …." if seen > 3 else "."
-        notes = []
-        if self.weak:
-            notes.append(f"the data say less than {percent(LITTLE)} % of {listing(self.weak, 'and')}: the priors stay")
-        pairs = self._pairs()
-        if pairs:
-            notes.append(f"known better together than alone: {listing(pairs, 'and')}")
-        found = [parameter_text(self.names, self, self._why)]  # type: ignore[arg-type]
-        found += [text(table, width=100) for table in (self._unbalance_columns(),) if table]
-        return Answer(first, "\n\n".join(found), self.warnings, tuple(notes))
+        if self.seen:
+            at = f"at {range_text(min(speeds), max(speeds))} " if speeds else ""
+            first.append(capital(f"{at}{self.seen}."))
+        wished = np.array([not unknown.beside for unknown in self.unknowns])
+        tables = [parameter_text(*self._part(which), self._why) for which in (wished, ~wished) if which.any()]
+        tables += [text(columns, width=COLUMNS) for columns in (self._unbalance_columns(),) if columns]
+        more = "what else is not known exactly" if not wished.all() else "unbalance"
+        return Answer(
+            "\n".join(first),
+            tables[0],
+            self.warnings,
+            tables=tuple(tables[1:]),
+            more=more if tables[1:] else "",
+        )
 
-    def _pairs(self) -> list[str]:
-        """Strongly correlated numbers, and their combination that is known."""
-        std = np.where(self.std > 0, self.std, np.inf)
-        r = np.triu(self.covariance / np.outer(std, std), 1)
-        order = np.argsort(-np.abs(r), axis=None)[:2]
-        found = []
-        for i, j in zip(*np.unravel_index(order, r.shape), strict=True):
-            if abs(r[i, j]) > CORRELATED:
-                row = np.zeros(len(self.names))
-                row[i], row[j] = 1.0, -np.sign(r[i, j]) * std[i] / std[j]
-                value, spread = row @ self._all, np.sqrt(max(row @ self.covariance @ row, 0.0))
-                found.append(f"{combination_words(np.round(row, 9), self.names)} = {value:.4g} ± {spread:.2g}")
-        return found
+    def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
+        """Names of some of the numbers, and these with their errors."""
+        part = Uncertain()
+        part.values, part.errors_stated, part.dof = self.values[which], True, 0
+        part.covariance = np.where(np.isnan(self.std), np.nan, self.covariance)[np.ix_(which, which)]
+        return tuple(name for name, taken in zip(self.names, which, strict=True) if taken), part
 
     def _unbalance_columns(self) -> tuple[Column, ...]:
         """What the bare rotor's readings say of its unbalances and bows."""
@@ -219,7 +206,7 @@ class CalibratedRotor(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per number: value, standard deviation, 95 % interval, share of the data."""
-        return frame((*parameter_columns(self.names, self), self._share_column()))  # type: ignore[arg-type]
+        return frame((*parameter_columns(*self._part(self._every)), self._share_column()))
 
     def _share_column(self) -> Column:
         share: Mapping[str, float] = (
@@ -232,7 +219,7 @@ class CalibratedRotor(Answered):
         calibration, estimate = self.rotor.calibration, self.found.estimate
         assert calibration is not None
         shares = dict(zip(self.names, self._share_column().values, strict=True))
-        parameters = parameter_dict(self.names, self)  # type: ignore[arg-type]
+        parameters = parameter_dict(*self._part(self._every))
         for name, unknown in zip(self.names, self.unknowns, strict=True):
             parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": shares[name]}
         r = estimate.residuals
@@ -244,7 +231,7 @@ class CalibratedRotor(Answered):
                 "identifiable": estimate.full_rank,
                 "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
                 "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
-                "seen": self.seen,
+                "seen": self.seen or None,
                 "residual_rms": np.sqrt(np.mean(r**2)),
                 "chi_square": self.chi_square,
                 "degrees_of_freedom": self.dof,

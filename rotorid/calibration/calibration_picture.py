@@ -37,7 +37,9 @@ def _numbers(result: CalibratedRotor, ax: Axes) -> None:
     known = np.array([p is not None for p in prior])
     ax.barh(rows[known], 3.92, 0.7, -1.96, color="0.88", label="known before (95 %)")
     spread = 1.96 * np.nan_to_num(result.std) / size
-    ax.errorbar((values - middle) / size, rows, xerr=spread, fmt="o", ms=4, capsize=2, label="calibrated (95 %)")
+    ax.errorbar(
+        (values - middle) / size, rows, xerr=spread, fmt="o", ms=4, capsize=2, label="calibrated (95 %)"
+    )
     ax.set_yticks(rows, result.names)
     ax.invert_yaxis()
     ax.set_xlabel("change from what was known, in its deviations")

@@ -69,7 +69,7 @@ class RunReadings:
     def size(self) -> int:
         """Number of real rows."""
         R, S, C = self.trials.mean.shape
-        return 2 * S * C * (R if self.modelled else R - 1)
+        return int(2 * S * C * (R if self.modelled else R - 1))
 
     @property
     def modelled(self) -> bool:
@@ -79,7 +79,7 @@ class RunReadings:
     def coefficients(
         self, start: Rotor, values: Mapping[str, float], derivatives: Sequence[str] = ()
     ) -> tuple[ComplexArray, ComplexArray]:
-        """What weights in the planes, then unbalances and bows, do: (S, C, P + q), and its derivatives by names.
+        """What weights in the planes, unbalances and bows do: (S, C, P + q), and its derivatives.
 
         Parameters
         ----------
@@ -106,7 +106,9 @@ class RunReadings:
             def other(value: float) -> Rotor:
                 return with_parameters(rotor, {path: value})
 
-            return matrix_change(other, parameter_value(rotor, path), STEP * typical_size(rotor, path), speeds)
+            return matrix_change(
+                other, parameter_value(rotor, path), STEP * typical_size(rotor, path), speeds
+            )
 
         own = [path for path in derivatives if not is_reading(path)]
         found = receptance_with_derivatives(
@@ -185,12 +187,12 @@ class ReadingRows:
         """What weights do less what was read, (S, x, C)."""
         trials, P = self.data.trials, len(self.data.nodes)
         left = np.einsum("scp,rp->rsc", W[..., :P], trials.weights) - trials.mean
-        return np.moveaxis(np.einsum("xr,rsc->xsc", self.take, left), 1, 0)
+        return np.asarray(np.einsum("xr,rsc->sxc", self.take, left))
 
     def effect(self, W: ComplexArray) -> ComplexArray:
         """What weights do by W or changes of W (…, S, C, P), (…, S, x, C)."""
         P, take = len(self.data.nodes), self.take @ self.data.trials.weights
-        return np.einsum("...scp,xp->...sxc", W[..., :P], take)
+        return np.asarray(np.einsum("...scp,xp->...sxc", W[..., :P], take))
 
     def residual(self, W: ComplexArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
         """Residuals (m,), the basis (m, 2q) that was projected out of them, and the unknowns u (q,)."""

@@ -32,6 +32,8 @@ class Unknown:
         Value and one standard deviation that are known beforehand; None: nothing.
     bounds
         Lowest and largest value; None: 0 where the number cannot be negative.
+    beside
+        It is not wished for, but not known exactly either.
     """
 
     path: str
@@ -39,6 +41,7 @@ class Unknown:
     start: float | None = None
     prior: tuple[float, float] | None = None
     bounds: tuple[float, float] | None = None
+    beside: bool = False
 
     @property
     def label(self) -> str:

@@ -130,11 +130,19 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
 
     model, files = rotor_source(rotor)
     given = [data] if isinstance(data, Path | str) else list(data)
-    own = [model.node(node) for node in nodes(options.unbalance_at, "--unbalance-at")] if options.unbalance_at else []
+    own = (
+        [model.node(node) for node in nodes(options.unbalance_at, "--unbalance-at")]
+        if options.unbalance_at
+        else []
+    )
     if options.bow < 0 or options.starts < 1:
         raise ValueError("--bow takes a number from 0, --starts one from 1")
     readings, frequencies, read, assumed = read_data(
-        [file_of(file, "data") for file in given], model, own, options.bow, candidates=options.design is not None
+        [file_of(file, "data") for file in given],
+        model,
+        own,
+        options.bow,
+        candidates=options.design is not None,
     )
     probes = list(dict.fromkeys(sensor for each in readings for sensor in each.trials.sensors))
     numbers = unknowns(model, probes, options.estimate, options.prior, options.bounds, exact=options.exact)
@@ -164,13 +172,13 @@ def _candidates(readings: Sequence[RunReadings], speeds: Speeds | None) -> RunRe
         return one
     omega = np.array(rising_speeds(speeds))
     trials = one.trials
-    blank = np.ones((1, omega.size, len(trials.sensors)))
+    blank = np.ones((1, omega.size, len(trials.sensors)), dtype=complex)
     bare = replace(
         trials,
         runs=("bare",),
         speeds=omega,
         readings=blank,
-        weights=np.zeros((1, len(trials.planes))),
+        weights=np.zeros((1, len(trials.planes)), dtype=complex),
         steps=None,
     )
     return replace(one, trials=bare)

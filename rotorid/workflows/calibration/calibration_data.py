@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rotorid.tables import Job
 
 
-
 def read_data(
     files: Sequence[Path], rotor: Rotor, unbalance: Sequence[int], bow: int, *, candidates: bool = False
 ) -> tuple[list[RunReadings], list[MeasuredFrequencies], list[Path], list[str]]:
@@ -52,7 +51,9 @@ def read_data(
     return readings, frequencies, read, said
 
 
-def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0, *, candidates: bool = False) -> RunReadings:
+def run_readings(
+    job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0, *, candidates: bool = False
+) -> RunReadings:
     """The runs of a job at their places in the model.
 
     Raises
@@ -64,13 +65,13 @@ def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int
     places = model_places(job)
     if job.rotor is not None and job.rotor.n_nodes != rotor.n_nodes:
         raise ValueError(
-            f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, and this one has {rotor.n_nodes}: "
+            f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, this one has {rotor.n_nodes}: "
             "its planes and sensors would be elsewhere"
         )
     if not (candidates or unbalance or bow or (len(trials.runs) > 1 and trials.weights.any())):
         raise ValueError(
-            "these runs say nothing of the rotor: no weights change between them; runs with a trial weight are "
-            "needed, or nodes at which the unbalance may stand (--unbalance-at)"
+            "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
+            "are needed, or nodes at which the unbalance may stand (--unbalance-at)"
         )
     return RunReadings(
         trials,

@@ -1,7 +1,7 @@
-"""Which trial runs at which speeds, and which sensors, would determine numbers of a rotor: before measuring.
+"""Which trial runs, speeds and sensors would determine numbers of a rotor: before measuring.
 
-A candidate is a trial weight in one plane at one speed, read by all sensors. Its rows K are the derivatives of
-what the weight does, each sensor's over its error (as if the weight moved a sensor as much as the rotor
+A candidate is a trial weight in one plane at one speed, read by all sensors. Its rows K are the derivatives
+of what the weight does, each sensor's over its error (as if the weight moved a sensor as much as the rotor
 vibrates there: a difference of two such readings). Chosen is what makes the covariance of the wished numbers
 smallest (the determinant), by exchange, with what is known beforehand of all.
 """
@@ -62,10 +62,9 @@ class CalibrationDesign(Answered):
         return (Column("speed_rpm", rpm, "{:.6g}".format, "rpm"), Column("plane", self.planes, str))
 
     def _numbers(self) -> tuple[Column, ...]:
-        known = np.where(self.before < VAGUE * 0.1 * self.before.max(initial=1.0), self.before, self.before)
         return (
             Column("parameter", self.names, str),
-            Column("std_before", known, error_figures, "± now"),
+            Column("std_before", self.before, error_figures, "± now"),
             Column("std_after", self.after, error_figures, "± after"),
         )
 
@@ -78,11 +77,10 @@ class CalibrationDesign(Answered):
     @property
     def answer(self) -> Answer:
         """Where to measure, and what it will tell."""
-        planes = dict.fromkeys(self.planes)
-        runs = [
-            f"{plane} at {listing((f'{v * RPM:.5g}' for v, p in zip(self.speeds, self.planes, strict=True) if p == plane), 'and')} rpm"
-            for plane in planes
-        ]
+        planes: dict[str, list[str]] = {}
+        for speed, plane in zip(self.speeds, self.planes, strict=True):
+            planes.setdefault(plane, []).append(f"{speed * RPM:.5g}")
+        runs = [f"{plane} at {listing(at, 'and')} rpm" for plane, at in planes.items()]
         return Answer(
             f"Run {counted(len(planes), 'trial weight')}: {'; '.join(runs)}.",
             text(self._numbers(), width=COLUMNS) + "\n\n" + text(self._sensors(), width=COLUMNS),
@@ -96,7 +94,11 @@ class CalibrationDesign(Answered):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
         return plain(
-            {"runs": rows(self._runs()), "parameters": rows(self._numbers()), "sensors": rows(self._sensors())}
+            {
+                "runs": rows(self._runs()),
+                "parameters": rows(self._numbers()),
+                "sensors": rows(self._sensors()),
+            }
         )
 
 
@@ -126,9 +128,7 @@ def design(
     sigma = relative * np.sqrt(TWO_READINGS * (size + FLOOR * size.mean(axis=1, keepdims=True)))
     K = np.moveaxis(dW / sigma, 0, -1)  # (S, C, P, n)
     K = np.stack((K.real, K.imag), axis=2).swapaxes(1, 3)  # (S, P, 2, C, n)
-    known = np.array(
-        [u.prior[1] if u.prior else VAGUE * (abs(values[u.path]) or 1.0) for u in unknowns]
-    )
+    known = np.array([u.prior[1] if u.prior else VAGUE * (abs(values[u.path]) or 1.0) for u in unknowns])
     K = (K * known).reshape(S * P, 2, C, len(paths))  # of numbers in their prior deviations
     wish = np.array([paths.index(path) for path in wished])
     each = np.einsum("krcn,krcm->kcnm", K, K)
@@ -143,7 +143,9 @@ def design(
         return float(np.linalg.slogdet(spread(which, every))[1])
 
     if not 1 <= n <= S * P:
-        raise ValueError(f"--design {n}: from 1 to {S * P} of the {counted(S * P, 'candidate')} can be chosen")
+        raise ValueError(
+            f"--design {n}: from 1 to {S * P} of the {counted(S * P, 'candidate')} can be chosen"
+        )
     chosen: list[int] = []
     while len(chosen) < n:
         free = [k for k in range(S * P) if k not in chosen]

@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 
     from balancing import Influence
     from fem import Rotor
-    from rotorid.base.arrays import ComplexArray
+    from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.tables import Job
     from rotorid.workflows.coefficients import ModelPlaces
 
-NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
+NEEDS_TRIAL = (
+    "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
+)
 
 
 def calibrated(influence: Influence, rotor: Rotor, places: ModelPlaces, key_phasor: float) -> Influence:
@@ -47,7 +49,12 @@ def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunRe
     """One bare run at these places, to ask for coefficients."""
     S, C, P = influence.W.shape
     trials = Trials(
-        ("bare",), influence.speeds, influence.sensors, influence.planes, np.ones((1, S, C)), np.zeros((1, P))
+        ("bare",),
+        influence.speeds,
+        influence.sensors,
+        influence.planes,
+        np.ones((1, S, C), dtype=complex),
+        np.zeros((1, P), dtype=complex),
     )
     radii = np.array([1.0 if places.radii is None else places.radii[plane] for plane in influence.planes])
     return RunReadings(
@@ -89,7 +96,9 @@ class NextTrial:
     after: float
 
 
-def next_trial(job: Job, influence: Influence, weights: ComplexArray, planes: tuple[str, ...]) -> NextTrial | None:
+def next_trial(
+    job: Job, influence: Influence, weights: ComplexArray, planes: tuple[str, ...]
+) -> NextTrial | None:
     """Of trial runs with the correction of one plane, the one after which the correction is known best.
 
     Parameters
@@ -112,8 +121,10 @@ def next_trial(job: Job, influence: Influence, weights: ComplexArray, planes: tu
     D[[influence.planes.index(plane) for plane in planes]] = weights
     moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
 
-    def error(C: ComplexArray) -> float:
-        return float(1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1]))
+    def error(C: FloatArray) -> float:
+        return float(
+            1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1])
+        )
 
     C = np.asarray(rotor.calibration.covariance)
     bare = job.trials.mean[0]

@@ -24,6 +24,7 @@ KNOWN = (
     ("probe[*].angle", 2.0),
 )
 """Unknown besides, with these standard deviations about what the files say."""
+_COMMA = r",(?![^\[]*\])"  # but not in brackets
 _EXAMPLE = "bearing[1].kxx=7e7+-20%"
 
 
@@ -44,7 +45,7 @@ def unknowns(
         For what cannot be read, and numbers that the rotor does not have.
     """
     found: dict[str, Unknown] = {}
-    parts = re.split(r",(?![^\[]*\])", estimate) if isinstance(estimate, str) else estimate
+    parts = re.split(_COMMA, estimate) if isinstance(estimate, str) else estimate
     for part in parts:
         name, _, path = (piece.strip() for piece in part.rpartition("="))
         paths = list(_expanded(rotor, path, probes))
@@ -54,7 +55,7 @@ def unknowns(
     for pattern, std in () if exact else KNOWN:
         for path in _there(rotor, pattern, probes):
             if path.rpartition(".")[0] not in found and (path[0] != "d" or path.split(".")[0] not in named):
-                found.setdefault(path, Unknown(path, prior=(_value(rotor, path), std)))
+                found.setdefault(path, Unknown(path, prior=(_value(rotor, path), std), beside=True))
     _apply(rotor, found, prior, "--prior", probes)
     _apply(rotor, found, bounds, "--bounds", probes)
     return list(found.values())
@@ -99,7 +100,8 @@ def _apply(
 ) -> None:
     """Priors or bounds of the numbers that a name, a path or a pattern with `*` stands for."""
     if isinstance(given, str):
-        given = dict(pairs(re.split(r",(?![^\[]*\])", given), what, lambda _, text: text, _EXAMPLE)) if given else {}
+        parts = re.split(_COMMA, given) if given else []
+        given = pairs(parts, what, lambda _, text: text, _EXAMPLE)
     for pattern, text in given.items():
         literal = re.sub(r"\[(?!\*\])([^\]]*)\]", r"[[]\1]", pattern).replace("[*]", "[[]*]")
         hit = [p for p, u in found.items() if pattern in (p, u.name) or fnmatchcase(p, literal)]
