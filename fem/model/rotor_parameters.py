@@ -37,7 +37,7 @@ _FIELDS: dict[str, dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(names(KINDS), _SUPPORT),
     "disc": {name: (name,) for name in _DISC} | {"scale": _DISC},
     "material": {name: (name,) for name in _MATERIAL},
-    "probe": {"angle": ()},
+    "probe": {"angle": (), "gain": ()},
     "key_phasor": {"angle": ()},
 }
 """By kind and name: keys of `_numbers`."""
@@ -54,11 +54,12 @@ class _Parameter(NamedTuple):
 
 
 def is_reading(path: str) -> bool:
-    """Whether it is `probe[NAME].angle` or `key_phasor.angle`: of the readings, no number of a rotor.
+    """Whether it is `probe[NAME].angle`, `.gain` or `key_phasor.angle`: of readings, no number of a rotor.
 
-    In degrees with the rotation: the true angle less the one that the job says.
+    Angles in degrees with the rotation: the true one less the one that the job says. A gain is what is
+    read over what is there.
     """
-    return re.fullmatch(r"probe\[[^*]+\]\.angle|key_phasor\.angle", path) is not None
+    return re.fullmatch(r"probe\[[^*]+\]\.(angle|gain)|key_phasor\.angle", path) is not None
 
 
 def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
@@ -131,7 +132,7 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 
 
 def parameter_value(rotor: Rotor, path: str) -> float:
-    """The value of a parameter, see `with_parameters`: 1 for a scale, 0 for what is added and for angles.
+    """The value of a parameter, see `with_parameters`: 1 of a scale or gain, 0 of what is added and of angles.
 
     Raises
     ------
@@ -140,7 +141,7 @@ def parameter_value(rotor: Rotor, path: str) -> float:
     """
     parameter = _parameter(rotor, path)
     if parameter.suffix or not parameter.keys:
-        return float(parameter.suffix == "scale")
+        return float(parameter.suffix == "scale" or path.endswith(".gain"))
     found = np.unique(_values(rotor, parameter, parameter.keys, plain=True))
     if len(found) > 1:
         raise ValueError(f"{path} is several numbers, {found[0]:.6g} to {found[-1]:.6g}: {path}.scale")

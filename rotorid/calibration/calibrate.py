@@ -113,7 +113,8 @@ def calibrate(
     if not unknowns or not (readings or frequencies):
         raise ValueError("a calibration needs data and at least one unknown number")
     for path in (unknown.path for unknown in unknowns if is_reading(unknown.path)):
-        probes = [f"probe[{sensor}].angle" for data in readings for sensor in data.trials.sensors]
+        sensors = [sensor for data in readings for sensor in data.trials.sensors]
+        probes = [f"probe[{sensor}].{what}" for sensor in sensors for what in ("angle", "gain")]
         if path not in (*probes, "key_phasor.angle") or not readings:
             raise ValueError(f"no data have readings of {path}: {', '.join(probes) or 'there are no runs'}")
     equations = _Equations(rotor, unknowns, readings, frequencies)

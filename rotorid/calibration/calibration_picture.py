@@ -1,4 +1,4 @@
-"""Picture of a calibration: the numbers beside what was known of them, and what is left of the readings."""
+"""Picture of a calibration: each number beside what was known of it."""
 
 from __future__ import annotations
 
@@ -7,52 +7,39 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.calibration.calibrated_rotor import CalibratedRotor
 
-_ROW, _LEAST = 0.24, 2.5
-"""Height of a row and of the picture, in."""
+_ROW = 0.24
+"""Height of a row, in."""
 
 
 def calibration_figure(result: CalibratedRotor) -> Figure:
-    """Each number less its prior in prior deviations with its 95 % interval; residuals by row of the data."""
-    from rotorid.base.plot_style import new_figure
+    """95 % intervals before and after, in standard deviations of what was known, else of the estimate."""
+    from rotorid.base.plot_style import legend_above, new_figure, plain
 
-    figure = new_figure(height=max(_LEAST, 1.4 + _ROW * len(result.names)))
-    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-    _numbers(result, left)
-    _residuals(result, right)
-    return figure
-
-
-def _numbers(result: CalibratedRotor, ax: Axes) -> None:
-    values = result.found.estimate.solution
+    values, std = result.found.estimate.solution, np.nan_to_num(result.std)
     prior = [unknown.prior for unknown in result.unknowns]
-    middle = np.array([p[0] if p else v for p, v in zip(prior, values, strict=True)])
-    size = np.array([p[1] if p else s for p, s in zip(prior, result.std, strict=True)])
-    size = np.where(np.nan_to_num(size) > 0, size, 1.0)
-    rows = np.arange(len(values))
     known = np.array([p is not None for p in prior])
-    ax.barh(rows[known], 3.92, 0.7, -1.96, color="0.88", label="known before (95 %)")
-    spread = 1.96 * np.nan_to_num(result.std) / size
+    middle = np.array([p[0] if p else v for p, v in zip(prior, values, strict=True)])
+    size = np.array([p[1] if p else s for p, s in zip(prior, std, strict=True)])
+    size, rows = np.where(size > 0, size, 1.0), np.arange(len(values))
+    figure = new_figure(height=1.2 + _ROW * len(values))
+    ax = figure.add_subplot()
+    ax.barh(rows[known], 3.92, 0.7, -1.96, color="0.88", label="known before, 95 %")
     ax.errorbar(
-        (values - middle) / size, rows, xerr=spread, fmt="o", ms=4, capsize=2, label="calibrated (95 %)"
+        (values - middle) / size,
+        rows,
+        xerr=1.96 * std / size,
+        fmt="o",
+        ms=4,
+        capsize=2,
+        label="calibrated, 95 %",
     )
     ax.set_yticks(rows, result.names)
-    ax.invert_yaxis()
-    ax.set_xlabel("change from what was known, in its deviations")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
-
-
-def _residuals(result: CalibratedRotor, ax: Axes) -> None:
-    r = np.sort(result.found.estimate.residuals)
-    from scipy.special import ndtri
-
-    expected = ndtri((np.arange(r.size) + 0.5) / r.size)
-    reach = 1.1 * max(np.abs(r).max(), np.abs(expected).max())
-    ax.plot([-reach, reach], [-reach, reach], color="0.6", lw=0.8)
-    ax.plot(expected, r, "o", ms=3, fillstyle="none")
-    ax.set_xlabel("expected of normal errors, in deviations")
-    ax.set_ylabel("what is left, in deviations")
+    ax.set_ylim(len(values) - 0.3, -0.7)
+    ax.set_xlabel("change, in standard deviations of what was known")
+    plain(ax)
+    legend_above(ax, 2)
+    return figure

@@ -119,17 +119,22 @@ class RunReadings:
         factor[:, : at.size] = (speeds**2)[:, None]
         factor[:, : len(self.nodes)] *= self.radii
         factor *= clock * ((1j * speeds) ** self.derivative)[:, None]
-        W = found.H * factor[:, None]
+        gains = np.array([values.get(f"probe[{name}].gain", 1.0) for name in self.trials.sensors])
+        factor = factor[:, None] * gains[:, None]  # (S, C, P + q)
+        W = found.H * factor
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
         for k, path in enumerate(derivatives):
             if path in own:
-                out[k] = found.by_number[own.index(path)] * factor[:, None]
+                out[k] = found.by_number[own.index(path)] * factor
                 out[k] /= values[path] if path.endswith(".scale") else 1.0  # which is 1 in this rotor
             elif path == "key_phasor.angle":
-                out[k] = W * np.radians(1j)
+                out[k] = W * 1j * np.radians(1.0)
             elif path in names:
                 c = names.index(path)
-                out[k, :, c] = found.by_angle[:, c] * factor * np.radians(1.0)
+                out[k, :, c] = found.by_angle[:, c] * factor[:, c] * np.radians(1.0)
+            else:
+                c = self.trials.sensors.index(path.removeprefix("probe[").removesuffix("].gain"))
+                out[k, :, c] = W[:, c] / gains[c]
         return W, out
 
     def rows(self, W: ComplexArray) -> ReadingRows:

@@ -16,7 +16,7 @@ import numpy as np
 
 from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
 from balancing.data.trials import ReadingErrors, Trials
-from fem.model.rotor_parameters import is_reading, parameter_value
+from fem.model.rotor_parameters import parameter_value
 from rotorid.calibration import RunReadings
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _values(rotor: Rotor) -> Mapping[str, float]:
     assert rotor.calibration is not None
     angles = dict(rotor.calibration.readings)
     return {
-        path: angles.get(path, 0.0) if is_reading(path) else parameter_value(rotor, path)
+        path: angles[path] if path in angles else parameter_value(rotor, path)
         for path in dict.fromkeys((*rotor.calibration.names, *angles))
     }
 

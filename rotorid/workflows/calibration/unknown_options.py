@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import expand, is_reading, parameter_value
+from fem.model.rotor_parameters import expand, parameter_value
 from rotorid.calibration import Unknown
 from rotorid.workflows.option_values import band, number, pairs
 
@@ -88,7 +88,7 @@ def _expanded(rotor: Rotor, path: str, probes: Sequence[str]) -> Iterator[str]:
 
 
 def _value(rotor: Rotor, path: str) -> float:
-    return 0.0 if is_reading(path) else parameter_value(rotor, path)
+    return parameter_value(rotor, path)
 
 
 def _apply(
