@@ -5,7 +5,7 @@ import re
 from rotorid.samples import sample_data
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
-from rotorid.tables.rotor import bearing, node_forces, rotor_file
+from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
 
 PAGE = sample_data().parent / "docs" / "files.md"
 TABLES = {
@@ -26,6 +26,10 @@ TABLES = {
     "key of [[station]]": rotor_file.STATION,
     "key of [[disc]]": rotor_file.DISC,
     "key of [[bearing]]": bearing.KEYS_OF["bearing"],
+    "key of [calibration]": calibration_keys.CALIBRATION,
+    "key of [[calibration.parameter]]": calibration_keys.PARAMETER,
+    "key of [[calibration.reading]]": calibration_keys.READING,
+    "key of [[calibration.compared]]": calibration_keys.COMPARED,
     "key of a small model": small_model_file.SMALL_MODEL,
     "key of [[unbalance]]": small_model_file.UNBALANCE,
     "key of [[bow]]": small_model_file.BOW,

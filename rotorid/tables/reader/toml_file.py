@@ -165,10 +165,10 @@ class Section:
         if value is None:
             return []
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            self.complain(key, f"tables that begin with [[{key}]]")
+            self.complain(key, f"tables that begin with [[{self._prefix}{key}]]")
             return []
         return [
-            Section(self.source, item, self._problems, f"{key}[{i}].")
+            Section(self.source, item, self._problems, f"{self._prefix}{key}[{i}].")
             for i, item in enumerate(value, start=1)
         ]
 

@@ -1,4 +1,4 @@
-"""Rotor files (.toml): a shaft table with material, model, discs, bearings, seals, forces and stations."""
+"""Rotor files (.toml): a shaft table with all that is attached to it, and what a calibration found."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rotorid.tables.reader.settings_keys import Key, take
 from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
 from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, read_support
+from rotorid.tables.rotor.calibration_keys import CALIBRATION, read_calibration
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, read_force
 from rotorid.tables.rotor.rotor_plausibility import warn_of_value
 from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
@@ -81,6 +82,7 @@ ROTOR = (
         Key(kind.name, each(KEYS_OF_FORCE[kind.name], lambda section: section), kind.about, default=())
         for kind in FORCES
     ),
+    Key("calibration", table(CALIBRATION), "what a fit to readings found, with its errors"),
 )
 """Of a rotor file; sections that name nodes are read when the shaft and the stations are known."""
 
@@ -148,7 +150,10 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
         forces=tuple(filter(None, forces)),
         model=Model(**said["model"]),
     )
-    return build(str(path), whole, names, problems)
+    rotor = build(str(path), whole, names, problems)
+    if said["calibration"] is None:
+        return rotor
+    return dataclasses.replace(rotor, calibration=read_calibration(said["calibration"], rotor, problems))
 
 
 def rotor_files(path: str | Path) -> tuple[Path, ...]:

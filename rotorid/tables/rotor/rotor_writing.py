@@ -16,6 +16,7 @@ from rotorid.tables.reader.decimal_numbers import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem
 from rotorid.tables.reader.table_writing import Value, csv_bytes, write_files
 from rotorid.tables.rotor.bearing import ENTRIES, PEDESTAL, SCALARS, TILTING
+from rotorid.tables.rotor.calibration_keys import calibration_table
 from rotorid.tables.rotor.node_forces import force_tables
 from rotorid.tables.rotor.rotor_file import INERTIA, MODEL
 from rotorid.tables.rotor.rotor_table import ATTACHED, OF_ELEMENTS, Material
@@ -87,6 +88,7 @@ def _beyond_a_table(rotor: Rotor) -> list[str]:
         ),
         "seals": any(support.kind != "bearing" for support in supports),
         "forces that are not linear": bool(rotor.forces),
+        "a calibration": rotor.calibration is not None,
     }
     return [reason for reason, there in reasons.items() if there]
 
@@ -128,10 +130,13 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     document |= forces
     if rotor.stations:
         document["station"] = [{"name": name, "node": node} for name, node in rotor.stations.items()]
+    found = calibration_table(rotor.calibration) if rotor.calibration else {}
+    document |= {"calibration": found} if found else {}
     for section in (
         material,
         *document.get("disc", ()),
         *(section for kind in (*names(KINDS), *forces) for section in document.get(kind, ())),
+        *(row for key in ("parameter", "reading", "compared") for row in found.get(key, ())),
     ):
         _check_sizes(section)
     try:

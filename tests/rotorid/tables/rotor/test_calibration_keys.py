@@ -1,0 +1,137 @@
+"""`[calibration]` of a rotor file: it comes back with all digits, and what cannot be is refused."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tables_data import complaints, write_csv
+
+import fem
+from fem.model.rotor_parameters import with_parameters
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor, write_rotor
+
+HEAD = 'shaft = "shaft.csv"\n[[bearing]]\nname = "DE"\nnode = 1\nkxx = 1e7\nkyy = 2e7\n'
+PLAIN = """[[calibration.parameter]]
+name = "bearing[DE].kxx"
+value = 1e7
+std = 2e5
+correlation = [1.0, -0.5]
+[[calibration.parameter]]
+name = "material.density.scale"
+value = 1.02
+std = 0.01
+correlation = [-0.5, 1]
+"""
+
+
+@pytest.fixture
+def read(tmp_path):
+    write_csv(tmp_path / "shaft.csv", [["length_m", "diameter_m"], [0.3, 0.1]])
+
+    def from_text(text):
+        (tmp_path / "rotor.toml").write_text(HEAD + text, encoding="utf-8")
+        return read_rotor(tmp_path / "rotor.toml").calibration
+
+    return from_text
+
+
+def drawn(rng, rotor):
+    """A calibration as a fit of full correlation gives it, in units of very different size."""
+    names = ("bearing[1].kxx.scale", "bearing[2].cyy.slope", "material.youngs_modulus")
+    A = rng.normal(size=(3, 3)) * [[1e-2], [1e-3], [3e9]]
+    return fem.Calibration(
+        names,
+        rng.normal(size=3),
+        A @ A.T,
+        {"probe[DE, x].angle": rng.normal(), "key_phasor.angle": -90.0},
+        np.sort(rng.uniform(10, 1e3, 4)),
+        ("DE, x", "NDE"),
+        rng.uniform(0, 0.2, (4, 2)),
+        needs_trial_run=True,
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_it_comes_back_with_all_digits(tmp_path, seed):
+    plain = read_rotor(sample_data() / "compressor" / "rotor.toml")
+    found = drawn(np.random.default_rng(seed), plain)
+    rotor = replace(with_parameters(plain, {"bearing[1].kyy.scale": 1.1}), calibration=found)
+    write_rotor(tmp_path / "r.toml", rotor)
+    back = read_rotor(tmp_path / "r.toml")
+    assert back == rotor
+    again = back.calibration
+    assert (again.names, again.sensors, again.readings) == (found.names, found.sensors, found.readings)
+    assert again.needs_trial_run
+    for name in ("values", "speeds", "lack_of_fit"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
+    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-14)
+
+
+def test_without_errors_and_with_nothing_but_angles(tmp_path):
+    rotor = fem.Rotor([0.3], 0.1, supports=[fem.Support(1, 1e7), fem.Support(2, 1e7)])
+    for found in (
+        fem.Calibration(("bearing[1].kxx",), [1e7], [[0.0]]),
+        fem.Calibration((), [], np.zeros((0, 0)), {"key_phasor.angle": 3.0}),
+    ):
+        write_rotor(tmp_path / "r.toml", replace(rotor, calibration=found))
+        again = read_rotor(tmp_path / "r.toml").calibration
+        assert (again.names, again.readings) == (found.names, found.readings)
+        np.testing.assert_array_equal(again.covariance, found.covariance)
+        assert again.lack_of_fit.size == 0
+    with pytest.raises(ValueError, match="cannot hold a calibration"):
+        write_rotor(tmp_path / "r.csv", replace(rotor, calibration=found))
+
+
+def test_what_an_engineer_writes_is_read(read):
+    found = read(PLAIN)
+    np.testing.assert_allclose(found.covariance, [[4e10, -1e3], [-1e3, 1e-4]], rtol=1e-14)
+    assert not found.needs_trial_run
+    found = read('[[calibration.parameter]]\nname = "bearing[DE].kxx"\nvalue = 1e7\nstd = 2e5\n')
+    np.testing.assert_allclose(found.covariance, [[4e10]], rtol=1e-14)
+    assert read("") is None
+
+
+COMPARED = '[calibration]\nspeeds_rad_s = [100, 200]\n[[calibration.compared]]\nsensor = "A"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "words"),
+    [
+        (
+            PLAIN.replace("[DE]", "[DF]"),
+            "calibration.parameter[1].name",
+            r"of 1 bearing none is called 'DF': 1 or DE",
+        ),
+        (PLAIN.replace("kxx", "kxxx"), "calibration.parameter[1].name", "did you mean 'kxx'"),
+        (PLAIN.replace("[DE]", "[*]"), "calibration.parameter[1].name", r"single parameter, without \[\*\]"),
+        (
+            PLAIN.replace("[1.0, -0.5]", "[1.0]"),
+            "calibration.parameter[1].correlation",
+            "2 numbers, one for each",
+        ),
+        (PLAIN.replace("std = 2e5", "std = -2e5"), "calibration.parameter[1].std", "0 or more"),
+        (PLAIN.replace("std = 2e5", ""), "calibration.parameter[1].std", "its std"),
+        (PLAIN.replace("-0.5", "-2"), "calibration", "must not be negative in any direction"),
+        (PLAIN.replace("[-0.5, 1]", "[0.5, 1]"), "calibration", "must be symmetric"),
+        (PLAIN.replace("material.density.scale", "bearing[DE].kxx"), "calibration", "names comes twice"),
+        (PLAIN + "[calibration]\nstds = 3", "calibration.stds", "a known key"),
+        (
+            '[[calibration.reading]]\nname = "A"\nangle_deg = 1',
+            "calibration.reading[1].name",
+            "key_phasor.angle",
+        ),
+        (
+            COMPARED + "lack_of_fit = [0.1]",
+            "calibration.compared[1].lack_of_fit",
+            "2 numbers, one for each of",
+        ),
+        (COMPARED + "lack_of_fit = [0.1, -0.1]", "calibration", "not negative"),
+    ],
+)
+def test_what_is_no_calibration_of_this_rotor_is_refused_with_file_and_key(read, text, key, words):
+    (problem,) = complaints(read, text)
+    assert problem.file.endswith("rotor.toml")
+    assert problem.column == key
+    assert re.search(words, problem.expected), problem.expected
