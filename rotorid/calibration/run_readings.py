@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from balancing.coefficients.run_error_estimate import given
-from balancing.coefficients.run_errors import RunErrors, assumed, run_columns, runs_of
+from balancing.coefficients.run_errors import RunErrors, Runs, assumed, run_columns, runs_of
 from balancing.data.reading_errors import error_model, mean_covariance
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from fem.matrices.banded_matrices import assemble, multiply
+from fem.matrices.undamped_matrices import one_plane
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import is_reading, parameter_value, typical_size, with_parameters
 from fem.model.sensors import Sensor
@@ -52,7 +53,7 @@ class RunReadings:
     key_phasor
         Direction of the key phasor, degrees from x with the rotation.
     unbalance, bow
-        Nodes of the bare rotor's unknown unbalances and number of its bow's shapes, the lowest modes at rest;
+        Nodes of the bare rotor's unknown unbalances, and number of its bow's shapes, modes of the free shaft;
         none: the bare rotor's readings are free.
     """
 
@@ -99,7 +100,8 @@ class RunReadings:
         at = np.array([A.deflection(node) for node in (*self.nodes, *self.unbalance)], dtype=np.intp)
         loads = [unit_loads(A, at)]
         if self.bow:
-            shapes = lowest_modes(rotor, A, self.bow).vectors
+            free = one_plane(rotor, A, 0, {})
+            shapes = lowest_modes(rotor, A, self.bow + 2, free).vectors[:, 2:]  # without rigid motions
             loads.append(multiply(A.shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0)))
 
         def change(path: str) -> MatrixChange:
@@ -145,7 +147,7 @@ class RunReadings:
         model = error_model(trials)
         reading = mean_covariance(trials, model.errors)
         runs = runs_of(Y, trials.weights, W[..., :P])
-        run = _run_errors(trials, runs, stated=model.source == "stated")
+        run = run_errors(trials, runs)
         columns = run_columns(run, runs)
         take = np.eye(R) if self.modelled else np.column_stack((-np.ones(R - 1), np.eye(R - 1)))
         n, least = len(take) * C, (NO_ERROR * np.abs(Y).max()) ** 2
@@ -157,11 +159,11 @@ class RunReadings:
         return ReadingRows(self, take, white, np.einsum("sii->si", own), model.source != "assumed")
 
 
-def _run_errors(trials: Trials, runs: object, *, stated: bool) -> RunErrors:
-    """As stated; none beside stated errors of a reading; else assumed."""
+def run_errors(trials: Trials, runs: Runs) -> RunErrors:
+    """Errors between these runs: as stated; none beside stated errors of a reading; else assumed."""
     if trials.run_errors is not None:
-        return given([], runs, *trials.run_errors, "stated")  # type: ignore[arg-type]
-    return RunErrors() if stated else assumed(runs)  # type: ignore[arg-type]
+        return given([], runs, *trials.run_errors, "stated")
+    return RunErrors() if error_model(trials).source == "stated" else assumed(runs)
 
 
 @dataclass(frozen=True, eq=False)

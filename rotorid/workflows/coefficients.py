@@ -163,7 +163,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
         key_phasor=job.key_phasor,
         labels=labels,
     )
-    return found if job.rotor.calibration is None else calibrated(found, job.rotor, places, job.key_phasor)
+    return found if job.rotor.calibration is None else calibrated(found, job, places)
 
 
 def _quantity(unit: str) -> Quantity:

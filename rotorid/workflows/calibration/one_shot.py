@@ -10,19 +10,22 @@ it will read.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
+from balancing.coefficients.run_errors import runs_of
 from balancing.data.trials import ReadingErrors, Trials
 from fem.model.rotor_parameters import parameter_value
 from rotorid.calibration import RunReadings
+from rotorid.calibration.run_readings import run_errors
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from balancing import Influence
+    from balancing.data.conventions import Labels
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.tables import Job
@@ -33,15 +36,26 @@ NEEDS_TRIAL = (
 )
 
 
-def calibrated(influence: Influence, rotor: Rotor, places: ModelPlaces, key_phasor: float) -> Influence:
-    """Computed coefficients as those of a calibrated rotor: at the angles it found, with its errors."""
-    calibration = rotor.calibration
+def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
+    """Computed coefficients as those of a job's calibrated rotor: at the angles it found, with its errors.
+
+    What changes between runs is as the job states it, else assumed.
+    """
+    assert job.rotor is not None
+    calibration = job.rotor.calibration
     assert calibration is not None
-    W, dW = _derivatives(_runs(influence, places, key_phasor), rotor)
+    W, dW = _derivatives(_runs(influence, places, job.key_phasor), job.rotor)
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = calibration.lack_at(influence.speeds, influence.sensors)
-    found = with_parameters(replace(influence, W=W), columns, lack)
+    known = [
+        job.trials.planes.index(plane) if plane in job.trials.planes else None for plane in influence.planes
+    ]
+    mounted = np.column_stack(
+        [np.zeros(len(job.trials.runs)) if k is None else job.trials.weights[:, k] for k in known]
+    )
+    between = run_errors(job.trials, runs_of(job.trials.mean, mounted, W))
+    found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
     return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
 
 
@@ -94,6 +108,27 @@ class NextTrial:
     weight: complex
     before: float
     after: float
+    labels: Labels
+
+    @property
+    def words(self) -> str:
+        """A clause."""
+        before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
+        return (
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow what the "
+            f"model leaves open most: expected ± from {before} to {after}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units."""
+        scale = self.labels.vibration_scale
+        weight = self.labels.weight_entry(self.weight)
+        return {
+            "plane": self.plane,
+            **weight,
+            "error_now": self.before * scale,
+            "error_after": self.after * scale,
+        }
 
 
 def next_trial(
@@ -113,7 +148,9 @@ def next_trial(
     from rotorid.workflows.coefficients import model_places
 
     rotor = job.rotor
-    if rotor is None or rotor.calibration is None or not rotor.calibration.names or not weights.any():
+    if rotor is None or rotor.calibration is None or influence.parameters is None or not weights.any():
+        return None
+    if job.trials.weights.any():
         return None
     runs = _runs(influence, model_places(job), job.key_phasor)
     W, dW = _derivatives(runs, rotor)
@@ -146,5 +183,7 @@ def next_trial(
         K = rows.jacobian(W, dW)
         CK = C @ K.T
         after = C - CK @ np.linalg.solve(np.eye(len(K)) + K @ CK, CK.T)
-        found.append(NextTrial(influence.planes[p], complex(one[p]), error(C), error(after)))
+        found.append(
+            NextTrial(influence.planes[p], complex(one[p]), error(C), error(after), job.trials.labels)
+        )
     return min(found, key=lambda trial: trial.after)
