@@ -132,7 +132,7 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 
 
 def parameter_value(rotor: Rotor, path: str) -> float:
-    """The value of a parameter, see `with_parameters`: 1 of a scale or gain, 0 of what is added and of angles.
+    """The value of a parameter, see `with_parameters`: 1 of a scale or gain, 0 of what is added or an angle.
 
     Raises
     ------

@@ -48,13 +48,10 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = calibration.lack_at(influence.speeds, influence.sensors)
-    known = [
-        job.trials.planes.index(plane) if plane in job.trials.planes else None for plane in influence.planes
-    ]
-    mounted = np.column_stack(
-        [np.zeros(len(job.trials.runs)) if k is None else job.trials.weights[:, k] for k in known]
-    )
-    between = run_errors(job.trials, runs_of(job.trials.mean, mounted, W))
+    runs, nothing = job.trials, np.zeros(len(job.trials.runs))
+    by_plane = dict(zip(runs.planes, runs.weights.T, strict=True))
+    mounted = np.column_stack([by_plane.get(plane, nothing) for plane in influence.planes])
+    between = run_errors(runs, runs_of(runs.mean, mounted, W))
     found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
     return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
 
@@ -115,8 +112,8 @@ class NextTrial:
         """A clause."""
         before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
         return (
-            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow what the "
-            f"model leaves open most: expected ± from {before} to {after}"
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow what "
+            f"the model leaves open most: expected ± from {before} to {after}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -148,9 +145,9 @@ def next_trial(
     from rotorid.workflows.coefficients import model_places
 
     rotor = job.rotor
-    if rotor is None or rotor.calibration is None or influence.parameters is None or not weights.any():
+    if rotor is None or rotor.calibration is None or influence.parameters is None:
         return None
-    if job.trials.weights.any():
+    if job.trials.weights.any() or not weights.any():
         return None
     runs = _runs(influence, model_places(job), job.key_phasor)
     W, dW = _derivatives(runs, rotor)
@@ -159,9 +156,8 @@ def next_trial(
     moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
 
     def error(C: FloatArray) -> float:
-        return float(
-            1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1])
-        )
+        square = np.einsum("ni,nm,mi->", moved, C, moved.conj()).real
+        return float(1.96 * np.sqrt(square / (2 * moved.shape[1])))
 
     C = np.asarray(rotor.calibration.covariance)
     bare = job.trials.mean[0]
