@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
+from fem.parameter_bands import NORMAL_95
 from fem.windows import ranges
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
@@ -26,6 +27,7 @@ from rotorid.base.plot_style import (
     plain,
     rad_s_above,
     scale_beside,
+    shade_band,
     shade_operating,
     shade_unstable,
 )
@@ -71,6 +73,11 @@ def draw_campbell(
     ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     top = _highest(campbell)
     _curves(ax, campbell, campbell.frequencies * RPM)
+    if campbell.std is not None:
+        curves, half = campbell.frequencies * RPM, NORMAL_95 * RPM * campbell.std
+        for k in _shown(campbell):
+            shade_band(ax, campbell.speeds * RPM, curves[:, k], half[:, k], COLORS[k % len(COLORS)])
+        note(ax, "shaded: 95 % (calibration)", (0.99, 0.03), xycoords="axes fraction", ha="right")
     end = min(float(campbell.speeds.max()) * RPM, top)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(xlim=_range(campbell), ylim=(0, top))

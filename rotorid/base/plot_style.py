@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -136,6 +137,11 @@ def shade_unstable(
     for k, (first, last) in enumerate(ranges):
         band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
         band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
+
+
+def shade_band(ax: Axes, x: FloatArray, middle: FloatArray, half: FloatArray, color: str) -> None:
+    """Shade the error band of a curve, whose half width is given; not below 0."""
+    ax.fill_between(x, (middle - half).clip(min=0.0), middle + half, color=color, alpha=0.2, linewidth=0)
 
 
 def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
