@@ -48,7 +48,7 @@ def spread(rotor: Rotor, evaluate: Callable[[Rotor], AnyArray]) -> FloatArray:
             for way in (1.0, -1.0)
         )
         if up.shape != middle.shape or down.shape != middle.shape:
-            raise ValueError("their number changes with the parameters")
+            raise ValueError("their number changes")
         square += np.abs(up - down) ** 2 / 12 + np.abs(up + down - 2 * middle) ** 2 / 18
     return np.sqrt(square)
 
@@ -62,7 +62,7 @@ def band(
     try:
         std = spread(rotor, evaluate)
     except ValueError as error:
-        return None, (f"no error bands of {what}: {error}",)
+        return None, (f"no error bands of {what}: within the errors of the calibration, {error}",)
     said = []
     if rotor.calibration.needs_trial_run:
         said.append("the readings of the calibration contradict the model: its errors exceed the bands")

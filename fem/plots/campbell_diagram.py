@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import cycle, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from rotorid.base.plot_style import (
     plain,
     rad_s_above,
     scale_beside,
-    shade_band,
+    shade_bands,
     shade_operating,
     shade_unstable,
 )
@@ -73,11 +73,6 @@ def draw_campbell(
     ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     top = _highest(campbell)
     _curves(ax, campbell, campbell.frequencies * RPM)
-    if campbell.std is not None:
-        curves, half = campbell.frequencies * RPM, NORMAL_95 * RPM * campbell.std
-        for k in _shown(campbell):
-            shade_band(ax, campbell.speeds * RPM, curves[:, k], half[:, k], COLORS[k % len(COLORS)])
-        note(ax, "shaded: 95 % (calibration)", (0.99, 0.03), xycoords="axes fraction", ha="right")
     end = min(float(campbell.speeds.max()) * RPM, top)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(xlim=_range(campbell), ylim=(0, top))
@@ -92,6 +87,9 @@ def draw_campbell(
     shade_unstable(ax, ranges(campbell.windows), "unstable")
     plain(ax)
     ax.set(xlabel="speed, rpm", ylabel="whirl frequency, rpm")
+    if campbell.std is not None:
+        half = NORMAL_95 * RPM * campbell.std
+        shade_bands(ax, campbell.speeds * RPM, campbell.frequencies * RPM, half, cycle(COLORS))
     rad_s_above(ax)
     scale_beside(ax, 60.0, "whirl frequency, Hz")
     _legend(ax, campbell, bool(seen))

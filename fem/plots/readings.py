@@ -14,7 +14,7 @@ from fem.plots.bode import draw_bode, draw_polar
 from fem.plots.drawing import draw_rotor
 from fem.plots.orbit_paths import MOST_ORBITS, draw_orbits
 from rotorid.base.arrays import FloatArray
-from rotorid.base.plot_style import BOX, COLORS, MARKERS, QUIET, look, new_figure, note, on_figure, shade_band
+from rotorid.base.plot_style import COLORS, MARKERS, QUIET, look, new_figure, on_figure, shade_bands
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -54,10 +54,9 @@ def bode_figure(
     if std is not None:
         middle = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan)
         half = NORMAL_95 * 1e6 * std
-        for k in range(len(sensors)):
-            shade_band(above, response.speeds * RPM, middle[:, k], half[:, k], look(k)["color"])
+        colors = (look(k)["color"] for k in range(len(sensors)))
+        shade_bands(above, response.speeds * RPM, middle, half, colors)
         above.set_ylim(top=max(above.get_ylim()[1], 1.05 * np.nanmax(middle + half, initial=0.0)))
-        note(above, "shaded: 95 % (calibration)", (0.01, 0.03), xycoords="axes fraction", bbox=BOX)
     return figure
 
 

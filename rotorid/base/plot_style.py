@@ -139,9 +139,11 @@ def shade_unstable(
         band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
 
 
-def shade_band(ax: Axes, x: FloatArray, middle: FloatArray, half: FloatArray, color: str) -> None:
-    """Shade the error band of a curve, whose half width is given; not below 0."""
-    ax.fill_between(x, (middle - half).clip(min=0.0), middle + half, color=color, alpha=0.2, linewidth=0)
+def shade_bands(ax: Axes, x: FloatArray, middle: FloatArray, half: FloatArray, colors: Iterable[str]) -> None:
+    """Shade 95 % of curves, shape (S, n), of which the half widths are given; not below 0."""
+    for low, high, color in zip((middle - half).clip(min=0.0).T, (middle + half).T, colors, strict=False):
+        ax.fill_between(x, low, high, color=color, alpha=0.2, linewidth=0)
+    ax.set_ylabel(f"{ax.get_ylabel()}\nshaded: 95 % (calibration)")
 
 
 def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:

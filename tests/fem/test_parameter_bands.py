@@ -85,11 +85,13 @@ def test_where_no_band_can_be_given_words_say_why():
     wild = fem.Calibration(("bearing[1].kxx",), [4e7], [[2.5e15]])
     std, said = band(replace(ROTOR, calibration=wild), "the critical speeds", criticals)
     assert std is None
-    assert said[0].startswith(
-        "no error bands of the critical speeds: support at node 1: stiffness xx must be"
+    begins = (
+        "no error bands of the critical speeds: within the errors of the calibration, support at node 1: "
     )
+    assert said[0].startswith(begins)
     std, said = band(ROTOR, "them", lambda rotor: np.zeros(2 + (rotor.discs[0].mass > 60.0)))
-    assert (std, said) == (None, ("no error bands of them: their number changes with the parameters",))
+    assert std is None
+    assert said == ("no error bands of them: within the errors of the calibration, their number changes",)
     contradicted = replace(ROTOR.calibration, needs_trial_run=True)
     std, said = band(replace(ROTOR, calibration=contradicted), "the critical speeds", criticals)
     np.testing.assert_array_equal(std, spread(ROTOR, criticals))
