@@ -31,9 +31,8 @@ if TYPE_CHECKING:
     from rotorid.tables import Job
     from rotorid.workflows.coefficients import ModelPlaces
 
-NEEDS_TRIAL = (
-    "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
-)
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
+"""Why its coefficients alone are not enough."""
 
 
 def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
@@ -53,7 +52,15 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     mounted = np.column_stack([by_plane.get(plane, nothing) for plane in influence.planes])
     between = run_errors(runs, runs_of(runs.mean, mounted, W))
     found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
-    return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
+    said = f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(found, warnings=(*found.warnings, said)) if calibration.needs_trial_run else found
+
+
+def needs_trial_run(job: Job, influence: Influence) -> bool:
+    """Whether these coefficients are those of a model alone that contradicts its own data."""
+    known = None if job.rotor is None else job.rotor.calibration
+    alone = influence.parameters is not None and not job.trials.weights.any()
+    return known is not None and known.needs_trial_run and alone
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
@@ -112,8 +119,8 @@ class NextTrial:
         """A clause."""
         before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
         return (
-            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow what "
-            f"the model leaves open most: expected ± from {before} to {after}"
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow "
+            f"what the model leaves open most: expected ± from {before} to {after}"
         )
 
     def to_dict(self) -> dict[str, Any]:
