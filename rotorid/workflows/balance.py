@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
 from rotorid.base.answer import Answer, together
-from rotorid.workflows.calibration.one_shot import NEEDS_TRIAL, needs_trial_run
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.input_checks import check_choices, file_of
 from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
@@ -198,6 +197,8 @@ class Balance(Parts):
     @property
     def answer(self) -> Answer:
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+        from rotorid.workflows.calibration.one_shot import NEEDS_TRIAL, needs_trial_run
+
         weights, sound = self.result.answer, self.result.sound
         if needs_trial_run(self.job, self.influence):
             weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False

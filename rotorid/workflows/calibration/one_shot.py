@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.tables import Job
-    from rotorid.workflows.coefficients import ModelPlaces
+    from rotorid.workflows.calibration.model_places import ModelPlaces
 
 NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
 """Why its coefficients alone are not enough."""
@@ -149,7 +149,7 @@ def next_trial(
     weights, planes
         The correction.
     """
-    from rotorid.workflows.coefficients import model_places
+    from rotorid.workflows.calibration.model_places import model_places
 
     rotor = job.rotor
     if rotor is None or rotor.calibration is None or influence.parameters is None:
