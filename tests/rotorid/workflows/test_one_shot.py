@@ -1,4 +1,4 @@
-"""Balancing with a calibrated rotor: what it leaves on the true machine, its errors, and the next trial run."""
+"""Balancing with a calibrated rotor: what it leaves on the true machine, its errors, the next trial run."""
 
 import importlib.util
 import shutil
