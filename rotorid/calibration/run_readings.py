@@ -108,9 +108,8 @@ class RunReadings:
             def other(value: float) -> Rotor:
                 return with_parameters(rotor, {path: value})
 
-            return matrix_change(
-                other, parameter_value(rotor, path), STEP * typical_size(rotor, path), speeds
-            )
+            step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
+            return matrix_change(other, parameter_value(rotor, path), step, speeds)
 
         own = [path for path in derivatives if not is_reading(path)]
         found = receptance_with_derivatives(
