@@ -106,6 +106,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         For a rotor or an option that cannot be.
     """
     import fem
+    from fem.critical import critical_speeds_near
     from fem.parameter_bands import band as error_band
 
     options = options or CriticalOptions()
@@ -118,8 +119,8 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         chart, left_out = _map(model, n) if options.speed_map else (None, [])
 
     def speeds(other: Rotor) -> FloatArray:
-        found = modes if other is model else fem.critical_speeds(other, options.number)
-        return found.frequencies
+        found = modes.frequencies
+        return found if other is model else critical_speeds_near(other, found)
 
     std, said = error_band(model, "the critical speeds", speeds)
     log_rotor(model)

@@ -20,6 +20,7 @@ from balancing.data.trials import ReadingErrors, Trials
 from fem.model.rotor_parameters import parameter_value
 from rotorid.calibration import RunReadings
 from rotorid.calibration.run_readings import run_errors
+from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,11 +30,10 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.tables import Job
-    from rotorid.workflows.coefficients import ModelPlaces
+    from rotorid.workflows.calibration.model_places import ModelPlaces
 
-NEEDS_TRIAL = (
-    "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
-)
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
+"""Why its coefficients alone are not enough."""
 
 
 def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
@@ -53,7 +53,22 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     mounted = np.column_stack([by_plane.get(plane, nothing) for plane in influence.planes])
     between = run_errors(runs, runs_of(runs.mean, mounted, W))
     found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
-    return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
+    said = f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(found, warnings=(*found.warnings, said)) if calibration.needs_trial_run else found
+
+
+def counted_before(job: Job) -> bool:
+    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
+    known = None if job.rotor is None else job.rotor.calibration
+    own = job.files[:2]  # the job, then its runs
+    return known is not None and any(hash_of(file) in known.data.values() for file in own)
+
+
+def needs_trial_run(job: Job, influence: Influence) -> bool:
+    """Whether these coefficients are those of a model alone that contradicts its own data."""
+    known = None if job.rotor is None else job.rotor.calibration
+    alone = influence.parameters is not None and not job.trials.weights.any()
+    return known is not None and known.needs_trial_run and alone
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
@@ -112,8 +127,8 @@ class NextTrial:
         """A clause."""
         before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
         return (
-            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow what "
-            f"the model leaves open most: expected ± from {before} to {after}"
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow "
+            f"what the model leaves open most: expected ± from {before} to {after}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -142,7 +157,7 @@ def next_trial(
     weights, planes
         The correction.
     """
-    from rotorid.workflows.coefficients import model_places
+    from rotorid.workflows.calibration.model_places import model_places
 
     rotor = job.rotor
     if rotor is None or rotor.calibration is None or influence.parameters is None:
