@@ -111,7 +111,7 @@ class RunReadings:
             loads.append(multiply(A.shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0)))
 
         def change(path: str) -> MatrixChange:
-            step = STEP * typical_size(rotor, path)
+            step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
             return matrix_change(lambda by: with_changes(rotor, {path: by}), 0.0, step, speeds)
 
         own = [path for path in derivatives if not is_reading(path)]
