@@ -40,7 +40,8 @@ class Start(NamedTuple):
 
     Y₀ (S, C), the covariance of (Y₀, W) per channel or None, errors of a reading, words for the user, how to
     print, what is mounted: run, planes, weights (None: nothing), what of the errors the channels have in
-    common (as `Influence.common`), and whether Y₀ is of new runs, which have not yet told of the errors.
+    common (as `Influence.common`), whether Y₀ is of new runs, which have not yet told of the errors, and what
+    errors of a model's parameters do (as `Influence.parameters`).
     """
 
     readings: ComplexArray
@@ -51,13 +52,14 @@ class Start(NamedTuple):
     mounted: tuple[str, tuple[str, ...], ComplexArray] | None
     common: ComplexArray | None = None
     fresh: bool = False
+    parameters: ComplexArray | None = None
 
     @property
     def own(self) -> FloatArray | None:
         """The covariance without what the channels have in common."""
-        if self.covariance is None or self.common is None:
-            return self.covariance
-        return symmetric(self.covariance - marginal(self.common))
+        if self.covariance is None:
+            return None
+        return symmetric(self.covariance - marginal(self.common, self.parameters))
 
 
 def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients") -> list[int]:
@@ -115,8 +117,16 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
 def _as_measured(influence: Influence, readings: ComplexArray) -> Start:
     """The vibration that the coefficients were measured with: their errors belong together."""
     known = ErrorModel(influence.errors, influence.reading_dof, influence.error_source)
-    mounted = _last_run(influence)
-    return Start(readings, influence.covariance, known, (), influence.labels, mounted, influence.common)
+    return Start(
+        readings,
+        influence.covariance,
+        known,
+        (),
+        influence.labels,
+        _last_run(influence),
+        influence.common,
+        parameters=influence.parameters,
+    )
 
 
 def _same(influence: Influence, readings: ComplexArray) -> bool:
@@ -259,11 +269,18 @@ def _with_coefficients(
     common = np.zeros((2, further.shape[1], S, C, P + 1), dtype=complex)
     common[..., 0] = further
     covariance += marginal(common)
-    if influence.common is not None:
-        before = influence.common.copy()
-        before[..., 0] = -before[..., 1:] @ mounted.mean(axis=0)
+    before, parameters = (_of_bare(c, mounted) for c in (influence.common, influence.parameters))
+    if before is not None:
         common = np.concatenate((before, common), axis=1)
-    return Start(readings, symmetric(covariance), model, warnings, influence.labels, None, common, fresh=True)
+    covariance = symmetric(covariance)
+    return Start(readings, covariance, model, warnings, influence.labels, None, common, True, parameters)
+
+
+def _of_bare(columns: ComplexArray | None, mounted: ComplexArray) -> ComplexArray | None:
+    """Columns (…, P + 1) of coefficients where Y₀ is a reading less what was mounted (R, P) does."""
+    if columns is None:
+        return None
+    return np.concatenate((-columns[..., 1:] @ mounted.mean(axis=0)[:, None], columns[..., 1:]), axis=-1)
 
 
 def _joined(model: ErrorModel, known: ErrorModel) -> ErrorModel:

@@ -132,7 +132,7 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 
 
 def parameter_value(rotor: Rotor, path: str) -> float:
-    """The value of a parameter, see `with_parameters`: 1 of a scale or gain, 0 of what is added and of angles.
+    """The value of a parameter, see `with_parameters`: 1 of a scale or gain, 0 of what is added or an angle.
 
     Raises
     ------
@@ -221,10 +221,12 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
             raise ValueError(f"{path}: write {'probe[NAME]' if kind == 'probe' else kind}.{rest}")
         return _Parameter(path, kind, (0,) if keys else (), keys, suffix)
     items = _selected(rotor, path, kind, selection)
-    there = tuple(i for i in items if keys[0] in _numbers(rotor, kind, i))
-    if not there or (selection is not None and there != items):
-        raise ValueError(f"{path}: the {kind} stands on no pedestal")
-    return _Parameter(path, kind, there, keys, suffix)
+    if keys[0].startswith("pedestal_"):
+        there = tuple(i for i in items if rotor.supports[i].pedestal)
+        if not there or (selection is not None and there != items):
+            raise ValueError(f"{path}: the {kind} stands on no pedestal")
+        items = there
+    return _Parameter(path, kind, items, keys, suffix)
 
 
 def _of_kind(rotor: Rotor, kind: str) -> list[int]:

@@ -197,7 +197,11 @@ class Balance(Parts):
     @property
     def answer(self) -> Answer:
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+        from rotorid.workflows.calibration.one_shot import NEEDS_TRIAL, needs_trial_run
+
         weights, sound = self.result.answer, self.result.sound
+        if needs_trial_run(self.job, self.influence):
+            weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
         if sound and (self.check or self.mounted):
             weights = replace(weights, judgement="")
         if self.mounted:

@@ -49,9 +49,7 @@ def main() -> None:
     random = np.random.default_rng(7)
     rotor = with_parameters(read_rotor(HERE.parent / "compressor" / "rotor.toml"), MACHINE)
     places = [fem.Sensor(node, angle + TURNED[name]) for name, (node, angle) in SENSORS.items()]
-    W, trial = (
-        fem.influence(rotor, planes, places, SPEEDS * np.pi / 30).W for planes in (IMPELLERS, PLANES)
-    )
+    W, trial = (fem.influence(rotor, planes, places, SPEEDS * np.pi / 30).W for planes in (IMPELLERS, PLANES))
     weights = np.array([1e-6 * m * np.exp(1j * np.radians(a)) for m, a in TRIAL.values()])
 
     def noise(shape: tuple[int, ...]) -> np.ndarray:

@@ -29,11 +29,10 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.tables import Job
-    from rotorid.workflows.coefficients import ModelPlaces
+    from rotorid.workflows.calibration.model_places import ModelPlaces
 
-NEEDS_TRIAL = (
-    "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
-)
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
+"""Why its coefficients alone are not enough."""
 
 
 def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
@@ -48,15 +47,20 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = calibration.lack_at(influence.speeds, influence.sensors)
-    known = [
-        job.trials.planes.index(plane) if plane in job.trials.planes else None for plane in influence.planes
-    ]
-    mounted = np.column_stack(
-        [np.zeros(len(job.trials.runs)) if k is None else job.trials.weights[:, k] for k in known]
-    )
-    between = run_errors(job.trials, runs_of(job.trials.mean, mounted, W))
+    runs, nothing = job.trials, np.zeros(len(job.trials.runs))
+    by_plane = dict(zip(runs.planes, runs.weights.T, strict=True))
+    mounted = np.column_stack([by_plane.get(plane, nothing) for plane in influence.planes])
+    between = run_errors(runs, runs_of(runs.mean, mounted, W))
     found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
-    return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
+    said = f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(found, warnings=(*found.warnings, said)) if calibration.needs_trial_run else found
+
+
+def needs_trial_run(job: Job, influence: Influence) -> bool:
+    """Whether these coefficients are those of a model alone that contradicts its own data."""
+    known = None if job.rotor is None else job.rotor.calibration
+    alone = influence.parameters is not None and not job.trials.weights.any()
+    return known is not None and known.needs_trial_run and alone
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
@@ -115,8 +119,8 @@ class NextTrial:
         """A clause."""
         before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
         return (
-            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow what the "
-            f"model leaves open most: expected ± from {before} to {after}"
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow "
+            f"what the model leaves open most: expected ± from {before} to {after}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -145,12 +149,12 @@ def next_trial(
     weights, planes
         The correction.
     """
-    from rotorid.workflows.coefficients import model_places
+    from rotorid.workflows.calibration.model_places import model_places
 
     rotor = job.rotor
-    if rotor is None or rotor.calibration is None or influence.parameters is None or not weights.any():
+    if rotor is None or rotor.calibration is None or influence.parameters is None:
         return None
-    if job.trials.weights.any():
+    if job.trials.weights.any() or not weights.any():
         return None
     runs = _runs(influence, model_places(job), job.key_phasor)
     W, dW = _derivatives(runs, rotor)
@@ -159,9 +163,8 @@ def next_trial(
     moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
 
     def error(C: FloatArray) -> float:
-        return float(
-            1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1])
-        )
+        square = np.einsum("ni,nm,mi->", moved, C, moved.conj()).real
+        return float(1.96 * np.sqrt(square / (2 * moved.shape[1])))
 
     C = np.asarray(rotor.calibration.covariance)
     bare = job.trials.mean[0]
