@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.model.calibration import Calibration
+from fem.model.calibration import Calibration, is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import is_reading, with_parameters
+from fem.model.rotor_parameters import with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.calibration.calibrated_rotor import CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
@@ -196,7 +196,6 @@ def _judged(
         names=tuple(equations.paths),
         values=theta,
         covariance=_as_it_stands(equations.paths, theta, covariance),
-        readings={path: value for path, value in values.items() if is_reading(path)},
         speeds=np.array(speeds),
         sensors=tuple(sensors),
         lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),

@@ -231,6 +231,7 @@ class CalibratedRotor(Answered):
                 "identifiable": estimate.full_rank,
                 "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
                 "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+                "correlation": self._part(self._every)[1].correlation,
                 "seen": self.seen or None,
                 "residual_rms": np.sqrt(np.mean(r**2)),
                 "chi_square": self.chi_square,

@@ -21,8 +21,9 @@ from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from fem.matrices.banded_matrices import assemble, multiply
 from fem.matrices.undamped_matrices import one_plane
+from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import is_reading, parameter_value, typical_size, with_parameters
+from fem.model.rotor_parameters import parameter_value, typical_size, with_parameters
 from fem.model.sensors import Sensor
 from fem.solvers.eigen import lowest_modes
 from fem.solvers.receptance import unit_loads

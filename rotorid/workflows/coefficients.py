@@ -40,12 +40,13 @@ def choose(
     """
     from balancing import estimate_influence
     from balancing.coefficients.combined_coefficients import combine
+    from rotorid.workflows.calibration.one_shot import counted_before
 
     has_trials = bool(job.trials.weights.any())
     if kind is None:
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
-            kind = "combined"
+            kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
     if kind == "measured" and model_error is not None:
         raise ValueError(
             "--model-error is for computed coefficients: add --coefficients computed or combined"
@@ -62,6 +63,17 @@ def choose(
             error = 0.0  # it states its own
         measured = combine(measured, computed(job, error))
     return measured, baseline
+
+
+def _separate(trials: Trials) -> bool:
+    """Whether the runs tell baseline and planes apart, so that there are measured coefficients to combine."""
+    from balancing.coefficients.identifiability import UndeterminedError, check_runs
+
+    try:
+        check_runs(trials.runs, trials.planes, trials.weights)
+    except UndeterminedError:
+        return False
+    return True
 
 
 def used_planes(job: Job, influence: Influence) -> list[str]:

@@ -158,6 +158,11 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
         raise ValueError("--speeds are candidates for --design: the data have their own")
     with phase("calibration"):
         found = calibration.calibrate(model, numbers, readings, frequencies, starts=options.starts)
+    of_rotor = {one["sha256"] for one in told["inputs"][: len(files)]}  # which jobs name, too
+    made_from = [one for one in told["inputs"] if one["sha256"] not in of_rotor]
+    hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
+    known = replace(found.rotor.calibration, data=hashes)  # type: ignore[type-var]
+    found = replace(found, rotor=replace(found.rotor, calibration=known))
     return Calibrated(found=found, assumed=tuple(assumed), provenance=told)
 
 

@@ -20,6 +20,7 @@ from balancing.data.trials import ReadingErrors, Trials
 from fem.model.rotor_parameters import parameter_value
 from rotorid.calibration import RunReadings
 from rotorid.calibration.run_readings import run_errors
+from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -54,6 +55,13 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
     said = f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
     return replace(found, warnings=(*found.warnings, said)) if calibration.needs_trial_run else found
+
+
+def counted_before(job: Job) -> bool:
+    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
+    known = None if job.rotor is None else job.rotor.calibration
+    own = job.files[:2]  # the job, then its runs
+    return known is not None and any(hash_of(file) in known.data.values() for file in own)
 
 
 def needs_trial_run(job: Job, influence: Influence) -> bool:
