@@ -117,16 +117,9 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
 def _as_measured(influence: Influence, readings: ComplexArray) -> Start:
     """The vibration that the coefficients were measured with: their errors belong together."""
     known = ErrorModel(influence.errors, influence.reading_dof, influence.error_source)
-    return Start(
-        readings,
-        influence.covariance,
-        known,
-        (),
-        influence.labels,
-        _last_run(influence),
-        influence.common,
-        parameters=influence.parameters,
-    )
+    mounted = _last_run(influence)
+    start = Start(readings, influence.covariance, known, (), influence.labels, mounted, influence.common)
+    return start._replace(parameters=influence.parameters)
 
 
 def _same(influence: Influence, readings: ComplexArray) -> bool:
@@ -250,6 +243,8 @@ def _with_coefficients(
     """Covariance of (Y₀, W) per channel where Y₀ is the mean of runs (R, S, C) less what was mounted does."""
     S, C, P = influence.W.shape
     covariance = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
+    change = np.eye(P + 1, dtype=complex)
+    change[0] = [0.0, *-mounted.mean(axis=0)]
     warnings = model.warnings
     if influence.covariance is None:
         warnings += (
@@ -257,11 +252,7 @@ def _with_coefficients(
             "baseline run alone, the real ones are larger",
         )
     else:
-        effect = stretch(mounted.mean(axis=0)[None])  # W T as a row
-        change = np.eye(2 * P + 2)
-        change[:2, :2] = 0.0
-        change[:2, 2:] = -effect
-        covariance = change @ influence.covariance @ change.T
+        covariance = stretch(change) @ influence.covariance @ stretch(change).T
     columns = run_columns(influence.run_errors, runs_of(runs, mounted, influence.W))
     R = len(runs)
     further = columns.common.reshape(2, -1, S, C) / R
@@ -269,18 +260,11 @@ def _with_coefficients(
     common = np.zeros((2, further.shape[1], S, C, P + 1), dtype=complex)
     common[..., 0] = further
     covariance += marginal(common)
-    before, parameters = (_of_bare(c, mounted) for c in (influence.common, influence.parameters))
-    if before is not None:
-        common = np.concatenate((before, common), axis=1)
+    if influence.common is not None:
+        common = np.concatenate((influence.common @ change.T, common), axis=1)
+    parameters = None if influence.parameters is None else influence.parameters @ change.T
     covariance = symmetric(covariance)
     return Start(readings, covariance, model, warnings, influence.labels, None, common, True, parameters)
-
-
-def _of_bare(columns: ComplexArray | None, mounted: ComplexArray) -> ComplexArray | None:
-    """Columns (…, P + 1) of coefficients where Y₀ is a reading less what was mounted (R, P) does."""
-    if columns is None:
-        return None
-    return np.concatenate((-columns[..., 1:] @ mounted.mean(axis=0)[:, None], columns[..., 1:]), axis=-1)
 
 
 def _joined(model: ErrorModel, known: ErrorModel) -> ErrorModel:

@@ -200,9 +200,7 @@ def _outer(columns: ComplexArray) -> ComplexArray:
     return np.asarray(columns.T @ columns.conj())
 
 
-def _without(
-    free: AnyArray, e: AnyArray, V: AnyArray, known: AnyArray
-) -> tuple[AnyArray, AnyArray, AnyArray]:
+def _without(free: AnyArray, e: AnyArray, V: AnyArray, known: AnyArray) -> tuple[AnyArray, ...]:
     """Residuals and their covariances, (…, n, n) both, without what the free unknowns do."""
     P = free.shape[-1]
     if not P:
@@ -261,10 +259,7 @@ def scatter(
 
 
 def seen_in(
-    run: RunErrors,
-    residual: ComplexArray,
-    parts: FloatArray,
-    W: ComplexArray,
+    run: RunErrors, residual: ComplexArray, parts: FloatArray, W: ComplexArray
 ) -> tuple[float, RunErrors]:
     """Probability that errors alone leave more of a corrected reading than was found; what it says of them.
 

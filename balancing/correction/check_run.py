@@ -106,13 +106,11 @@ def compare_check(
         distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, np.linalg.solve(covariance, d[..., None])[..., 0]))
         run, speed, known = *map(_columns, common), _columns(parameters)[..., ::2]
         white, shares = whitening(_by_speed(V), speed, np.concatenate((run, known), axis=-1))
-        of_model = float(np.sum(white(known) ** 2)) / d.size
+        model = float(np.sum(white(known) ** 2)) / d.size
         stacked = np.moveaxis(d, 0, 2).reshape(len(at), -1, 1)
         between = influence.own_between
         own_share, at_speed, whole = shares
-        kinds = np.array(
-            [own_share * (1 - between), own_share * between, at_speed, whole - of_model, of_model]
-        )
+        kinds = np.array([own_share * (1 - between), own_share * between, at_speed, whole - model, model])
         # all directions alike: so many tell the degrees of freedom
         unit = np.eye(min(d.size, _DIRECTIONS))
         scale, dof = influence.run_errors.degrees(kinds[:, None, None] * unit, dof)

@@ -18,7 +18,7 @@ from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.correction_methods import Fitted
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorid.regression import stretch
 
 
@@ -94,22 +94,21 @@ class StackErrors:
 
     def _after(self, D: ComplexArray) -> tuple[float, RunErrors]:
         own = np.trace(prediction_covariance(D, self.channels), axis1=1, axis2=2) / 2
-        parts = self._parts(np.diag(np.repeat(own, 2)), *self._shared(D))
+        parts = self._parts(np.diag(np.repeat(own, 2)), *self._shared(D, np.zeros((2, 0, *self.Y.shape))))
         return seen_in(self.run, self.Y + self.W @ D, parts, self.W)
 
     def _parts(self, own: FloatArray, *others: FloatArray) -> FloatArray:
         """As `RunErrors.degrees` takes them, (5, n, n)."""
         return np.stack((own * (1 - self.between), own * self.between, *others))
 
-    def _shared(self, D: ComplexArray, further: ComplexArray | None = None) -> tuple[FloatArray, ...]:
+    def _shared(self, D: ComplexArray, further: AnyArray) -> tuple[FloatArray, ...]:
         """Of Y₀ + W D what is common at a speed, to the run (`further` too), of parameters, (2N, 2N) each."""
         z = np.concatenate(([1.0], D))
         S, C = self.Y.shape
-        further = np.zeros((2, 0, S, C), dtype=complex) if further is None else further
         common = further if self.common is None else np.concatenate((self.common @ z, further), axis=1)
         run, speed = (stretch(F.T @ F.conj()) for F in common.reshape(2, -1, S * C))
-        known = np.zeros((0, S, C, len(z))) if self.parameters is None else self.parameters
-        columns = stretch((known @ z).reshape(-1, S * C).T)[:, ::2]
+        moved = np.zeros((0, S, C)) if self.parameters is None else self.parameters @ z
+        columns = stretch(moved.reshape(-1, S * C).T)[:, ::2]
         return speed * np.kron(np.eye(S), np.ones((2 * C,) * 2)), run, columns @ columns.T
 
 

@@ -74,7 +74,7 @@ def error_form(covariance: FloatArray, row_weights: FloatArray | None = None) ->
 
 def common_covariance(
     J: FloatArray, common: ComplexArray | None, parameters: ComplexArray | None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, ...]:
     """Covariances (2P, 2P) by errors common at a speed, to the whole run, and of a model's parameters.
 
     Parameters
@@ -94,8 +94,7 @@ def common_covariance(
     if parameters is not None:
         F = stretch(parameters[..., None])[..., :1].reshape(len(parameters), *J.shape[::2], 1)
         known = np.einsum("nqz,mnzu->mqu", J, F)
-    first, second, third = (np.einsum("mqu,mpu->qp", part, part) for part in (speed, run, known))
-    return first, second, third
+    return tuple(np.einsum("mqu,mpu->qp", part, part) for part in (speed, run, known))
 
 
 def whitening(

@@ -115,12 +115,46 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
     """
     values: dict[str, float] = defaultdict(float)
     for path, change in changes.items():
-        parameter = _parameter(rotor, path)
-        if not parameter.suffix and {*parameter.keys} & {*_TABLED}:
-            values[f"{path}.offset"] += change
-        else:
-            values[path] += parameter_value(rotor, path) + change
+        to = as_change(rotor, path)
+        values[to] += parameter_value(rotor, to) + change
     return with_parameters(rotor, values)
+
+
+def as_change(rotor: Rotor, path: str) -> str:
+    """The parameter by which this one can be changed from where it stands: `.offset` of a coefficient."""
+    parameter = _parameter(rotor, path)
+    return f"{path}.offset" if not parameter.suffix and {*parameter.keys} & {*_TABLED} else path
+
+
+def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
+    """Derivatives (n, n) of changes, as `with_changes` makes them of the rotor with these values, by these.
+
+    A scale s is 1 there, and multiplies what is added to the same numbers, a, too: ds' = ds / s,
+    da' = da − a ds / s.
+
+    Raises
+    ------
+    ValueError
+        For what is added to more numbers than such a scale multiplies.
+    """
+    T = np.eye(len(values))
+    numbers = [numbers_of(rotor, path) for path in values]
+    for j, (path, scale) in enumerate(values.items()):
+        if not path.endswith(".scale"):
+            continue
+        T[j, j] = 1 / scale
+        for i, (other, added) in enumerate(values.items()):
+            if other.rpartition(".")[2] in _POWERS and numbers[i] & numbers[j]:
+                if not numbers[i] <= numbers[j]:
+                    raise ValueError(f"{other} adds to more numbers than {path} multiplies")
+                T[i, j] = -added / scale
+    return T
+
+
+def numbers_of(rotor: Rotor, path: str) -> frozenset[tuple[str, int, str]]:
+    """Which numbers a parameter sets, scales or adds to: kind, place, name of each; none of a reading."""
+    _, kind, items, keys, _ = _parameter(rotor, path)
+    return frozenset((kind, i, key) for i in items for key in keys)
 
 
 def parameter_value(rotor: Rotor, path: str) -> float:
@@ -213,12 +247,10 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
             raise ValueError(f"{path}: write {'probe[NAME]' if kind == 'probe' else kind}.{rest}")
         return _Parameter(path, kind, (0,) if keys else (), keys, suffix)
     items = _selected(rotor, path, kind, selection)
-    if keys[0].startswith("pedestal_"):
-        there = tuple(i for i in items if rotor.supports[i].pedestal)
-        if not there or (selection is not None and there != items):
-            raise ValueError(f"{path}: the {kind} stands on no pedestal")
-        items = there
-    return _Parameter(path, kind, items, keys, suffix)
+    there = tuple(i for i in items if keys[0][:8] != "pedestal" or rotor.supports[i].pedestal)
+    if not there or (selection is not None and there != items):
+        raise ValueError(f"{path}: the {kind} stands on no pedestal")
+    return _Parameter(path, kind, there, keys, suffix)
 
 
 def _of_kind(rotor: Rotor, kind: str) -> list[int]:

@@ -190,11 +190,20 @@ class Support:
         k + iωc in series with the pedestal's k − ω² m + iωc. Stiffness and damping are those at the
         rotor's `speed`, rad/s; None: at the frequency itself (synchronous).
         """
+        bearing, stand = self.dynamic_parts(omega, speed)
+        if stand is None:
+            return bearing
+        return np.asarray(bearing - bearing @ np.linalg.solve(bearing + stand, bearing))
+
+    def dynamic_parts(
+        self, omega: ArrayLike, speed: ArrayLike | None = None
+    ) -> tuple[ComplexArray, ComplexArray | None]:
+        """What `dynamic_stiffness` puts in series: bearing and pedestal, (…, 2, 2) each; None: the ground."""
         omega = np.asarray(omega, dtype=float)
         k, c = self.at(omega if speed is None else np.broadcast_to(np.asarray(speed, float), omega.shape))
-        bearing = k + 1j * omega[..., None, None] * c
+        bearing = np.asarray(k + 1j * omega[..., None, None] * c)
         if self.pedestal is None:
-            return np.asarray(bearing)
+            return bearing, None
         stand = np.zeros((*omega.shape, 2, 2), dtype=complex)
         for i in (0, 1):
             stand[..., i, i] = (
@@ -202,7 +211,7 @@ class Support:
                 - omega * omega * self.pedestal.mass
                 + 1j * omega * self.pedestal.xy("damping")[i]
             )
-        return np.asarray(bearing - bearing @ np.linalg.solve(bearing + stand, bearing))
+        return bearing, stand
 
     @cached_property
     def _tables(self) -> FloatArray:

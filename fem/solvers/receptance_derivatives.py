@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.matrices.banded_matrices import Matrices, assemble, dense, multiply
-from fem.matrices.support_dynamic_stiffness import Supported, supported
+from fem.matrices.support_dynamic_stiffness import Supported, supported, whirl_change
 from fem.matrices.undamped_matrices import Whirl, one_plane
 from fem.model.rotor import Rotor
 from fem.solvers.receptance import (
@@ -34,21 +34,28 @@ from fem.solvers.receptance import (
 )
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
-_CHUNK = 256  # speeds at a time, so that memory does not grow with them
+_CHUNK = 128  # speeds at a time, to stay in the processor's cache
 _DIRECTIONS: tuple[Whirl, Whirl] = (1, -1)
 BANDS = ("shaft", "mass", "gyroscopic", "material")
 
 
 @dataclass(frozen=True, eq=False)
 class MatrixChange:
-    """∂D by one number of a rotor: bands of shaft and discs (None: unchanged), and supports at nodes.
+    """∂D by one number of a rotor: bands of shaft and discs that change, and supports at nodes.
 
-    The latter, (S, k, 2, 2), act on (F, b) as in `Supported`.
+    The bands, by name, are those of the unknowns from `first` on; supports, (S, k, 2, 2), act on (F, b) as in
+    `Supported`.
     """
 
-    bands: dict[str, FloatArray] | None
+    bands: dict[str, FloatArray]
+    first: int
     nodes: tuple[int, ...]
     supports: ComplexArray
+
+    @property
+    def unknowns(self) -> IndexArray:
+        """On which the bands act."""
+        return self.first + np.arange(max((band.shape[1] for band in self.bands.values()), default=0))
 
 
 def matrix_change(
@@ -66,15 +73,21 @@ def matrix_change(
         raise ValueError("the rotor can have no other value here, neither larger nor smaller")
     up, down = ends
     pairs = [pair for pair in zip(up.supports, down.supports, strict=True) if pair[0] != pair[1]]
-    at = [supported(replace(up, supports=each), speeds) for each in zip(*pairs, strict=True)]
-    change = (at[0].stiffness - at[1].stiffness) / width if at else np.zeros((speeds.size, 0, 2, 2), complex)
-    bands = None
-    if replace(up, supports=()) != replace(down, supports=()) or any(
-        one.tilting_stiffness != other.tilting_stiffness for one, other in pairs
-    ):
-        first, second = assemble(up), assemble(down)
-        bands = {name: (getattr(first, name) - getattr(second, name)) / width for name in BANDS}
-    return MatrixChange(bands, at[0].nodes if at else (), change)
+    change = np.zeros((speeds.size, len(pairs), 2, 2), dtype=complex)
+    for k, (more, less) in enumerate(pairs):
+        change[:, k] = whirl_change(more, less, speeds) / width
+    tilting = any(more.tilting_stiffness != less.tilting_stiffness for more, less in pairs)
+    bands: dict[str, FloatArray] = {}
+    first = end = 0
+    if tilting or replace(down, supports=up.supports) != up:
+        one, other = assemble(up), assemble(down)
+        bands = {name: (getattr(one, name) - getattr(other, name)) / width for name in BANDS}
+        bands = {name: band for name, band in bands.items() if band.any()}
+    if bands:
+        entries, columns = np.concatenate([np.argwhere(band) for band in bands.values()]).T
+        first, end = int((columns + entries).min()) - one.width, int(columns.max()) + 1
+    bands = {name: band[:, first:end] for name, band in bands.items()}
+    return MatrixChange(bands, first, tuple(more.node for more, _ in pairs), change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +133,7 @@ def receptance_with_derivatives(
         Outside a bearing table, or where the rotor is no rotor for `fem.response`.
     """
     A, at = assemble(rotor), supported(rotor, speeds)
-    ports = _Ports(A, at, rows, any(change.bands is not None for change in changes))
+    ports = _Ports(A, at, rows, [change.unknowns for change in changes])
     turn = np.exp(1j * angles)
     u = np.stack((turn.conj(), turn), axis=1)  # (a, 2)
     solve = _solver(rotor, A, at, ports, loads, u, speeds)
@@ -134,11 +147,11 @@ def receptance_with_derivatives(
 
 
 class _Ports:
-    """Unknowns that are asked for: all of them, if bands change, else those of sensors and supports."""
+    """Unknowns that are asked for: those of sensors and supports, and on which changing bands act."""
 
-    def __init__(self, A: Matrices, at: Supported, rows: IndexArray, whole: bool) -> None:
+    def __init__(self, A: Matrices, at: Supported, rows: IndexArray, more: Sequence[IndexArray]) -> None:
         held = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
-        self.unknowns = np.arange(A.size) if whole else np.unique(np.concatenate((rows, held)))
+        self.unknowns = np.unique(np.concatenate((rows, held, *more)))
         self.rows, self.held = (np.searchsorted(self.unknowns, where) for where in (rows, held))
         self.of_node = dict(zip(at.nodes, self.held.tolist(), strict=True))
 
@@ -184,7 +197,7 @@ def _solver(
         D = support_change(Supported(at.nodes, at.stiffness[part], at.reference, 2), springs)
         D[:, :, 1, 1] -= np.array(list(springs.values())) * (stiffer - 1.0)[:, None]
         directions = [ahead.at(omega**2, near), behind.at(omega**2 / stiffer, near) / stiffer]
-        H = np.moveaxis(np.stack(directions), -1, 0)  # (S, 2, places, columns)
+        H = np.ascontiguousarray(np.moveaxis(np.stack(directions), -1, 0))  # (S, 2, places, columns)
         of_loads, of_sensors, of_held = H[..., :b], H[..., b : b + a] * u.T[:, None], H[..., b + a :]
         s, S = held.size, omega.size
         D, G = _spread(D), np.zeros((S, 2 * s, 2 * s), dtype=complex)
@@ -250,24 +263,28 @@ def _derivatives(
     q, p = pair
     read = q[:, :, ports.rows] * u.T[:, :, None]  # (S, 2, a, b)
     by_number = np.zeros((len(changes), *read[:, 0].shape), dtype=complex)
-    w2 = (omega**2)[:, None, None]
+    w2, one = omega**2, np.ones(omega.size)
+    factors = {
+        "shaft": (one, one),
+        "mass": (-w2, -w2),
+        "gyroscopic": (w2, -w2),
+        "material": (0 * one, 2j * omega),
+    }
     for k, change in enumerate(changes):
         for node, D in zip(change.nodes, np.moveaxis(change.supports[part], 1, 0), strict=True):
             at = ports.of_node[node]
             by_number[k] -= np.swapaxes(p[:, :, at], 1, 2) @ (D @ q[:, :, at])
-        if change.bands is not None:
-            K, M, G, B = (_applied(change.bands[name], q) for name in BANDS)
-            forward = K[:, 0] - w2 * (M[:, 0] - G[:, 0])
-            backward = K[:, 1] + 2j * omega[:, None, None] * B[:, 1] - w2 * (M[:, 1] + G[:, 1])
-            moved = np.stack((forward, backward), axis=1)
-            by_number[k] -= (np.swapaxes(p, 2, 3) @ moved).sum(axis=1)
+        first = int(np.searchsorted(ports.unknowns, change.first))
+        for name, band in change.bands.items():
+            acting = slice(first, first + band.shape[1])
+            work = np.swapaxes(p[:, :, acting], 2, 3) @ _applied(band, q[:, :, acting])
+            for i, factor in enumerate(factors[name]):
+                by_number[k] -= factor[:, None, None] * work[:, i]
     return read.sum(axis=1), by_number, 1j * (read[:, 1] - read[:, 0])
 
 
 def _applied(band: FloatArray, q: ComplexArray) -> AnyArray:
-    """A band times vectors (S, 2, size, b)."""
-    if not band.any():
-        return np.zeros((*q.shape[:2], 1, 1))
+    """A band times vectors (S, 2, n, b)."""
     flat = np.moveaxis(q, 2, 0)
     product: AnyArray = multiply(band, flat.reshape(len(flat), -1))  # type: ignore[arg-type]
     return np.moveaxis(product.reshape(flat.shape), 0, 2)

@@ -15,7 +15,7 @@ import numpy as np
 
 from fem.model.calibration import Calibration, is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import with_parameters
+from fem.model.rotor_parameters import as_they_stand, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.calibration.calibrated_rotor import CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
@@ -192,10 +192,11 @@ def _judged(
     values = equations.values(theta)
     lack = _lack_of_fit(equations, theta) if misfit else {}
     speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
+    to = as_they_stand(equations.rotor, values)
     calibration = Calibration(
         names=tuple(equations.paths),
         values=theta,
-        covariance=_as_it_stands(equations.paths, theta, covariance),
+        covariance=to @ covariance @ to.T,
         speeds=np.array(speeds),
         sensors=tuple(sensors),
         lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),
@@ -222,14 +223,6 @@ def _judged(
         stated=all(rows.stated for rows in equations.rows),
         other_ends=tuple(apart),
     )
-
-
-def _as_it_stands(paths: Sequence[str], theta: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Covariance of the numbers as they stand in the new rotor, where every scale is 1."""
-    scales = np.array(
-        [value if path.endswith(".scale") else 1.0 for path, value in zip(paths, theta, strict=True)]
-    )
-    return np.asarray(covariance / np.outer(scales, scales))
 
 
 def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, str], float]:

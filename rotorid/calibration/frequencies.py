@@ -75,13 +75,24 @@ class MeasuredFrequencies:
         return np.concatenate(left)
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
-        """Derivatives (rows, n) by the numbers."""
-        rotor = with_parameters(start, values)
+        """Derivatives (rows, n) by the numbers; on one side only, where the other is no rotor.
+
+        ValueError where neither is.
+        """
+        rotor, here = with_parameters(start, values), self.residual(start, values)
         columns = []
         for path in paths:
-            step = STEP * typical_size(rotor, path)
-            up, down = (self.residual(start, {**values, path: values[path] + s}) for s in (step, -step))
-            columns.append((up - down) / (2 * step))
+            step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
+            ends = []
+            for side in (step, -step):
+                try:
+                    ends.append((side, self.residual(start, {**values, path: values[path] + side})))
+                except ValueError:
+                    ends.append((0.0, here))
+            (above, up), (below, down) = ends
+            if above == below:
+                raise ValueError(f"the rotor can have no other {path}, neither larger nor smaller")
+            columns.append((up - down) / (above - below))
         return np.stack(columns, axis=1)
 
 

@@ -23,7 +23,12 @@ from fem.matrices.banded_matrices import assemble, multiply
 from fem.matrices.undamped_matrices import one_plane
 from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import parameter_value, typical_size, with_parameters
+from fem.model.rotor_parameters import (
+    as_they_stand,
+    typical_size,
+    with_changes,
+    with_parameters,
+)
 from fem.model.sensors import Sensor
 from fem.solvers.eigen import lowest_modes
 from fem.solvers.receptance import unit_loads
@@ -90,7 +95,7 @@ class RunReadings:
         values
             All numbers, by path.
         derivatives
-            n paths; the second array has the shape (n, S, C, P + q).
+            n of these paths; the second array has the shape (n, S, C, P + q).
         """
         rotor, speeds = with_parameters(start, values), self.trials.speeds
         A = assemble(rotor)
@@ -106,12 +111,8 @@ class RunReadings:
             loads.append(multiply(A.shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0)))
 
         def change(path: str) -> MatrixChange:
-            def other(value: float) -> Rotor:
-                return with_parameters(rotor, {path: value})
-
-            return matrix_change(
-                other, parameter_value(rotor, path), STEP * typical_size(rotor, path), speeds
-            )
+            step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
+            return matrix_change(lambda by: with_changes(rotor, {path: by}), 0.0, step, speeds)
 
         own = [path for path in derivatives if not is_reading(path)]
         found = receptance_with_derivatives(
@@ -126,10 +127,11 @@ class RunReadings:
         factor = factor[:, None] * gains[:, None]  # (S, C, P + q)
         W = found.H * factor
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
+        to = as_they_stand(start, {path: values[path] for path in own})
+        by_number = np.tensordot(to.T, found.by_number, 1)
         for k, path in enumerate(derivatives):
             if path in own:
-                out[k] = found.by_number[own.index(path)] * factor
-                out[k] /= values[path] if path.endswith(".scale") else 1.0  # which is 1 in this rotor
+                out[k] = by_number[own.index(path)] * factor
             elif path == "key_phasor.angle":
                 out[k] = W * 1j * np.radians(1.0)
             elif path in names:

@@ -89,6 +89,8 @@ critical-rotor23-mesh       critical {ROTOR23} -n 5 --mesh-check --output modes.
 critical-model-job          critical sample_data/model_job/rotor.csv -n 2
 critical-compressor         critical {COMPRESSOR} -n 4 --operating 5300:6500rpm --output modes.xlsx
 critical-compressor-map     critical {COMPRESSOR} -n 3 --map --plot map.png
+critical-rk4                critical sample_data/rk4/calibrated.toml -n 2
+calibrate-rk4               calibrate sample_data/rk4/rotor.toml sample_data/rk4/few.toml sample_data/rk4/few_1005.toml --estimate "bearing.kxx, bearing.kyy, bearing.cxx, bearing.cyy, bearing.tilting_stiffness, key_phasor.angle, probe[*].gain" --prior "bearing.k*=40%, bearing.c*=40%, bearing.tilting_stiffness=100%, key_phasor.angle=0+-100, probe[*].gain=50%, probe[*].angle=0+-30" --table
 critical-misspelt           critical misspelt.csv
 critical-missing            critical nowhere.csv
 critical-too-many           critical {ROTOR23} -n 1000
@@ -179,6 +181,8 @@ left-in                     balance sample_data/left_in/job.toml --history
 left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
+rk4-few                     balance sample_data/rk4/few.toml
+rk4-few-1005                balance sample_data/rk4/few_1005.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
 one-shot                    balance sample_data/calibration/later.toml
 template                    balance --template job.xlsx

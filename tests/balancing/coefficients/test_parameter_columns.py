@@ -139,8 +139,10 @@ def test_check_runs_are_predicted(drawn):
     assert chi_square.mean() / n == pytest.approx(1, abs=4 * np.sqrt(2 / n / len(chi_square)))
     away = drawn.seen - np.array([one.after for one in drawn.found])
     covariance = np.array([one.after_covariance for one in drawn.found])
+    distance = np.array([one.distance for one in drawn.checks])[:, 0]
     for s, c in np.ndindex(away.shape[1:]):
         assert holds_95_of_100(inside(real(away[:, s, c, None]), covariance[:, s, c]))
+        assert holds_95_of_100(distance[:, s, c] ** 2 < chdtri(2, 0.05))
 
 
 def test_check_runs_stay_below_the_bound(drawn):
@@ -272,6 +274,20 @@ def test_unbalance_of_a_run():
     assert chi_square.mean() == pytest.approx(8, abs=4 * np.sqrt(16 / J))  # 6 readings, 2 planes
 
 
+def test_chi_square_of_an_unbalance():
+    """What no unbalance explains, by generalised least squares over the real parts of all readings."""
+    model, rng = computed(2, 3, 2, lack=0.004), np.random.default_rng(10)
+    base = read(rng, model, true(rng, model, 0.004) @ UNBALANCE)
+    found, start = unbalance_of_run(model, base), starting_point(model, base)
+    z = np.concatenate(([1.0], -found.unbalance))
+    own = np.trace(stretch(z[None]) @ start.own @ stretch(z[None]).T, axis1=2, axis2=3) / 2
+    columns = real((start.parameters @ z).reshape(2, -1)).T
+    root = np.linalg.cholesky(np.diag(np.repeat(own.ravel(), 2)) + columns @ columns.T)
+    rows = np.linalg.solve(root, stretch(model.W.reshape(-1, 2)))
+    least = np.linalg.lstsq(rows, np.linalg.solve(root, real(found.residual)), rcond=None)[1][0]
+    assert found.chi_square == pytest.approx(least, rel=1e-9)
+
+
 def test_a_verdict_has_the_region_of_the_correction():
     model, rng = computed(2, 3, 1, size=0.1), np.random.default_rng(7)
     base = read(rng, model, model.W @ UNBALANCE)
@@ -295,10 +311,20 @@ def test_degrees_of_freedom_of_the_readings_do_not_widen_them():
     root = np.linalg.inv(np.linalg.cholesky(found.covariance))
     share = np.trace(root @ alone.covariance @ root.T) / 4  # of the readings in the whole
     assert found.dof == pytest.approx(6 / share**2, rel=0.02)
+
+
+def test_what_is_open_of_errors_between_runs_does_not_scale_them():
+    run = RunErrors(probability=np.full(2, 0.5), ratios=np.array([[0.1] * 3, [10.0] * 3]))
     parts = np.zeros((5, 2, 2))
-    open_ones = RunErrors(probability=np.full(2, 0.5), ratios=np.array([[0.1] * 3, [10.0] * 3]), merged=True)
     parts[4] = np.eye(2)
-    assert open_ones.degrees(parts, 3) == (1.0, None)
+    assert replace(run, merged=True).degrees(parts, 3) == (1.0, None)
+    model, rng = replace(computed(2, 3, 1), run_errors=run), np.random.default_rng(11)
+    W = true(rng, model)
+    base = read(rng, model, W @ UNBALANCE)
+    found = correct(model, base)
+    check = read(rng, model, W @ (UNBALANCE + found.weights), found.weights, "check")
+    assert found.dof is None
+    assert compare_check(found, check, model, base).dof is None
 
 
 def test_known_errors_stay_where_those_between_runs_are_assumed():
