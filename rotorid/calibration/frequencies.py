@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.critical import lowest_critical_speeds
+from fem.critical import NOT_COUNTED, lowest_critical_speeds
 from fem.matrices.undamped_matrices import static_stiffness
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import typical_size, with_parameters
+from fem.model.rotor_parameters import is_reading, typical_size, with_parameters
 from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.rpm import rpm_text
@@ -53,6 +53,29 @@ class MeasuredFrequencies:
         """What they are."""
         return "natural frequencies at rest" if self.rest else "critical speeds"
 
+    @property
+    def scales(self) -> int:
+        """How many scales of shapes are found besides."""
+        return len(self.modes) if self.nodes else 0
+
+    def check(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> None:
+        """Refuse numbers that change which critical speeds are listed.
+
+        Raises
+        ------
+        ValueError
+            For supports that are alike in x and y, and would not be with another number.
+        """
+        if self.rest or not with_parameters(start, values).symmetric:
+            return
+        for path in paths:
+            if not all(rotor.symmetric for _, rotor in _beside(start, values, path)):
+                raise ValueError(
+                    f"{path} alone makes supports differ in x and y: then backward critical speeds count, "
+                    "too, and the numbers of modes are others; estimate what keeps them alike (as "
+                    "bearing[1].stiffness does), or write the rotor file with supports that differ"
+                )
+
     def residual(self, start: Rotor, values: Mapping[str, float]) -> FloatArray:
         """Computed less measured, in standard deviations: frequencies, then shapes, each in its best scale.
 
@@ -61,6 +84,8 @@ class MeasuredFrequencies:
         rotor = with_parameters(start, values)
         most = int(self.modes.max())
         found = lowest_critical_speeds(at_rest(rotor) if self.rest else rotor, most)
+        if below := next((said for said in found.warnings if NOT_COUNTED in said), ""):
+            raise ValueError(f"{below}: extend the tables")
         moving = np.flatnonzero(found.frequencies > 0)
         if moving.size < most:
             last = rpm_text(float(found.frequencies[-1]))
@@ -76,13 +101,26 @@ class MeasuredFrequencies:
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
         """Derivatives (rows, n) by the numbers."""
-        rotor = with_parameters(start, values)
         columns = []
         for path in paths:
-            step = STEP * typical_size(rotor, path)
-            up, down = (self.residual(start, {**values, path: values[path] + s}) for s in (step, -step))
-            columns.append((up - down) / (2 * step))
+            if is_reading(path):
+                columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
+                continue
+            (up, one), (down, other) = _beside(start, values, path)
+            columns.append((self.residual(one, {}) - self.residual(other, {})) / ((up - down) or 1.0))
         return np.stack(columns, axis=1)
+
+
+def _beside(start: Rotor, values: Mapping[str, float], path: str) -> list[tuple[float, Rotor]]:
+    """The rotor with a little more and a little less of a number; as it is on a side where there is none."""
+    found = []
+    step = STEP * typical_size(with_parameters(start, values), path)
+    for value in (values[path] + step, values[path] - step):
+        try:
+            found.append((value, with_parameters(start, {**values, path: value})))
+        except ValueError:
+            found.append((values[path], with_parameters(start, values)))
+    return found
 
 
 def at_rest(rotor: Rotor) -> Rotor:
