@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import balancing
 import fem
@@ -29,6 +30,7 @@ JOBS = {1206: ("few.toml", "job.toml"), 1005: ("few_1005.toml", "job_1004.toml")
 BOTH = (1206, 1005)
 BEARINGS = {480: (3, 27), 520: (2, 28), 560: (1, 29)}
 PROBES = ("p1x", "p1y", "p2x", "p2y")
+OF = ("disk_1", "disk_2", "sum")
 ESTIMATE = (
     "bearing.kxx, bearing.kyy, bearing.cxx, bearing.cyy, bearing.tilting_stiffness, "
     "key_phasor.angle, probe[*].gain"
@@ -41,8 +43,7 @@ PRIOR = (
 
 def main() -> dict[str, float]:
     """Print what the trial runs say of the rotor, and how well it estimates weights; return key numbers."""
-    spans()
-    rotors = {speeds: calibration(speeds).rotor for speeds in (BOTH, (1206,), (1005,))}
+    rotors = {BOTH: spans()[560], **{(rpm,): calibration((rpm,)).rotor for rpm in BOTH}}
     for rpm in BOTH:
         print(f"\nWeights at {rpm} rpm by the calibrated rotor (error, half the longest axis of its region):")
         coefficients = known(rpm, "computed", rotors[BOTH])
@@ -51,21 +52,28 @@ def main() -> dict[str, float]:
     for method in ("weighted", "least-squares"):
         print(f"\nError ± half axis, root mean square over these eight runs, --method {method} (g·mm):")
         for rpm in BOTH:
-            numbers |= summary(rpm, rotors, method)
+            errors = summary(rpm, rotors, method)
+            for kind in ("both", "other") if method == "weighted" else ():
+                numbers |= {
+                    f"{kind}_{rpm}_{name}": float(e) for name, e in zip(OF, errors[kind], strict=True)
+                }
     return numbers
 
 
-def spans() -> None:
-    """Print what the trial runs at both speeds say of the distance between the bearings."""
+def spans() -> dict[int, fem.Rotor]:
+    """Print what the runs at both speeds say of the distance between the bearings; return the rotors."""
+    rotors = {}
     print("Bearings    χ² (dof)    critical speeds     gains of", ", ".join(PROBES))
     for span, nodes in BEARINGS.items():
         found = calibration(BOTH, nodes)
+        rotors[span] = found.rotor
         first, second = fem.critical_speeds(found.rotor, 2).frequencies * 30 / np.pi
         values = dict(zip(found.names, found.values, strict=True))
         gains = ", ".join(f"{values[f'probe[{name}].gain']:.2f}" for name in PROBES)
         verdict = "" if found.explained else "  contradicted by the runs"
         critical = f"{first:.0f} and {second:.0f} rpm"
         print(f"  {span} mm  {found.chi_square:5.1f} ({found.dof})  {critical}  {gains}{verdict}")
+    return rotors
 
 
 def calibration(speeds: Sequence[int], nodes: Sequence[int] = BEARINGS[560]) -> CalibratedRotor:
@@ -101,8 +109,10 @@ def others(rpm: int) -> dict[str, balancing.Trials]:
     return {run: of(trials, [run]) for run in trials.runs if run not in FEW}
 
 
-def summary(rpm: int, rotors: dict[tuple[int, ...], fem.Rotor], method: str) -> dict[str, float]:
-    """Print one line for each kind of coefficients; return errors of disc 1, disc 2 and their sum."""
+def summary(
+    rpm: int, rotors: dict[tuple[int, ...], fem.Rotor], method: str
+) -> dict[str, NDArray[np.float64]]:
+    """Print one line for each kind of coefficients; return their errors of disc 1, disc 2 and the sum."""
     (other,) = {*BOTH} - {rpm}
     kinds = {
         "plain": ("of the trial runs", known(rpm, "measured")),
@@ -111,22 +121,20 @@ def summary(rpm: int, rotors: dict[tuple[int, ...], fem.Rotor], method: str) -> 
         "other": (f"of that calibrated at {other}", known(rpm, "computed", rotors[other,])),
         "combined": (f"of this and the trial runs at {rpm}", known(rpm, "combined", rotors[other,])),
     }
-    runs, numbers = others(rpm).values(), {}
+    runs, errors = others(rpm).values(), {}
     print(
         f"  {rpm} rpm, coefficients               disk 1         disk 2         sum of both    held   silent"
     )
     for kind, (words, coefficients) in kinds.items():
         found = [estimated(coefficients, one, method) for one in runs]
-        error, size = (
+        errors[kind], size = (
             np.sqrt(np.mean(np.square([getattr(each, name) for each in found]), axis=0))
             for name in ("errors", "sizes")
         )
-        cells = "  ".join(f"{e:5.2f} ± {s:5.2f}" for e, s in zip(error, size, strict=True))
+        cells = "  ".join(f"{e:5.2f} ± {s:5.2f}" for e, s in zip(errors[kind], size, strict=True))
         held = " ".join(map(str, np.sum([each.inside for each in found], axis=0)))
         print(f"  {words:34}  {cells}  {held}   {sum(not each.warned for each in found)}")
-        of_discs = zip(("disk_1", "disk_2", "sum"), error, strict=True)
-        numbers |= {f"{method}_{rpm}_{kind}_{name}": float(e) for name, e in of_discs}
-    return numbers
+    return errors
 
 
 if __name__ == "__main__":
