@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.critical import NOT_COUNTED, lowest_critical_speeds
+from fem.critical import NOT_COUNTED, critical_speeds_near, lowest_critical_speeds
 from fem.matrices.undamped_matrices import static_stiffness
 from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
@@ -101,14 +101,21 @@ class MeasuredFrequencies:
         return np.concatenate(left)
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
-        """Derivatives (rows, n) by the numbers."""
+        """Derivatives (rows, n) by the numbers; frequencies over tables are followed, not searched again."""
+        rotor = with_parameters(start, values)
+        follow = not (self.rest or self.nodes or rotor.constant)
+        here = self.residual(start, values) * self.std + self.frequencies if follow else None
         columns = []
         for path in paths:
             if is_reading(path):
                 columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
                 continue
             (up, one), (down, other) = _beside(start, values, path)
-            columns.append((self.residual(one, {}) - self.residual(other, {})) / ((up - down) or 1.0))
+            if here is None:
+                change = self.residual(one, {}) - self.residual(other, {})
+            else:
+                change = (critical_speeds_near(one, here) - critical_speeds_near(other, here)) / self.std
+            columns.append(change / ((up - down) or 1.0))
         return np.stack(columns, axis=1)
 
 
