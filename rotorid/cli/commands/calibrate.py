@@ -23,7 +23,7 @@ def calibrate(
     data: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DATA...",
+            metavar="DATA",
             help="Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.",
         ),
     ],

@@ -41,7 +41,7 @@ class CalibrateOptions:
     unbalance_at : LIST
         Nodes where the rotor's own unbalance may stand: the readings of the bare rotor count, too.
     bow : N
-        Shapes of an unknown bow, the lowest modes; with --unbalance-at.
+        Shapes of an unknown bow, modes of the free shaft; with --unbalance-at.
     starts : N
         Searches from different starting values.
     design : N
