@@ -21,6 +21,8 @@ from rotorid.base.rpm import rpm_text
 
 STEP = 1e-4
 """Of a number's typical size, for central differences."""
+ROUNDING = 1e-12, 1e-7
+"""Of frequencies and shapes: a number whose step makes less is not seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +103,15 @@ class MeasuredFrequencies:
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
         """Derivatives (rows, n) by the numbers."""
-        columns = []
+        columns, by_shape = [], np.full(len(self.nodes) * len(self.modes), self.shape_std / ROUNDING[1])
         for path in paths:
             if is_reading(path):
                 columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
                 continue
             (up, one), (down, other) = _beside(start, values, path)
-            columns.append((self.residual(one, {}) - self.residual(other, {})) / ((up - down) or 1.0))
+            change = self.residual(one, {}) - self.residual(other, {})
+            seen = np.abs(change) * np.append(self.std / self.frequencies / ROUNDING[0], by_shape)
+            columns.append(change / ((up - down) or 1.0) * (seen > 1).any())
         return np.stack(columns, axis=1)
 
 
