@@ -142,6 +142,7 @@ def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
     for j, (path, scale) in enumerate(values.items()):
         if not path.endswith(".scale"):
             continue
+        scale = scale or 1.0  # with nothing left of the numbers
         T[j, j] = 1 / scale
         for i, (other, added) in enumerate(values.items()):
             if other.rpartition(".")[2] in _POWERS and numbers[i] & numbers[j]:

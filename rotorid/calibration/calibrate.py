@@ -16,7 +16,7 @@ import numpy as np
 from fem.model.calibration import Calibration, is_reading
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import as_they_stand, with_parameters
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.calibration.calibrated_rotor import CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
@@ -27,10 +27,10 @@ from rotorid.regression.search import search_from
 
 LEVEL = 0.01
 """Probability of a χ² as large, below which the model does not explain the data."""
-SPREAD = 0.3
-"""Relative spread of starting values without a prior."""
-LIMIT = 40
-"""Evaluations of a search from one of several starts."""
+SPREAD, ASIDE = 0.3, 0.7
+"""Relative, of starting values without a prior: drawn ones, and along what the data see least."""
+LIMIT, MORE = 40, 3
+"""Evaluations of a search from one of several starts, and so many times more starts until one explains."""
 SAME = 1e-3
 """Relative, besides three standard deviations: nearer ends of searches are one."""
 AS_WELL = 4.0
@@ -82,6 +82,12 @@ class _Equations:
 
     known = 0
 
+    @property
+    def besides(self) -> int:
+        """How many numbers are found besides: of unbalances, bows and scales of shapes."""
+        complex_ones = sum(len(data.unbalance) + data.bow for data in self.readings)
+        return 2 * complex_ones + sum(modes.scales for modes in self.frequencies)
+
     def jacobian(self, theta: FloatArray) -> FloatArray:
         values = self.values(theta)
         parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, self.paths)) for rows in self.rows]
@@ -109,7 +115,9 @@ def calibrate(
     readings, frequencies
         The data, of any mixture.
     starts
-        Searches: from the starting values, and from others drawn by priors (or 30 % of the value).
+        Searches: from the starting values; from 70 % beside where that ends, to both sides, along what the
+        data see least of the numbers without a prior; from others drawn by priors (or 30 % of the value).
+        Three times as many, while no end explains the data.
     seed
         Of the drawn starts.
 
@@ -165,22 +173,41 @@ def _best_start(
     seed: int,
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Where the lowest of several short searches ends, and the ends of all that stay inside the bounds."""
+    from scipy.special import chdtrc
+
     random = np.random.default_rng(seed)
     residual, jacobian = prior.beside(equations.residual, equations.jacobian)
     spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
     spread = np.where(spread > 0, spread, SPREAD * np.abs(first))
     limits = np.array([unknown.limits(equations.rotor) for unknown in unknowns], dtype=float)
     lower, upper = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
-    ends = []
-    for k in range(starts):
+    free = np.array([unknown.prior is None for unknown in unknowns]) & (first != 0)
+    dof = max(residual(first).size - first.size - equations.besides, 1)
+    ends: list[tuple[float, FloatArray]] = []
+    aside: list[FloatArray] = []
+    for k in range(MORE * starts if starts > 1 else 0):
+        if k >= starts and ends and chdtrc(dof, 2 * min(cost for cost, _ in ends)) >= LEVEL:
+            break
         begin = first + (spread * random.uniform(-1.0, 1.0, first.size) if k else 0.0)
-        begin = np.clip(begin, lower, upper)
-        if starts > 1 and np.isfinite(residual(begin)).all():
+        if k == 1 and ends and free.any():
+            at = ends[0][1]
+            by = ASIDE * _least_seen(jacobian(at), at, free)
+            aside = [at - by, at + by]
+        begin = np.clip(aside.pop() if aside else begin, lower, upper)
+        if np.isfinite(residual(begin)).all():
             end = search_from(residual, begin, jacobian, limit=LIMIT)
             inside = end is not None and (lower <= end[1]).all() and (end[1] <= upper).all()
             ends += [end] if end is not None and inside else []
     ends.sort(key=lambda end: end[0])
     return (ends[0][1] if ends else first), [end for _, end in ends]
+
+
+def _least_seen(K: FloatArray, theta: FloatArray, free: BoolArray) -> FloatArray:
+    """Direction (n,) of relative changes of the free numbers that moves rows the least, in their units."""
+    weak = np.linalg.svd(K[:, free] * theta[free])[2][-1]
+    found = np.zeros(theta.size)
+    found[free] = weak / np.abs(weak).max() * theta[free]
+    return found
 
 
 def _judged(
@@ -201,8 +228,7 @@ def _judged(
         return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))
 
     chi_square = mismatch(theta)
-    besides = 2 * sum(u.size for u in unbalance) + sum(modes.scales for modes in equations.frequencies)
-    dof = r.size + len(prior) - besides - found.estimate.rank
+    dof = r.size + len(prior) - equations.besides - found.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
     misfit = chance < LEVEL
     covariance = found.estimate.solution_covariance

@@ -22,6 +22,8 @@ from rotorid.base.rpm import rpm_text
 
 STEP = 1e-4
 """Of a number's typical size, for central differences."""
+ROUNDING = 1e-12, 1e-7
+"""Of frequencies and shapes: a number whose step makes less is not seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,7 @@ class MeasuredFrequencies:
         rotor = with_parameters(start, values)
         follow = not (self.rest or self.nodes or rotor.constant)
         here = self.residual(start, values) * self.std + self.frequencies if follow else None
-        columns = []
+        columns, by_shape = [], np.full(len(self.nodes) * len(self.modes), self.shape_std / ROUNDING[1])
         for path in paths:
             if is_reading(path):
                 columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
@@ -115,7 +117,8 @@ class MeasuredFrequencies:
                 change = self.residual(one, {}) - self.residual(other, {})
             else:
                 change = (critical_speeds_near(one, here) - critical_speeds_near(other, here)) / self.std
-            columns.append(change / ((up - down) or 1.0))
+            seen = np.abs(change) * np.append(self.std / self.frequencies / ROUNDING[0], by_shape)
+            columns.append(change / ((up - down) or 1.0) * (seen > 1).any())
         return np.stack(columns, axis=1)
 
 

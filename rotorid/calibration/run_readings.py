@@ -40,6 +40,8 @@ from rotorid.regression import solution, stretch
 
 STEP = 1e-4
 """Of a number's typical size, for differences of matrices."""
+UNSEEN = 1e-9
+"""Relative change of the largest coefficient: a number whose whole size makes less is not seen."""
 NO_ERROR = 1e-9
 """Of the largest reading: the least error, for data that state none."""
 
@@ -128,6 +130,9 @@ class RunReadings:
         W = found.H * factor
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
         to = as_they_stand(start, {path: values[path] for path in own})
+        for k, path in enumerate(own):  # what rounding leaves of a number that does nothing
+            seen = np.abs(found.by_number[k]).max() * typical_size(rotor, path)
+            found.by_number[k] *= seen > UNSEEN * np.abs(found.H).max()
         by_number = np.tensordot(to.T, found.by_number, 1)
         for k, path in enumerate(derivatives):
             if path in own:

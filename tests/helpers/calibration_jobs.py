@@ -44,7 +44,7 @@ class Runs:
     free: bool = True  # the bare rotor's readings
 
     def readings(self, rotor, bow=None):
-        """(R, S, C), phase lead from the pulse of the key phasor; `bow` (nodes, 2): a bent shaft's w and slope."""
+        """(R, S, C), phase lead from the key phasor; `bow` (nodes, 2): w and slope of a bent shaft."""
         out = np.zeros((len(self.weights), len(self.speeds), len(self.sensors)), complex)
         for r, mounted in enumerate(self.weights):
             u = dict(self.unbalance)

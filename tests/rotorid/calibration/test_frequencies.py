@@ -1,4 +1,4 @@
-"""Critical speeds, natural frequencies and shapes as rows, against dense eigenvalues and Rayleigh's quotient."""
+"""Critical speeds, natural frequencies, shapes as rows: against dense eigenvalues and Rayleigh quotients."""
 
 from dataclasses import replace
 
@@ -102,7 +102,7 @@ def test_of_a_number_at_its_end_the_derivative_is_to_one_side():
 
 
 def test_numbers_that_change_which_critical_speeds_are_listed_are_refused():
-    """Of a rotor on supports alike in x and y forward ones are listed alone, of another all: twice as many."""
+    """On supports alike in x and y forward ones are listed alone, on others all: twice as many."""
     data = measured([1, 2], [250.0, 500.0])
     with pytest.raises(ValueError, match=r"bearing\[1\].kxx alone makes supports differ in x and y"):
         data.check(
@@ -128,7 +128,7 @@ def test_critical_speeds_below_bearing_tables_are_not_numbered():
 
 
 def test_modes_that_the_model_does_not_have():
-    with pytest.raises(ValueError, match="the model has only 4 critical speeds, up to .* rpm, not 9"):
+    with pytest.raises(ValueError, match=r"the model has only 4 critical speeds, up to .* rpm, not 9"):
         measured([9], [1e5]).residual(uniform(1, supports=[fem.Support(1, 1e7), fem.Support(2, 1e7)]), {})
 
 

@@ -1,0 +1,421 @@
+"""Numbers from data of a known truth: exact data give them back, noise as stated their errors."""
+
+import functools
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calibration_jobs import Runs, machine
+from fem_rotors import rotor23, uniform
+from scipy.stats import chi2
+
+import fem
+from balancing.data.trials import ReadingErrors
+from fem.model.rotor_parameters import with_parameters
+from rotorid.calibration import MeasuredFrequencies, Unknown, calibrate
+from rotorid.regression import nonlinear, search
+
+ERRORS = ReadingErrors(0.02, 0.02)
+RPM = np.pi / 30
+
+
+def off(rotor, values, by=0.2):
+    """Unknowns that start so far off the truth, now to one side, now to the other."""
+    signs = [1 if k % 2 else -1 for k in range(len(values))]
+    start = [v * (1 + s * by) if v else s * by * 1e6 for v, s in zip(values.values(), signs, strict=True)]
+    return [Unknown(path, start=first) for path, first in zip(values, start, strict=True)]
+
+
+def tabled():
+    """The machine with the first bearing tabulated over speed."""
+    first, second = machine().supports
+    k = np.array(first.stiffness)
+    table = replace(
+        first, speeds=(100.0, 300.0, 500.0), stiffness=[k, 0.8 * k, 0.7 * k], damping=[2e4, 2.5e4, 2e4]
+    )
+    return replace(machine(), supports=[table, second])
+
+
+COEFFICIENTS = {
+    "bearing[1].kxx": 4.7e7,
+    "bearing[1].kxy": 4e6,
+    "bearing[1].kyx": -3e6,
+    "bearing[1].kyy": 5.2e7,
+    "bearing[1].cxx": 2.3e4,
+    "bearing[1].cyy": 2.6e4,
+    "bearing[2].kxx": 4.4e7,
+    "bearing[2].cyy": 1.7e4,
+}
+SCALES = {
+    "bearing[1].stiffness.scale": 1.15,
+    "bearing[1].cxx.scale": 0.9,
+    "bearing[1].kyy.slope": 2e4,
+    "bearing[2].damping.scale": 1.2,
+    "bearing[2].pedestal_stiffness_x": 1.7e8,
+    "bearing[2].pedestal_mass": 18.0,
+}
+MASSES = {
+    "disc[1].mass": 27.0,
+    "disc[2].scale": 1.1,
+    "material.youngs_modulus.scale": 0.96,
+    "material.density": 8000.0,
+    "bearing[2].kxx.offset": 3e6,
+    "bearing[1].kxx.curve": 30.0,
+}
+PROBES = {
+    "bearing[1].kxx": 4.6e7,
+    "probe[a].angle": 5.0,
+    "probe[b].gain": 0.93,
+    "probe[d].angle": -4.0,
+    "key_phasor.angle": 3.0,
+}
+
+
+def truth_of(runs, values):
+    """With probes and key phasor that stand and read as the values say, where the job says otherwise."""
+    turned = {p[6]: v for p, v in values.items() if p.startswith("probe") and p.endswith("angle")}
+    gains = {p[6]: v for p, v in values.items() if p.endswith("gain")}
+    at = runs.key_phasor + values.get("key_phasor.angle", 0.0)
+    return replace(runs, turned=turned, gains=gains, key_phasor=at)
+
+
+@pytest.mark.parametrize(
+    ("rotor", "values", "more"),
+    [
+        (machine(), COEFFICIENTS, {}),
+        (machine(), COEFFICIENTS, {"free": False}),
+        (machine(), COEFFICIENTS, {"free": False, "derivative": 2, "key_phasor": 40.0}),
+        (tabled(), SCALES, {"derivative": 1, "planes": {"P": (4, 0.12), "Q": (8, 0.2)}}),
+        (machine(), MASSES, {}),
+        (machine(), MASSES, {"free": False}),
+        (machine(), PROBES, {"key_phasor": 15.0}),
+    ],
+)
+def test_exact_data_give_the_numbers_back(rotor, values, more):
+    """By the dense rotor; free baselines and unknown unbalances, velocities, accelerations, masses."""
+    runs = Runs(speeds=tuple(np.linspace(120.0, 480.0, 7)), **more)
+    truth = with_parameters(rotor, values)
+    readings = truth_of(runs, values).readings(truth)
+    data = runs.data(np.stack((readings, readings)), errors=ERRORS)  # repeats
+    found = calibrate(rotor, off(rotor, values), [data])
+    assert found.found.converged
+    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
+    assert found.chi_square < 1e-6
+    if data.modelled:
+        assert found.unbalance[0] == pytest.approx(list(runs.unbalance.values()), rel=1e-6)
+
+
+def test_several_jobs_with_unbalances_of_their_own():
+    values = {"bearing[1].kxx": 4.6e7, "bearing[2].cyy": 2.4e4, "material.youngs_modulus.scale": 1.03}
+    truth = with_parameters(machine(), values)
+    first = Runs(free=False, speeds=(140.0, 300.0, 420.0))
+    second = Runs(free=False, unbalance={4: 1e-3j}, weights=((0, 0), (0, 2e-3)), speeds=(200.0, 350.0))
+    jobs = [each.data(each.readings(truth), errors=ERRORS) for each in (first, second)]
+    found = calibrate(machine(), off(machine(), values), jobs)
+    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
+    assert [u.tolist() for u in found.unbalance] == [
+        pytest.approx(list(each.unbalance.values()), rel=1e-6) for each in (first, second)
+    ]
+
+
+def test_an_unknown_bow():
+    """Without it the bent shaft pulls the numbers away, and the model does not explain its readings."""
+    values = {"bearing[1].kxx": 4.6e7, "bearing[2].cyy": 2.4e4}
+    truth, s = with_parameters(machine(), values), np.pi * np.arange(11) / 10
+    bow = 100e-6 * np.stack((np.sin(s), np.pi / 1.2 * np.cos(s)), axis=1)
+    runs = Runs(free=False, speeds=(140.0, 300.0, 420.0))
+    data = runs.data(runs.readings(truth, bow), errors=ReadingErrors(0.01, 0.01))
+    unknowns = off(machine(), values, 0.05)
+    without, found = (calibrate(machine(), unknowns, [replace(data, bow=shapes)]) for shapes in (0, 3))
+    assert not without.explained
+    assert found.explained
+    assert found.dof == without.dof - 2 * 3
+    assert abs(found.unbalance[0][2]) == pytest.approx(100e-6, rel=0.2)  # nearly the first shape
+    assert found.values == pytest.approx(list(values.values()), rel=2e-3)  # but not quite
+
+
+def jeffcott(k, c, speed, K, m):
+    """z of the disc per unbalance: mass m on a massless shaft of stiffness K, in series with two supports."""
+    held = 2 * (k + 1j * speed * c)
+    series = K * held / (K + held)
+    return speed**2 / (series - m * speed**2)
+
+
+def test_a_jeffcott_rotor_on_damped_supports():
+    """The closed form gives k and c, and their standard deviations by linear propagation."""
+    m, L, d = 30.0, 1.0, 0.05
+    E, second = 2.1e11, np.pi / 64 * d**4
+    K = 48 * E * second / L**3
+    k, c = 3e6, 4e3
+    shaft = fem.Rotor(
+        [L / 2] * 2,
+        d,
+        density=0.0,
+        discs=[fem.Disc(2, m)],
+        supports=[fem.Support(node, 2.5e6, 5e3) for node in (1, 3)],
+    )
+    w = np.sqrt(K * 2 * k / (K + 2 * k) / m)
+    runs = Runs(
+        speeds=tuple(w * np.array([0.7, 0.93, 1.02, 1.2])),
+        sensors={"x": (2, 0.0), "y": (2, 90.0)},
+        planes={"disc": (2, 1.0)},
+        weights=((0,), (1e-4,)),
+        unbalance={},
+    )
+    speeds = np.array(runs.speeds)
+    z = 1e-4 * jeffcott(k, c, speeds, K, m)
+    effect = np.stack((z, -1j * z), axis=1)  # y follows x by a quarter
+    base = 2e-5 * np.ones_like(effect)
+    floor = 1e-7
+    data = runs.data(np.stack((base, base + effect)), errors=ReadingErrors(floor=floor))
+    found = calibrate(shaft, [Unknown("bearing.stiffness"), Unknown("bearing.damping")], [data])
+    assert found.values == pytest.approx([k, c], rel=1e-6)
+
+    def by(which, h):
+        up, down = (
+            jeffcott(k * (1 + s * h * (which == 0)), c * (1 + s * h * (which == 1)), speeds, K, m)
+            for s in (1, -1)
+        )
+        return 1e-4 * (up - down) / (2 * h * (k, c)[which])
+
+    columns = np.stack([by(0, 1e-5), by(1, 1e-5)], axis=-1)
+    J = np.concatenate([part for z in (columns, -1j * columns) for part in (z.real, z.imag)])
+    covariance = 2 * floor**2 * np.linalg.inv(J.T @ J)  # a difference of two readings
+    assert found.std == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-5)
+    assert abs(found.covariance[0, 1]) < 1e-6 * found.std.prod()  # z is a function of k + iωc: orthogonal
+    assert abs(covariance[0, 1]) < 1e-6 * found.std.prod()
+    assert found.dof == 4 * 2 * 2 - 2
+
+
+def on_stiffnesses(k1, k2):
+    base = rotor23()
+    return replace(
+        base, supports=[replace(s, stiffness=k) for s, k in zip(base.supports, (k1, k2), strict=True)]
+    )
+
+
+def rounded(rotor, n=3):
+    """Critical speeds as whole rpm, with the error of their digits."""
+    frequencies = np.round(fem.critical_speeds(rotor, n).frequencies / RPM) * RPM
+    return MeasuredFrequencies(np.arange(1, n + 1), frequencies, np.full(n, RPM / np.sqrt(12)))
+
+
+def test_two_stiffnesses_from_three_rounded_critical_speeds():
+    """Both lie in their 95 % intervals as often as that says, over drawn pairs; or two pairs are told."""
+    unknowns = [Unknown(f"bearing[{i}].stiffness", start=1e8) for i in (1, 2)]
+    rng, inside = np.random.default_rng(3), []
+    for truth in [(7e7, 1.4e8), *(10 ** rng.uniform(7.6, 8.4, (9, 2)))]:
+        found = calibrate(rotor23(), unknowns, frequencies=[rounded(on_stiffnesses(*truth))])
+        assert found.found.converged
+        assert found.explained
+        z = np.array([abs(each - truth) / found.std for each in (found.values, *found.other_ends)])
+        if found.other_ends:
+            assert any(abs(each / truth - 1).max() < 0.05 for each in (found.values, *found.other_ends))
+        else:
+            assert z.max() < 4
+            inside.append(z[0] < 1.96)
+    assert inside[0].all()
+    assert len(inside) >= 7
+    assert np.mean(inside) > 0.8  # 95 % to three deviations of such a count
+
+
+def test_the_search_looks_for_another_pair_that_explains_as_well():
+    truth = 1.836e8, 1.337e8
+    unknowns = [Unknown(f"bearing[{i}].stiffness", start=1e8) for i in (1, 2)]
+    found = calibrate(rotor23(), unknowns, frequencies=[rounded(on_stiffnesses(*truth))])
+    for end in found.other_ends:  # indeed: all critical speeds as the data say
+        left = found.jacobian.shape[0], rounded(on_stiffnesses(*end))
+        data = rounded(on_stiffnesses(*truth))
+        assert abs(left[1].frequencies - data.frequencies).max() <= 1.01 * RPM
+    assert min(end[0] for end in found.other_ends) < 1.5e8
+    assert "other numbers explain the data as well: bearing[1].stiffness = 1.3" in found.warnings[0]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_ends_outside_the_bounds_are_not_told(order):
+    bounds = {1: (1.5e8, 3e8), -1: (2e7, 1.5e8)}[order]
+    unknowns = [Unknown("bearing[1].stiffness", start=1.6e8 if order > 0 else 1e8, bounds=bounds)]
+    unknowns += [Unknown("bearing[2].stiffness", start=1e8)]
+    found = calibrate(rotor23(), unknowns, frequencies=[rounded(on_stiffnesses(1.836e8, 1.337e8))])
+    assert found.other_ends == ()
+    assert bounds[0] < found.values[0] < bounds[1]
+    assert (found.values[0] > 1.7e8) == (order > 0)
+
+
+def test_natural_frequencies_and_shapes_at_rest():
+    """Stiffness and modulus from shapes too; a scale of each shape is found besides and counts."""
+    truth = with_parameters(rotor23(), {"bearing.stiffness": 9e7, "material.youngs_modulus": 2e11})
+    modes = fem.critical_speeds(truth, 3)
+    nodes = (2, 6, 11, 17, 22)
+    shapes = modes.shapes[np.array(nodes) - 1] * (1.0, -2.0, 0.5)
+    data = MeasuredFrequencies(
+        np.arange(1, 4), modes.frequencies, 1e-3 * modes.frequencies, True, nodes, shapes, 0.02
+    )
+    unknowns = [Unknown("bearing.stiffness", start=1.1e8), Unknown("material.youngs_modulus", start=1.9e11)]
+    found = calibrate(rotor23(), unknowns, frequencies=[data])
+    assert found.values == pytest.approx([9e7, 2e11], rel=1e-6)
+    assert found.dof == 3 + 3 * 5 - 3 - 2
+    rng, chi = np.random.default_rng(2), []
+    size = 0.02 * abs(shapes).max(axis=0)
+    for _ in range(25):
+        read = replace(
+            data,
+            frequencies=data.frequencies + data.std * rng.standard_normal(3),
+            shapes=shapes + size * rng.standard_normal(shapes.shape),
+        )
+        chi.append(calibrate(truth, unknowns, frequencies=[read], starts=1).chi_square)
+    assert np.mean(chi) == pytest.approx(found.dof, abs=4 * np.sqrt(2 * found.dof / 25))
+
+
+def test_chi_square_and_errors_of_simulated_readings():
+    """Noise as stated: χ² has its mean and quantile, and the numbers scatter as their deviations say."""
+    values = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy": 2.2e4, "disc[1].mass": 25.0}
+    truth = with_parameters(machine(), values)
+    runs, rng, draws = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(8), 50
+    exact = runs.readings(truth)
+    unknowns = [Unknown(path, start=value) for path, value in values.items()]
+    found = []
+    for _ in range(draws):
+        noise = 1 + ERRORS.amplitude * rng.standard_normal(exact.shape)
+        turned = np.exp(1j * ERRORS.phase * rng.standard_normal(exact.shape))
+        found.append(
+            calibrate(machine(), unknowns, [runs.data(exact * noise * turned, errors=ERRORS)], starts=1)
+        )
+    dof = 2 * 2 * 4 * 3 - 2 * 2 - 3
+    assert {each.dof for each in found} == {dof}
+    chi = np.array([each.chi_square for each in found])
+    assert chi.mean() == pytest.approx(dof, abs=4 * np.sqrt(2 * dof / draws))
+    assert np.mean(chi > chi2.ppf(0.8, dof)) == pytest.approx(0.2, abs=4 * np.sqrt(0.16 / draws))
+    z = np.array([(each.values - list(values.values())) / each.std for each in found])
+    assert z.std(axis=0) == pytest.approx(1.0, abs=4 / np.sqrt(2 * draws))
+    assert abs(z.mean(axis=0)).max() < 4 / np.sqrt(draws)
+
+
+def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
+    """Neither is given a value, nor a deviation: only the stiffness of both in series is seen."""
+    stand = fem.Pedestal(0.0, 1e8)
+    supports = [fem.Support(1, 4e7, pedestal=stand), fem.Support(11, 5e7)]
+    rotor = uniform(10, discs=[fem.Disc(5, 20.0)], supports=supports)
+    runs = Runs(speeds=(200.0,), unbalance={})
+    data = runs.data(runs.readings(rotor), errors=ERRORS)
+    unknowns = [
+        Unknown(f"bearing[1].{name}", start=start)
+        for name, start in (("stiffness", 5e7), ("pedestal_stiffness", 9e7))
+    ]
+    found = calibrate(rotor, unknowns, [data])
+    assert np.isnan(found.values).all()
+    assert np.isnan(found.std).all()
+    told = found.to_dict()["parameters"]
+    assert [told[unknown.path]["value"] for unknown in unknowns] == [None, None]
+    assert "bearing[1].stiffness" in found.not_found
+    (k, p) = found.found.estimate.solution
+    assert k * p / (k + p) == pytest.approx(4e7 * 1e8 / 1.4e8, rel=1e-5)
+    known = calibrate(rotor, [unknowns[0], replace(unknowns[1], prior=(1e8, 1e6))], [data])
+    assert known.values == pytest.approx([4e7, 1e8], rel=1e-4)
+    assert known.std[1] == pytest.approx(1e6, rel=1e-3)
+    assert known.std[0] > 1e6 * (4e7 / 1e8) ** 2  # what the pedestal leaves open, and the data's own
+    assert known.not_found == ""
+
+
+def test_what_the_sensors_do_not_see_has_no_number():
+    """A weight that acts in x alone on supports that couple nothing: y is not moved."""
+    rotor = uniform(10, supports=[fem.Support(n, ((4e7, 0.0), (0.0, 6e7)), 1e3) for n in (1, 11)])
+    runs = Runs(sensors={"x": (4, 0.0)}, unbalance={})
+    data = runs.data(runs.readings(rotor), errors=ERRORS)
+    found = calibrate(rotor, [Unknown("bearing[1].kxx"), Unknown("bearing[1].kyy")], [data], starts=1)
+    assert found.values[0] == pytest.approx(4e7, rel=1e-6)
+    assert np.isnan(found.values[1])
+    assert np.isnan(found.std[1])
+
+
+def test_a_number_at_its_bound_has_no_deviation_and_says_so():
+    values = {"bearing[1].kxx": 4.7e7, "bearing[1].cxx": 2e4}
+    runs = Runs()
+    data = runs.data(runs.readings(with_parameters(machine(), values)), errors=ERRORS)
+    unknowns = [Unknown("bearing[1].kxx", bounds=(1e7, 4.5e7)), Unknown("bearing[1].cxx")]
+    found = calibrate(machine(), unknowns, [data])
+    assert found.values[0] == 4.5e7
+    assert np.isnan(found.std[0])
+    assert found.std[1] > 0
+    assert any(w.startswith("bearing[1].kxx stands at its bound") for w in found.warnings)
+
+
+def test_numbers_that_may_be_negative_are_not_stopped_at_zero():
+    """Offsets and the stiffness of a seal have either sign."""
+    seal = fem.Support(6, ((1e6, 0.0), (0.0, 1e6)), 500.0, kind="seal")
+    rotor = replace(machine(), supports=[*machine().supports, seal])
+    values = {"seal[1].kxx": -8e5, "bearing[1].kxx.offset": -5e6}
+    runs = Runs()
+    data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
+    found = calibrate(rotor, [Unknown(path) for path in values], [data])
+    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
+    assert found.found.at_bounds == ()
+
+
+def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypatch):
+    once = functools.partial(nonlinear.nonlinear_least_squares, max_iterations=1)
+    monkeypatch.setattr(sys.modules[calibrate.__module__], "nonlinear_least_squares", once)
+    monkeypatch.setattr(search, "POLISH", 0)
+    runs = Runs()
+    data = runs.data(runs.readings(machine()), errors=ERRORS)
+    far = [Unknown("bearing[1].kxx", start=1e7), Unknown("bearing[2].kyy", start=1e8)]
+    found = calibrate(machine(), far, [data], starts=1)
+    assert not found.found.converged
+    assert np.isnan(found.std).all()
+    assert found.warnings[0].startswith("not converged after 1 evaluation")
+    assert found.not_found == found.warnings[0]
+    assert found.rotor.calibration.needs_trial_run
+
+
+def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
+    """Readings of a rotor with another modulus: χ² is too large, by speed and sensor, too."""
+    truth = with_parameters(machine(), {"material.youngs_modulus.scale": 0.7})
+    runs = Runs()
+    tight = ReadingErrors(0.002, 0.002)
+    data = runs.data(runs.readings(truth), errors=tight)
+    found = calibrate(machine(), [Unknown("bearing[1].kxx")], [data])
+    honest = calibrate(truth, [Unknown("bearing[1].kxx")], [data])
+    assert not found.explained
+    assert honest.explained
+    assert found.rotor.calibration.needs_trial_run
+    assert found.rotor.calibration.lack_of_fit.shape == (3, 4)
+    assert found.std[0] > 3 * honest.std[0]
+    assert found.std[0] ** 2 == pytest.approx(
+        found.found.estimate.solution_covariance[0, 0] * found.chi_square / found.dof
+    )
+
+
+@pytest.mark.parametrize(
+    ("paths", "said"),
+    [
+        (("bearing[1].kxx", "bearing[DE].kxx"), "are the same number"),
+        (("bearing[1].kxx", "bearing.kxx"), "are the same number"),
+        (("bearing[1].kxx", "bearing[1].stiffness.scale"), "are the same number"),
+        (("bearing[1].kxx", "bearing[1].kxx.offset"), "are the same number"),
+        (("disc[1].mass", "disc[1].scale"), "are the same number"),
+        (("bearing[1].kxx.scale", "bearing.kxx.offset"), "adds to more numbers than bearing[1].kxx.scale"),
+        (("bearing[9].kxx",), "of 2 bearings none is called '9'"),
+        (("probe[z].angle",), "no data have readings of probe[z].angle"),
+        ((), "needs data and at least one unknown number"),
+    ],
+)
+def test_numbers_that_cannot_be_estimated_are_refused(paths, said):
+    runs = Runs()
+    data = runs.data(runs.readings(machine()), errors=ERRORS)
+    with pytest.raises(ValueError) as error:
+        calibrate(machine(), [Unknown(path) for path in paths], [data])
+    assert said in str(error.value)
+
+
+def test_covariance_stands_as_the_rotor_does():
+    """Of a scale and a slope of the same coefficient: of changes from where both now stand."""
+    values = {"bearing[1].kyy.scale": 1.25, "bearing[1].kyy.slope": 2e4}
+    truth = with_parameters(machine(), values)
+    runs = Runs(speeds=(150.0, 250.0, 400.0))
+    data = runs.data(runs.readings(truth), errors=ERRORS)
+    found = calibrate(machine(), [Unknown(p, start=v) for p, v in values.items()], [data], starts=1)
+    # the same data about the rotor that was found: its own numbers err as these say
+    again = calibrate(found.rotor, [Unknown(path) for path in values], [data], starts=1)
+    assert found.rotor.calibration.covariance == pytest.approx(again.covariance, rel=1e-4)
+    assert found.covariance != pytest.approx(again.covariance, rel=1e-2)
