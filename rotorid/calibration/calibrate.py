@@ -17,16 +17,15 @@ from fem.model.calibration import Calibration, is_reading
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import as_they_stand, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.calibration.calibrated_rotor import CalibratedRotor
+from rotorid.calibration.calibrated_rotor import LEVEL, CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
+from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
 from rotorid.calibration.unknowns import Unknown
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from
 
-LEVEL = 0.01
-"""Probability of a χ² as large, below which the model does not explain the data."""
 SPREAD = 0.3
 """Relative spread of starting values without a prior."""
 LIMIT = 40
@@ -75,9 +74,12 @@ class _Equations:
     known = 0
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
-        values = self.values(theta)
-        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, self.paths)) for rows in self.rows]
-        parts += [data.jacobian(self.rotor, values, self.paths) for data in self.frequencies]
+        return self.by(self.paths, self.values(theta))
+
+    def by(self, paths: Sequence[str], values: dict[str, float]) -> FloatArray:
+        """Derivatives by any numbers that have values."""
+        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, paths)) for rows in self.rows]
+        parts += [data.jacobian(self.rotor, values, paths) for data in self.frequencies]
         return np.vstack(parts)
 
 
@@ -87,6 +89,7 @@ def calibrate(
     readings: Sequence[RunReadings] = (),
     frequencies: Sequence[MeasuredFrequencies] = (),
     *,
+    held: Sequence[Unknown] = (),
     starts: int = 3,
     seed: int = 0,
 ) -> CalibratedRotor:
@@ -100,6 +103,9 @@ def calibrate(
         Its n unknown numbers.
     readings, frequencies
         The data, of any mixture.
+    held
+        Numbers that are taken as they stand, with priors of what they might be off by: the data are asked
+        whether they contradict that.
     starts
         Searches: from the starting values, and from others drawn by priors (or 30 % of the value).
     seed
@@ -142,7 +148,7 @@ def calibrate(
     found = solve(begin)
     equations.weigh(found.estimate.solution)
     found = solve(found.estimate.solution, near=True)
-    return _judged(equations, unknowns, prior, found, others)
+    return _judged(equations, unknowns, prior, held, found, others)
 
 
 def _best_start(
@@ -172,6 +178,7 @@ def _judged(
     equations: _Equations,
     unknowns: Sequence[Unknown],
     prior: Prior,
+    held: Sequence[Unknown],
     found: NonlinearEstimate,
     others: Sequence[tuple[float, FloatArray]],
 ) -> CalibratedRotor:
@@ -184,11 +191,12 @@ def _judged(
     chi_square = float(r @ r + np.sum(prior.residual(theta) ** 2))
     dof = r.size + len(prior) - 2 * sum(u.size for u in unbalance) - found.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
-    misfit = chance < LEVEL
+    tested = _tested(equations, prior, held, theta, K, r) if held else None
+    misfit = chance < LEVEL or (tested is not None and tested.chance < LEVEL)
     covariance = found.estimate.solution_covariance
     covariance = np.zeros((theta.size,) * 2) if covariance is None else np.nan_to_num(covariance)
     if misfit:
-        covariance = covariance * chi_square / dof
+        covariance = covariance * max(chi_square / dof, 1.0)
     values = equations.values(theta)
     lack = _lack_of_fit(equations, theta) if misfit else {}
     speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
@@ -218,11 +226,29 @@ def _judged(
         chi_square=chi_square,
         dof=dof,
         chance=chance,
+        held=tested,
         unbalance=tuple(unbalance),
         readings=tuple(equations.readings),
         stated=all(rows.stated for rows in equations.rows),
         other_ends=tuple(apart),
     )
+
+
+def _tested(
+    equations: _Equations,
+    prior: Prior,
+    held: Sequence[Unknown],
+    theta: FloatArray,
+    K: FloatArray,
+    r: FloatArray,
+) -> HeldNumbers:
+    """Whether data and priors contradict what is held."""
+    known = [(number.path, *number.prior) for number in held if number.prior]
+    values = equations.values(theta) | {path: value for path, value, _ in known}
+    H = equations.by([path for path, *_ in known], values) * np.array([std for *_, std in known])
+    H = np.vstack((H, np.zeros((len(prior), len(known)))))
+    names = [number.label for number in held if number.prior]
+    return held_numbers(names, prior.below(K), H, np.append(r, prior.residual(theta)))
 
 
 def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, str], float]:
