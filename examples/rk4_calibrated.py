@@ -28,7 +28,8 @@ from rk4 import BARE, FEW, FOLDER, estimated, lines, of
 
 JOBS = {1206: ("few.toml", "job.toml"), 1005: ("few_1005.toml", "job_1004.toml")}
 BOTH = (1206, 1005)
-BEARINGS = {480: (3, 27), 520: (2, 28), 560: (1, 29)}
+BEARINGS = {480: (3, 27), 520: (2, 28), 560: (1, 29)}  # mm between them, nodes
+BELIEVED = ((480, 1e6), (480, 7e4), (520, 1e6), (560, 2e5), (560, 1e6))  # mm, N/m
 PROBES = ("p1x", "p1y", "p2x", "p2y")
 OF = ("disk_1", "disk_2", "sum")
 ESTIMATE = (
@@ -43,7 +44,7 @@ PRIOR = (
 
 def main() -> dict[str, float]:
     """Print what the trial runs say of the rotor, and how well it estimates weights; return key numbers."""
-    rotors = {BOTH: spans()[560], **{(rpm,): calibration((rpm,)).rotor for rpm in BOTH}}
+    rotors = {BOTH: beliefs()[560, 1e6], **{(rpm,): calibration((rpm,)).rotor for rpm in BOTH}}
     for rpm in BOTH:
         print(f"\nWeights at {rpm} rpm by the calibrated rotor (error, half the longest axis of its region):")
         coefficients = known(rpm, "computed", rotors[BOTH])
@@ -60,26 +61,28 @@ def main() -> dict[str, float]:
     return numbers
 
 
-def spans() -> dict[int, fem.Rotor]:
-    """Print what the runs at both speeds say of the distance between the bearings; return the rotors."""
+def beliefs() -> dict[tuple[float, float], fem.Rotor]:
+    """Print what the runs at both speeds say of other distances and stiffnesses; return the rotors."""
     rotors = {}
-    print("Bearings    χ² (dof)    critical speeds     gains of", ", ".join(PROBES))
-    for span, nodes in BEARINGS.items():
-        found = calibration(BOTH, nodes)
-        rotors[span] = found.rotor
+    print("Bearings           χ² (dof)    critical speeds     gains of", ", ".join(PROBES))
+    for span, stiffness in BELIEVED:
+        found = calibration(BOTH, span, stiffness)
+        rotors[span, stiffness] = found.rotor
         first, second = fem.critical_speeds(found.rotor, 2).frequencies * 30 / np.pi
         values = dict(zip(found.names, found.values, strict=True))
         gains = ", ".join(f"{values[f'probe[{name}].gain']:.2f}" for name in PROBES)
         verdict = "" if found.explained else "  contradicted by the runs"
         critical = f"{first:.0f} and {second:.0f} rpm"
-        print(f"  {span} mm  {found.chi_square:5.1f} ({found.dof})  {critical}  {gains}{verdict}")
+        fit = f"{found.chi_square:.1f} ({found.dof})"
+        print(f"  {span} mm, {stiffness:.0e} N/m  {fit}  {critical}  {gains}{verdict}")
     return rotors
 
 
-def calibration(speeds: Sequence[int], nodes: Sequence[int] = BEARINGS[560]) -> CalibratedRotor:
-    """The rotor of the sample with bearings at these nodes, calibrated by the trial runs at these speeds."""
+def calibration(speeds: Sequence[int], span: int = 560, stiffness: float = 1e6) -> CalibratedRotor:
+    """The rotor of the sample with bearings believed to be so, calibrated at these speeds."""
     start = read_rotor(FOLDER / "rotor.toml")
-    start = replace(start, supports=[replace(s, node=n) for s, n in zip(start.supports, nodes, strict=True)])
+    bearings = zip(start.supports, BEARINGS[span], strict=True)
+    start = replace(start, supports=[replace(s, node=node, stiffness=stiffness) for s, node in bearings])
     files = [FOLDER / JOBS[rpm][0] for rpm in speeds]
     return calibrate(start, files, CalibrateOptions(estimate=ESTIMATE, prior=PRIOR)).found
 

@@ -21,6 +21,7 @@ _USUAL = 3  # critical speeds, where nothing else is asked for
 _FEW, _MANY = 4, 32  # looked for at first; over tables all are found at once, however many are asked for
 _NAMED = 5  # critical speeds beyond the end of a list that are named
 _SECANTS, _SAME = 12, 1e-12  # steps that follow a critical speed, and a step that is none
+NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
 _SLOW = 1e-6  # of the last speed of the tables: no motion of a rotor is slower, but as a rigid body
 
 
@@ -185,8 +186,7 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
     if below:
         warnings += (
             f"at {first:.6g} rad/s, where the bearing tables begin, the lowest natural frequency is only "
-            f"{np.sqrt(search.at(first).squares[0]):.6g} rad/s: critical speeds below the tables are not "
-            "known, nor counted",
+            f"{np.sqrt(search.at(first).squares[0]):.6g} rad/s: {NOT_COUNTED}",
         )
     result = []
     for speed, k in found[:n]:

@@ -21,7 +21,7 @@ from rotorid.calibration.calibrated_rotor import LEVEL, CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
-from rotorid.calibration.unknowns import Unknown
+from rotorid.calibration.unknowns import Unknown, check_different
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from
@@ -30,8 +30,10 @@ SPREAD = 0.3
 """Relative spread of starting values without a prior."""
 LIMIT = 40
 """Evaluations of a search from one of several starts."""
-SAME = 0.1
-"""Standard deviations within which two ends of searches are one."""
+SAME = 1e-3
+"""Relative, besides three standard deviations: nearer ends of searches are one."""
+AS_WELL = 4.0
+"""Of χ²: other numbers that explain the data so nearly as well are told."""
 
 
 class _Equations:
@@ -47,6 +49,7 @@ class _Equations:
         self.rotor, self.readings, self.frequencies = rotor, readings, frequencies
         self.paths = [unknown.path for unknown in unknowns]
         self.rows: list[ReadingRows] = []
+        self.last: dict[int, tuple[FloatArray, ComplexArray]] = {}
 
     def values(self, theta: FloatArray) -> dict[str, float]:
         return dict(zip(self.paths, theta.tolist(), strict=True))
@@ -56,7 +59,12 @@ class _Equations:
         self.rows = [data.rows(self.coefficients(data, theta)) for data in self.readings]
 
     def coefficients(self, data: RunReadings, theta: FloatArray) -> ComplexArray:
-        return data.coefficients(self.rotor, self.values(theta))[0]
+        """Of these readings at these numbers; a search asks for the last ones again."""
+        at, W = self.last.get(id(data), (None, None))
+        if at is None or W is None or not np.array_equal(at, theta):
+            W = data.coefficients(self.rotor, self.values(theta))[0]
+            self.last[id(data)] = theta.copy(), W
+        return W
 
     def residual(self, theta: FloatArray) -> FloatArray:
         values = self.values(theta)
@@ -123,11 +131,14 @@ def calibrate(
         probes = [f"probe[{sensor}].{what}" for sensor in sensors for what in ("angle", "gain")]
         if path not in (*probes, "key_phasor.angle") or not readings:
             raise ValueError(f"no data have readings of {path}: {', '.join(probes) or 'there are no runs'}")
+    check_different(rotor, [unknown.path for unknown in unknowns])
     equations = _Equations(rotor, unknowns, readings, frequencies)
     names = tuple(unknown.label for unknown in unknowns)
     first = np.array([unknown.first(rotor) for unknown in unknowns])
     known = {unknown.label: unknown.prior for unknown in unknowns if unknown.prior}
     prior = prior_rows(names, known)
+    for modes in frequencies:
+        modes.check(rotor, equations.values(first), equations.paths)
     equations.weigh(first)
     equations.residual(first)
     begin, others = _best_start(equations, unknowns, prior, first, starts, seed)
@@ -158,20 +169,24 @@ def _best_start(
     first: FloatArray,
     starts: int,
     seed: int,
-) -> tuple[FloatArray, list[tuple[float, FloatArray]]]:
-    """Where the lowest of several short searches ends, and the ends (half χ², θ) of all."""
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Where the lowest of several short searches ends, and the ends of all that stay inside the bounds."""
     random = np.random.default_rng(seed)
     residual, jacobian = prior.beside(equations.residual, equations.jacobian)
     spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
     spread = np.where(spread > 0, spread, SPREAD * np.abs(first))
+    limits = np.array([unknown.limits(equations.rotor) for unknown in unknowns], dtype=float)
+    lower, upper = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
     ends = []
     for k in range(starts):
         begin = first + (spread * random.uniform(-1.0, 1.0, first.size) if k else 0.0)
+        begin = np.clip(begin, lower, upper)
         if starts > 1 and np.isfinite(residual(begin)).all():
             end = search_from(residual, begin, jacobian, limit=LIMIT)
-            ends += [] if end is None else [end]
+            inside = end is not None and (lower <= end[1]).all() and (end[1] <= upper).all()
+            ends += [end] if end is not None and inside else []
     ends.sort(key=lambda end: end[0])
-    return (ends[0][1] if ends else first), ends
+    return (ends[0][1] if ends else first), [end for _, end in ends]
 
 
 def _judged(
@@ -180,7 +195,7 @@ def _judged(
     prior: Prior,
     held: Sequence[Unknown],
     found: NonlinearEstimate,
-    others: Sequence[tuple[float, FloatArray]],
+    others: Sequence[FloatArray],
 ) -> CalibratedRotor:
     """The rotor with these numbers, and whether the model explains the data."""
     from scipy.special import chdtrc
@@ -188,8 +203,13 @@ def _judged(
     theta = found.estimate.solution
     K, r = equations.jacobian(theta), equations.residual(theta)
     unbalance = [rows.residual(equations.coefficients(rows.data, theta))[2] for rows in equations.rows]
-    chi_square = float(r @ r + np.sum(prior.residual(theta) ** 2))
-    dof = r.size + len(prior) - 2 * sum(u.size for u in unbalance) - found.estimate.rank
+
+    def mismatch(theta: FloatArray) -> float:
+        return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))
+
+    chi_square = mismatch(theta)
+    besides = 2 * sum(u.size for u in unbalance) + sum(modes.scales for modes in equations.frequencies)
+    dof = r.size + len(prior) - besides - found.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
     tested = _tested(equations, prior, held, theta, K, r) if held else None
     misfit = chance < LEVEL or (tested is not None and tested.chance < LEVEL)
@@ -198,9 +218,9 @@ def _judged(
     if misfit:
         covariance = covariance * max(chi_square / dof, 1.0)
     values = equations.values(theta)
+    to = as_they_stand(equations.rotor, values)
     lack = _lack_of_fit(equations, theta) if misfit else {}
     speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
-    to = as_they_stand(equations.rotor, values)
     calibration = Calibration(
         names=tuple(equations.paths),
         values=theta,
@@ -210,11 +230,12 @@ def _judged(
         lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),
         needs_trial_run=misfit or not found.converged,
     )
-    std = np.sqrt(np.diag(covariance))
+    known = ~np.isnan(found.values)
+    same = 3 * np.sqrt(np.diag(covariance)) + SAME * np.abs(theta)
     apart = [
         end
-        for cost, end in others
-        if 2 * cost < chi_square + 4 and (np.abs(end - theta) > 1 + SAME * std + 3 * std).any()
+        for end in others
+        if (np.abs(end - theta) > same)[known].any() and mismatch(end) < chi_square + AS_WELL
     ]
     return CalibratedRotor(
         rotor=replace(with_parameters(equations.rotor, values), calibration=calibration),

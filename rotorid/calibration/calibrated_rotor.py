@@ -107,6 +107,13 @@ class CalibratedRotor(Answered):
         """Whether the model explains the data within their errors."""
         return not (self.rotor.calibration and self.rotor.calibration.needs_trial_run)
 
+    @property
+    def not_found(self) -> str:
+        """Why no rotor has these numbers, in words, or nothing."""
+        if not self.found.converged:
+            return self.found.message
+        return "" if self.found.estimate.full_rank else self.found.estimate.describe_rank()
+
     @cached_property
     def seen(self) -> str:
         """Of wished numbers that the data do not tell apart, the combinations that they do tell, in words."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.critical import lowest_critical_speeds
+from fem.critical import NOT_COUNTED, critical_speeds_near, lowest_critical_speeds
 from fem.matrices.undamped_matrices import static_stiffness
+from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import typical_size, with_parameters
 from fem.model.supports import Pedestal, Support
@@ -53,6 +54,29 @@ class MeasuredFrequencies:
         """What they are."""
         return "natural frequencies at rest" if self.rest else "critical speeds"
 
+    @property
+    def scales(self) -> int:
+        """How many scales of shapes are found besides."""
+        return len(self.modes) if self.nodes else 0
+
+    def check(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> None:
+        """Refuse numbers that change which critical speeds are listed.
+
+        Raises
+        ------
+        ValueError
+            For supports that are alike in x and y, and would not be with another number.
+        """
+        if self.rest or not with_parameters(start, values).symmetric:
+            return
+        for path in paths:
+            if not all(rotor.symmetric for _, rotor in _beside(start, values, path)):
+                raise ValueError(
+                    f"{path} alone makes supports differ in x and y: then backward critical speeds count, "
+                    "too, and the numbers of modes are others; estimate what keeps them alike (as "
+                    "bearing[1].stiffness does), or write the rotor file with supports that differ"
+                )
+
     def residual(self, start: Rotor, values: Mapping[str, float]) -> FloatArray:
         """Computed less measured, in standard deviations: frequencies, then shapes, each in its best scale.
 
@@ -61,6 +85,8 @@ class MeasuredFrequencies:
         rotor = with_parameters(start, values)
         most = int(self.modes.max())
         found = lowest_critical_speeds(at_rest(rotor) if self.rest else rotor, most)
+        if below := next((said for said in found.warnings if NOT_COUNTED in said), ""):
+            raise ValueError(f"{below}: extend the tables")
         moving = np.flatnonzero(found.frequencies > 0)
         if moving.size < most:
             last = rpm_text(float(found.frequencies[-1]))
@@ -75,25 +101,35 @@ class MeasuredFrequencies:
         return np.concatenate(left)
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
-        """Derivatives (rows, n) by the numbers; on one side only, where the other is no rotor.
-
-        ValueError where neither is.
-        """
-        rotor, here = with_parameters(start, values), self.residual(start, values)
+        """Derivatives (rows, n) by the numbers; frequencies over tables are followed, not searched again."""
+        rotor = with_parameters(start, values)
+        follow = not (self.rest or self.nodes or rotor.constant)
+        here = self.residual(start, values) * self.std + self.frequencies if follow else None
         columns = []
         for path in paths:
-            step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
-            ends = []
-            for side in (step, -step):
-                try:
-                    ends.append((side, self.residual(start, {**values, path: values[path] + side})))
-                except ValueError:
-                    ends.append((0.0, here))
-            (above, up), (below, down) = ends
-            if above == below:
-                raise ValueError(f"the rotor can have no other {path}, neither larger nor smaller")
-            columns.append((up - down) / (above - below))
+            if is_reading(path):
+                columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
+                continue
+            (up, one), (down, other) = _beside(start, values, path)
+            if here is None:
+                change = self.residual(one, {}) - self.residual(other, {})
+            else:
+                change = (critical_speeds_near(one, here) - critical_speeds_near(other, here)) / self.std
+            columns.append(change / ((up - down) or 1.0))
         return np.stack(columns, axis=1)
+
+
+def _beside(start: Rotor, values: Mapping[str, float], path: str) -> list[tuple[float, Rotor]]:
+    """The rotor with a little more and a little less of a number; as it is on a side where there is none."""
+    found = []
+    rotors = (start, with_parameters(start, values))
+    step = STEP * max(typical_size(rotor, path) for rotor in rotors)  # a number near 0, too
+    for value in (values[path] + step, values[path] - step):
+        try:
+            found.append((value, with_parameters(start, {**values, path: value})))
+        except ValueError:
+            found.append((values[path], with_parameters(start, values)))
+    return found
 
 
 def at_rest(rotor: Rotor) -> Rotor:

@@ -10,7 +10,7 @@ gradient is exact). Rows are divided by the root of the joint covariance of read
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from balancing.data.reading_errors import error_model, mean_covariance
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from fem.matrices.banded_matrices import assemble, multiply
+from fem.matrices.support_dynamic_stiffness import supported
 from fem.matrices.undamped_matrices import one_plane
 from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
@@ -30,10 +31,11 @@ from fem.model.rotor_parameters import (
     with_parameters,
 )
 from fem.model.sensors import Sensor
-from fem.solvers.eigen import lowest_modes
+from fem.solvers.eigen import finite_modes, lowest_modes
 from fem.solvers.receptance import unit_loads
 from fem.solvers.receptance_derivatives import MatrixChange, matrix_change, receptance_with_derivatives
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import counted
 from rotorid.regression import solution, stretch
 
 STEP = 1e-4
@@ -106,9 +108,7 @@ class RunReadings:
         at = np.array([A.deflection(node) for node in (*self.nodes, *self.unbalance)], dtype=np.intp)
         loads = [unit_loads(A, at)]
         if self.bow:
-            free = one_plane(rotor, A, 0, {})
-            shapes = lowest_modes(rotor, A, self.bow + 2, free).vectors[:, 2:]  # without rigid motions
-            loads.append(multiply(A.shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0)))
+            loads.append(self._bow_loads(start, rotor))
 
         def change(path: str) -> MatrixChange:
             step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
@@ -142,6 +142,23 @@ class RunReadings:
                 out[k, :, c] = W[:, c] / gains[c]
         return W, out
 
+    def _bow_loads(self, start: Rotor, rotor: Rotor) -> FloatArray:
+        """Loads (size, bow) of shafts bent, at most by 1 m, as the lowest modes of the rotor at the start.
+
+        On the springs of its supports; shapes that do not change with the numbers, of the shaft alone.
+        """
+        first, now = (
+            replace(each, supports=[replace(s, tilting_stiffness=0.0) for s in each.supports])
+            for each in (start, rotor)
+        )
+        A, at = assemble(first), supported(first, self.trials.speeds)
+        pencil = one_plane(first, A, 0, dict(zip(at.nodes, at.reference.tolist(), strict=True)))
+        still = pencil.rigid.shape[1]
+        if self.bow > (most := finite_modes(pencil) - still):
+            raise ValueError(f"the shaft has {counted(most, 'shape')} of a bow, not {self.bow}")
+        shapes = lowest_modes(first, A, self.bow + still, pencil).vectors[:, still:]
+        return multiply(assemble(now).shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0))
+
     def rows(self, W: ComplexArray) -> ReadingRows:
         """The rows with their errors, which coefficients W (S, C, P + q) of about this size tell."""
         trials, P = self.trials, len(self.nodes)
@@ -159,7 +176,8 @@ class RunReadings:
         # a column of a run stands in all rows that the run is part of
         common = np.einsum("xr,krmsc->krmsxc", take, columns.common).reshape(2, -1, S, n)
         white, _ = whitening(own, real_columns(common[1]), real_columns(common[0]))
-        return ReadingRows(self, take, white, np.einsum("sii->si", own), model.source != "assumed")
+        stated = "assumed" not in (model.source, run.origin)
+        return ReadingRows(self, take, white, np.einsum("sii->si", own), stated)
 
 
 def run_errors(trials: Trials, runs: Runs) -> RunErrors:
@@ -210,13 +228,13 @@ class ReadingRows:
 
     def jacobian(self, W: ComplexArray, dW: ComplexArray) -> FloatArray:
         """Derivatives (m, n) of the residuals by n numbers, dW (n, S, C, P + q)."""
-        _, basis, u = self.residual(W)
         change = self.effect(dW)
-        if u.size:
+        if self.data.modelled:
+            _, basis, u = self.residual(W)
             bare = np.einsum("nscq,q->nsc", dW[..., len(self.data.nodes) :], u)
             change = change + bare[:, :, None, :] * self.take.sum(axis=1)[:, None]
         J = self._white(np.moveaxis(change, 0, -1))
-        return J - basis @ solution(basis, J) if u.size else J
+        return J - basis @ solution(basis, J) if self.data.modelled else J
 
     def _project(self, W: ComplexArray, r: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
         if not self.data.modelled:

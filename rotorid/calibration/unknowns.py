@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import parameter_value
+from fem.model.rotor_parameters import numbers_of, parameter_value
 
-_SIGNED = ("kxy", "kyx", "cxy", "cyx", "slope", "curve", "angle")
+_SIGNED = ("kxy", "kyx", "cxy", "cyx", "offset", "slope", "curve", "angle")
 """Last words of paths of numbers that may have either sign."""
+_CHANGES = (".scale", ".offset", ".slope", ".curve")
 _ABOVE_ZERO = ("youngs_modulus", "density", "pedestal_stiffness")
 LEAST = 1e-3
 """Of its value: the lower bound of what must be above zero."""
@@ -61,7 +63,26 @@ class Unknown:
             return self.bounds
         words = self.path.split(".")
         value = parameter_value(rotor, self.path)
-        if is_reading(self.path) or words[-1] in _SIGNED or value < 0:
+        signed = words[-1] in _SIGNED or (words[0].startswith("seal") and words[-1] != "scale")
+        if is_reading(self.path) or signed or value < 0:
             return None, None
         positive = words[-1] == "scale" or words[-1].startswith(_ABOVE_ZERO)
         return (LEAST * value if positive and np.isfinite(value) else 0.0), None
+
+
+def check_different(rotor: Rotor, paths: Sequence[str]) -> None:
+    """Refuse paths that mean the same number of a rotor.
+
+    Raises
+    ------
+    ValueError
+        For a value that is asked for beside itself, its scale or its offset, and a change asked for twice.
+    """
+    numbers = [numbers_of(rotor, path) for path in paths]
+    ways = [path.rpartition(".")[2] if path.endswith(_CHANGES) else "" for path in paths]
+    for k, path in enumerate(paths):
+        for i in range(k):
+            how = {ways[i], ways[k]}
+            value = "" in how and how <= {"", "scale", "offset"}
+            if numbers[i] & numbers[k] and (value or (len(how) == 1 and numbers[i] == numbers[k])):
+                raise ValueError(f"{paths[i]} and {path} are the same number of the rotor: estimate one")

@@ -250,7 +250,7 @@ def test_the_page_of_the_calibrated_rig_shows_what_its_example_prints(ran):
     _, text, _ = ran("rk4_calibrated")
     page = blocks(FOLDER.parent / "docs" / "rk4_calibrated.md")
     shown = [block.text for block in page if block.kind == "{code-block} text" and not block.caption]
-    assert [len(part.splitlines()) for part in shown] == [4, 27]
+    assert [len(part.splitlines()) for part in shown] == [6, 27]
     assert first_difference("...\n".join(shown).splitlines(), text) is None
 
 

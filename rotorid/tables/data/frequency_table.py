@@ -18,6 +18,7 @@ from rotorid.tables.reader.units import one_of, ratio
 
 FREQUENCY_ERROR, SHAPE_ERROR = 0.005, 0.05
 """Assumed, relative, of a table of modes that states none."""
+MOST_MODES = 1000
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": units.Unit("percent", "ratio", 1.0, 100.0)})
 COLUMNS = (
@@ -68,7 +69,8 @@ def read_frequencies(path: Path, rotor: Rotor) -> FrequencyTable:
         "one column critical_speed_rpm (or another unit) or natural_frequency_Hz",
     )
     number = table.numbers("mode")
-    table.must_be("mode", (number >= 1) & (number == np.floor(number)), "a mode number: 1, 2, …")
+    whole = (number >= 1) & (number <= MOST_MODES) & (number == np.floor(number))
+    table.must_be("mode", whole, "a mode number: 1, 2, …")
     table.once("mode", table.numbers("mode").tolist(), "another mode than in row {}")
     table.must_be("std", table.numbers("std") > 0, "a standard deviation above 0 percent")
     if stem is not None:
@@ -78,13 +80,21 @@ def read_frequencies(path: Path, rotor: Rotor) -> FrequencyTable:
     values = table.numbers(stem)
     std = values * table.numbers("std") if "std" in table else table.steps(stem) / np.sqrt(12.0)
     rest = stem == "natural_frequency"
-    return FrequencyTable(MeasuredFrequencies(number.astype(np.int64), values, std, rest))
+    counted = "modes count the forward critical speeds, as of any rotor on supports alike in x and y"
+    said = (counted,) if rotor.symmetric and not rest else ()
+    return FrequencyTable(MeasuredFrequencies(number.astype(np.int64), values, std, rest), said)
 
 
 def _modes(path: Path, rotor: Rotor) -> FrequencyTable:
     modes = read_modes(path, rotor)
     assumed = []
     relative, spread = modes.frequency_std, SHAPE_ERROR
+    for name, std in (("frequency", relative), ("shape", modes.shape_std)):
+        if std is not None and not std.all():
+            problems = Problems()
+            expected = "standard deviations above 0: nothing is measured exactly"
+            problems.add(path.name, None, f"{name}_std_percent", None, expected)
+            problems.stop()
     if relative is None:
         relative = np.full(modes.frequencies.size, FREQUENCY_ERROR)
         assumed.append(f"{100 * FREQUENCY_ERROR:g} % of each frequency is assumed as its standard deviation")

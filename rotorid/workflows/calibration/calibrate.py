@@ -85,7 +85,7 @@ class Calibrated(Found):
         Raises
         ------
         ValueError
-            For a rotor file of a design.
+            For a rotor file of a design, or of numbers that were not found.
         """
         from rotorid.tables.reader.table_writing import table_bytes
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
@@ -94,6 +94,8 @@ class Calibrated(Found):
             return {path: table_bytes(path, self.to_frame())}
         if not hasattr(self.found, "rotor"):
             raise ValueError(f"{path}: --design finds no rotor; a table of the runs is .csv or .xlsx")
+        if why := self.found.not_found:
+            raise ValueError(f"{path}: no rotor file can be written, {why}")
         return rotor_file_bytes(path, self.found.rotor)
 
     def figure(self) -> Figure:
@@ -137,6 +139,8 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
     )
     if options.bow < 0 or options.starts < 1:
         raise ValueError("--bow takes a number from 0, --starts one from 1")
+    if options.bow and not own:
+        raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     readings, frequencies, read, assumed = read_data(
         [file_of(file, "data") for file in given],
         model,

@@ -41,7 +41,10 @@ def read_data(
     for file in files:
         if is_job(file):
             job = read_job(file)
-            readings.append(run_readings(job, rotor, unbalance, bow, candidates=candidates))
+            try:
+                readings.append(run_readings(job, rotor, unbalance, bow, candidates=candidates))
+            except ValueError as error:
+                raise ValueError(f"{file.name}: {error}") from None
             read += job.files
         else:
             found = read_frequencies(file, rotor)

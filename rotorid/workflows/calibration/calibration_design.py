@@ -31,6 +31,8 @@ TWO_READINGS = 3.0
 """Variance of the difference of two readings of that size, in variances of one."""
 FLOOR = 0.05
 """Of a weight's effect, root mean square over the sensors: the least that a sensor's error is relative to."""
+ASSUMED = 0.03
+"""Relative error of a reading where none is stated."""
 VAGUE = 1e3
 """Standard deviation of a number of which nothing is known, in its own size."""
 
@@ -121,7 +123,8 @@ def design(
     W, dW = runs.coefficients(rotor, values, paths)
     S, C, P = W.shape
     errors = runs.trials.errors
-    relative = 0.03 if errors is None else float(np.hypot(errors.amplitude, errors.phase) / np.sqrt(2))
+    relative = 0.0 if errors is None else float(np.hypot(errors.amplitude, errors.phase) / np.sqrt(2))
+    relative = relative or ASSUMED
     if runs.trials.run_errors is not None:
         relative = float(np.hypot(relative, runs.trials.run_errors.relative))
     size = np.abs(W) ** 2

@@ -17,7 +17,7 @@ import numpy as np
 from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
 from balancing.coefficients.run_errors import runs_of
 from balancing.data.trials import ReadingErrors, Trials
-from fem.model.rotor_parameters import parameter_value
+from fem.model.rotor_parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
 from rotorid.calibration.run_readings import run_errors
 from rotorid.workflows.result_provenance import hash_of
@@ -97,16 +97,15 @@ def _values(rotor: Rotor) -> Mapping[str, float]:
     """The calibrated numbers as they stand."""
     assert rotor.calibration is not None
     angles = dict(rotor.calibration.readings)
-    return {
-        path: angles[path] if path in angles else parameter_value(rotor, path)
-        for path in dict.fromkeys((*rotor.calibration.names, *angles))
-    }
+    paths = dict.fromkeys(as_change(rotor, path) for path in (*rotor.calibration.names, *angles))
+    return {path: angles[path] if path in angles else parameter_value(rotor, path) for path in paths}
 
 
 def _derivatives(runs: RunReadings, rotor: Rotor) -> tuple[ComplexArray, ComplexArray]:
     """Coefficients and their derivatives by the calibrated numbers that act on these sensors."""
     assert rotor.calibration is not None
-    return runs.coefficients(rotor, _values(rotor), rotor.calibration.names)
+    names = [as_change(rotor, path) for path in rotor.calibration.names]
+    return runs.coefficients(rotor, _values(rotor), names)
 
 
 @dataclass(frozen=True)

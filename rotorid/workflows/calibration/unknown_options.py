@@ -10,9 +10,11 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import expand, parameter_value
+from fem.model.rotor_parameters import expand, numbers_of, parameter_value
+from rotorid.base.text import counted
 from rotorid.calibration import Unknown
-from rotorid.workflows.option_values import band, number, pairs
+from rotorid.calibration.unknowns import check_different
+from rotorid.workflows.option_values import number, pairs
 
 ENTRIES = {"kxx": (0, 0, 0), "kxy": (0, 0, 1), "kyx": (0, 1, 0), "kyy": (0, 1, 1)}
 ENTRIES |= {f"c{name[1:]}": (1, *place[1:]) for name, place in ENTRIES.items()}
@@ -25,7 +27,7 @@ KNOWN = (
 )
 """Unknown besides, with these standard deviations about what the files say."""
 _COMMA = r",(?![^\[]*\])"  # but not in brackets
-_EXAMPLE = "bearing[1].kxx=7e7+-20%"
+_EXAMPLE, _RANGE = "bearing[1].kxx=7e7+-20%", "bearing[1].kxx=1e6:1e9"
 
 
 def unknowns(
@@ -49,12 +51,21 @@ def unknowns(
     for part in parts:
         name, _, path = (piece.strip() for piece in part.rpartition("="))
         paths = list(_expanded(rotor, path, probes))
-        for each in paths:
-            found[each] = Unknown(each, name if len(paths) == 1 else "")
-    named = {part.split(".")[0] for part in found}
+        if name and len(paths) != 1:
+            raise ValueError(f"--estimate {part.strip()}: one name for {counted(len(paths), 'number')}")
+        if twice := next((each for each in paths if each in found), None):
+            raise ValueError(f"--estimate: {twice} stands twice")
+        found |= {each: Unknown(each, name) for each in paths}
+    if not found:
+        raise ValueError("--estimate: all coefficients of these supports are 0; name those that are not")
+    check_different(rotor, list(found))
+    labels = [unknown.label for unknown in found.values()]
+    if twice := next((label for label in labels if labels.count(label) > 1), None):
+        raise ValueError(f"--estimate: two numbers are called {twice}")
+    named = {number for path in found for number in numbers_of(rotor, path)}
     for pattern, std in () if exact else KNOWN:
         for path in _there(rotor, pattern, probes):
-            if path.rpartition(".")[0] not in found and (path[0] != "d" or path.split(".")[0] not in named):
+            if not numbers_of(rotor, path) & named:
                 found.setdefault(path, Unknown(path, prior=(_value(rotor, path), std), beside=True))
     _apply(rotor, found, prior, "--prior", probes)
     _apply(rotor, found, bounds, "--bounds", probes)
@@ -76,15 +87,13 @@ def _expanded(rotor: Rotor, path: str, probes: Sequence[str]) -> Iterator[str]:
         yield from expand(rotor, path, probes)
         return
     for each in expand(rotor, f"{head}.kxx", probes):
-        one = each.rpartition(".")[0]
-        kind, index = one.rstrip("]").split("[")
-        own = [support for support in rotor.supports if support.kind == kind]
-        called = [support.name for support in own]
-        support = own[called.index(index) if index in called else int(index) - 1]
-        tables = np.stack(support.at(np.array(support.speeds or (0.0,))))  # (2, rows, 2, 2)
+        own = [rotor.supports[place] for _, place, _ in numbers_of(rotor, each)]
+        tables = [np.stack(support.at(np.array(support.speeds or (0.0,)))) for support in own]
         for name, (quantity, i, j) in ENTRIES.items():
-            if tables[quantity, :, i, j].any():
-                yield f"{one}.{name}{'.scale' if support.speeds else ''}"
+            values = np.concatenate([table[quantity, :, i, j] for table in tables])
+            if values.any():
+                scaled = np.ptp(values) > 0 or any(support.speeds for support in own)
+                yield f"{each.removesuffix('kxx')}{name}{'.scale' if scaled else ''}"
 
 
 def _value(rotor: Rotor, path: str) -> float:
@@ -113,8 +122,7 @@ def _apply(
             if what == "--prior":
                 found[path] = replace(found[path], prior=_prior(str(text), value, pattern))
             else:
-                low, high = band(str(text), what) or (0.0, 0.0)
-                found[path] = replace(found[path], bounds=(low, high))
+                found[path] = replace(found[path], bounds=_bounds(str(text), pattern))
 
 
 def _prior(text: str, value: float, pattern: str) -> tuple[float, float]:
@@ -128,3 +136,12 @@ def _prior(text: str, value: float, pattern: str) -> tuple[float, float]:
     if not (np.isfinite(middle) and std > 0):
         raise ValueError(f"--prior {pattern}={text}: a standard deviation is needed, such as {_EXAMPLE}")
     return middle, std
+
+
+def _bounds(text: str, pattern: str) -> tuple[float, float]:
+    """`1e6:1e9`."""
+    low, _, high = text.partition(":")
+    ends = number(low), number(high)
+    if not ends[0] < ends[1]:
+        raise ValueError(f"--bounds {pattern}={text}: LOWEST:HIGHEST is needed, such as {_RANGE}")
+    return ends

@@ -1,0 +1,237 @@
+"""Rows of readings: what they compute against the dense rotor, their errors against one joint covariance."""
+
+from dataclasses import replace
+
+import dense_rotor
+import numpy as np
+import pytest
+from calibration_jobs import Runs, bent, machine
+from scipy.linalg import eigh
+from scipy.stats import chi2
+
+import fem
+from balancing.coefficients.run_error_estimate import given
+from balancing.coefficients.run_errors import runs_of
+from balancing.data.trials import ReadingErrors, RunScatter
+from fem.model.rotor_parameters import with_parameters
+
+ERRORS = ReadingErrors(0.02, 0.03)
+
+
+def coefficients_of(runs, rotor):
+    """(S, C, P + q) by the dense rotor, a unit in each plane and at each node."""
+    units = {f"P{k}": place for k, place in enumerate(runs.planes.values())}
+    units |= {} if runs.free else {f"u{node}": (node, 1.0) for node in runs.unbalance}
+    each = replace(runs, planes=units, weights=tuple(np.eye(len(units))), unbalance={})
+    return np.moveaxis(each.readings(rotor), 0, -1)
+
+
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+@pytest.mark.parametrize("free", [True, False])
+def test_coefficients_are_those_of_the_dense_rotor(derivative, free):
+    """Radii, the clock of the key phasor, quantities, probes that stand elsewhere and read more."""
+    runs = Runs(derivative=derivative, planes={"P": (4, 0.12), "Q": (8, 0.3)}, key_phasor=70.0, free=free)
+    data = runs.data(runs.readings(machine()), key_phasor=50.0)
+    values = {"probe[b].angle": 12.0, "probe[c].gain": 0.8, "key_phasor.angle": 20.0, "bearing[DE].kxx": 5e7}
+    truth = replace(runs, turned={"b": 12.0}, gains={"c": 0.8})
+    expected = coefficients_of(truth, with_parameters(machine(), {"bearing[DE].kxx": 5e7}))
+    W, _ = data.coefficients(machine(), values)
+    assert abs(W - expected).max() < 1e-9 * abs(expected).max()
+    for sensor in range(4):  # nor is a small one lost beside a large one
+        assert W[:, sensor] == pytest.approx(expected[:, sensor], rel=1e-8)
+
+
+def test_derivatives_are_differences_of_the_dense_rotor():
+    runs = Runs(derivative=1, planes={"P": (4, 0.12)}, weights=((0,), (1,)), free=False)
+    data, rotor = runs.data(runs.readings(machine())), machine()
+    values = {
+        "bearing[1].kxx": 4.4e7,
+        "bearing[1].kxx.slope": 2e4,
+        "bearing[2].kyy.scale": 1.2,
+        "bearing[2].pedestal_stiffness.scale": 0.9,
+        "disc[1].scale": 1.05,
+        "disc[2].mass": 17.0,
+        "material.youngs_modulus.scale": 0.98,
+        "material.density": 8100.0,
+        "probe[a].angle": 3.0,
+        "probe[b].gain": 1.1,
+        "key_phasor.angle": -4.0,
+    }
+
+    def W(at):
+        shown = replace(runs, turned={"a": at["probe[a].angle"]}, gains={"b": at["probe[b].gain"]})
+        shown.key_phasor = at["key_phasor.angle"]
+        return coefficients_of(shown, with_parameters(rotor, at))
+
+    _, found = data.coefficients(rotor, values, list(values))
+    for (path, value), own in zip(values.items(), found, strict=True):
+        h = 1e-4 * abs(value)
+        expected = (W({**values, path: value + h}) - W({**values, path: value - h})) / (2 * h)
+        assert abs(own - expected).max() < 1e-6 * abs(expected).max(), path
+
+
+def joint_covariance(data, W, sizes):
+    """Of all rows (S, x, C, real and imaginary), by loops over what each error does to each reading.
+
+    `sizes` (3, 3) of p, w, f by the kinds own, at a speed, of the run: what a run's errors go along.
+    """
+    trials, P = data.trials, len(data.nodes)
+    Y = trials.mean
+    R, S, C = Y.shape
+    e, n = trials.errors, trials.repeats
+    effect = np.einsum("scp,rp->rsc", W[..., :P], trials.weights)
+    unit = np.moveaxis(W[..., :P], -1, 0)
+    unit = unit / np.sqrt((abs(unit) ** 2).mean(axis=(1, 2)) * P)[:, None, None]
+    columns = []  # what an independent error of size 1 changes, (R, S, C)
+
+    def add(change):
+        columns.extend((change, 1j * change))
+
+    for r, s, c in np.ndindex(R, S, C):
+        here = np.zeros((R, S, C), complex)
+        here[r, s, c] = 1.0
+        columns.append(here * Y * e.amplitude / np.sqrt(n[r, s, c]))
+        columns.append(here * 1j * Y * e.phase / np.sqrt(n[r, s, c]))
+        add(here * e.floor / np.sqrt(n[r, s, c]))
+        p, w, f = sizes[:, 0]
+        for part in (p * Y, w * effect, f * np.ones(Y.shape)):
+            add(here * part)
+    for r in range(R):
+        for speeds, kind in (*(([s], 1) for s in range(S)), (list(range(S)), 2)):
+            here = np.zeros((R, S, C))
+            here[r, speeds] = 1.0
+            p, w, f = sizes[:, kind]
+            for part in (p * Y, w * effect, *(f * np.ones((R, 1, 1)) * one for one in unit)):
+                add(here * part)
+    take = np.eye(R) if data.modelled else np.hstack((-np.ones((R - 1, 1)), np.eye(R - 1)))
+    rows = np.einsum("xr,krsc->ksxc", take, np.array(columns)).reshape(len(columns), -1)
+    real = np.stack((rows.real, rows.imag), axis=-1).reshape(len(columns), -1)
+    return real.T @ real
+
+
+def noisy(runs, **trials):
+    """With readings that scatter, repeats of some, and a model beside the truth."""
+    rng = np.random.default_rng(5)
+    exact = runs.readings(machine())
+    noise = rng.standard_normal((2, 2, *exact.shape))
+    readings = exact * (1 + 0.03 * (noise[0] + 1j * noise[1]))
+    readings[1, 1:] = np.nan
+    data = runs.data(readings, errors=replace(ERRORS, floor=1e-6), **trials)
+    return data, data.coefficients(machine(), {"bearing[1].kxx": 4.3e7})[0]
+
+
+@pytest.mark.parametrize("free", [True, False])
+@pytest.mark.parametrize("scatter", [None, RunScatter(0.05, 2e-6)])
+def test_whitening_is_that_of_one_joint_covariance(free, scatter):
+    data, W = noisy(Runs(free=free), run_errors=scatter)
+    runs = runs_of(data.trials.mean, data.trials.weights, W[..., :2])
+    sizes = given([], runs, *scatter, "stated").sizes if scatter else np.zeros((3, 3))
+    C = joint_covariance(data, W, sizes)
+    rows = data.rows(W)
+    raw = rows.raw(W).ravel()
+    x = np.stack((raw.real, raw.imag), axis=-1).ravel()
+    if not free:  # the least χ² over all unbalances
+        basis = np.repeat(W[:, None, :, 2:], 3, axis=1).reshape(raw.size, -1)
+        both = np.hstack(
+            [np.stack((b.real, b.imag), axis=1).reshape(x.size, -1) for b in (basis, 1j * basis)]
+        )
+        left = np.linalg.solve(C, both)
+        x = x - both @ np.linalg.solve(both.T @ left, left.T @ x)
+    residual = rows.residual(W)[0]
+    assert residual.size == data.size == x.size
+    assert residual @ residual == pytest.approx(x @ np.linalg.solve(C, x), rel=1e-6)
+    assert rows.stated
+
+
+def test_errors_that_are_assumed_are_not_called_stated():
+    runs = Runs()
+    exact = runs.readings(machine())
+    W = coefficients_of(runs, machine())
+    assert not runs.data(exact).rows(W).stated
+    noise = 1 + 0.01 * np.random.default_rng(1).standard_normal((4, *exact.shape))
+    assert not runs.data(exact * noise).rows(W).stated  # the repeats say nothing of errors between runs
+    assert runs.data(exact * noise, errors=ERRORS).rows(W).stated
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_chi_square_of_simulated_readings(free):
+    """Of readings with the stated errors, common ones of runs included: mean and quantiles of χ²."""
+    runs, rng, draws = Runs(free=free, speeds=(150.0, 380.0)), np.random.default_rng(11), 400
+    rotor, scatter = machine(), RunScatter(0.03)
+    exact = runs.readings(rotor)
+    W = coefficients_of(runs, rotor)
+    sizes = given([], runs_of(exact, np.array(runs.weights), W[..., :2]), *scatter, "stated").sizes
+    data = runs.data(exact, errors=ReadingErrors(0.01, 0.01), run_errors=scatter)
+    white, found = data.rows(W).white, []
+
+    def noise(*shape):
+        return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+    p = sizes[0]
+    for _ in range(draws):
+        common = p[0] * noise(3, 2, 4) + p[1] * noise(3, 2, 1) + p[2] * noise(3, 1, 1)
+        Y = exact * (1 + common + 0.01 * noise(*exact.shape))
+        rows = replace(data.rows(W), data=runs.data(Y, errors=data.trials.errors), white=white)
+        found.append(float(np.sum(rows.residual(W)[0] ** 2)))
+    dof = data.size - (0 if free else 2 * len(runs.unbalance))
+    assert np.mean(found) == pytest.approx(dof, abs=4 * np.sqrt(2 * dof / draws))
+    outside = np.mean(np.array(found) > chi2.ppf(0.9, dof))
+    assert outside == pytest.approx(0.1, abs=4 * np.sqrt(0.1 * 0.9 / draws))
+
+
+def test_unbalances_of_the_bare_rotor_are_found_beside():
+    runs = Runs(free=False, weights=((0, 0),), planes={"P": (4, 1.0), "Q": (8, 1.0)})
+    data = runs.data(runs.readings(machine()), errors=ERRORS)
+    W, _ = data.coefficients(machine(), {})
+    r, _, u = data.rows(W).residual(W)
+    assert u == pytest.approx(list(runs.unbalance.values()), rel=1e-8)
+    assert abs(r).max() < 1e-6
+
+
+@pytest.mark.parametrize("tables", [False, True])
+@pytest.mark.parametrize("tilting", [0.0, 1e5])
+def test_a_bow_is_found_in_metres(tables, tilting):
+    """Of the lowest bending shape on the supports: from M and K of the dense rotor in one plane."""
+    k = 5e7
+    speeds = (0.0, 1000.0) if tables else ()
+    supports = [fem.Support(node, k, ((2e4, 0), (0, 3e4)), speeds=speeds) for node in (1, 11)]
+    rotor = replace(machine(), supports=[replace(s, tilting_stiffness=tilting) for s in supports])
+    held = dense_rotor.assemble(replace(rotor, supports=[fem.Support(node, k) for node in (1, 11)]), 0.0)
+    plane = np.sort(np.concatenate((held.x, held.x + 1)))
+    _, shapes = eigh(held.K[np.ix_(plane, plane)], held.M[np.ix_(plane, plane)])
+    bow = shapes[:, 0].reshape(-1, 2)
+    bow = bow / bow[np.argmax(abs(bow[:, 0])), 0]
+    runs = Runs(free=False)
+    data = runs.data(runs.readings(rotor, 30e-6 * bow), errors=ERRORS, bow=1)
+    W, _ = data.coefficients(rotor, {})
+    r, _, u = data.rows(W).residual(W)
+    assert u[:2] == pytest.approx(list(runs.unbalance.values()), rel=1e-6)
+    assert abs(u[2]) == pytest.approx(30e-6, rel=1e-6)
+    assert abs(r).max() < 1e-4
+    if not tilting:  # at rest it lies in its supports as it is bent
+        assert abs(bent(rotor, bow, 1e-3)[0][[0, -1]]).max() < 1e-8
+
+
+def test_the_gradient_of_the_projected_residuals_is_exact():
+    data, _ = noisy(Runs(free=False))
+    data, rotor = replace(data, bow=1), machine()
+    start = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy.scale": 1.1, "material.youngs_modulus.scale": 0.97}
+    start |= {"probe[a].angle": 2.0}
+    rows = data.rows(data.coefficients(rotor, start)[0])
+
+    def cost(values):
+        return float(np.sum(rows.residual(data.coefficients(rotor, values)[0])[0] ** 2)) / 2
+
+    W, dW = data.coefficients(rotor, start, list(start))
+    gradient = rows.jacobian(W, dW).T @ rows.residual(W)[0]
+    for (path, value), own in zip(start.items(), gradient, strict=True):
+        h = 1e-4 * abs(value)
+        expected = (cost({**start, path: value + h}) - cost({**start, path: value - h})) / (2 * h)
+        assert own == pytest.approx(expected, rel=1e-4), path
+
+
+def test_more_shapes_of_a_bow_than_the_shaft_has_are_refused():
+    runs = Runs(free=False)
+    data = runs.data(runs.readings(machine()), bow=99)
+    with pytest.raises(ValueError, match="has 22 shapes of a bow, not 99"):
+        data.coefficients(machine(), {})
