@@ -160,8 +160,11 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
         return Calibrated(found=design(model, numbers, wished, runs, options.design), provenance=told)
     if options.speeds is not None:
         raise ValueError("--speeds are candidates for --design: the data have their own")
+    paths = {number.path for number in numbers}
+    beside = unknowns(model, probes, options.estimate, "", "", exact=False) if options.exact else []
+    held = [number for number in beside if number.path not in paths]
     with phase("calibration"):
-        found = calibration.calibrate(model, numbers, readings, frequencies, starts=options.starts)
+        found = calibration.calibrate(model, numbers, readings, frequencies, held=held, starts=options.starts)
     of_rotor = {one["sha256"] for one in told["inputs"][: len(files)]}  # which jobs name, too
     made_from = [one for one in told["inputs"] if one["sha256"] not in of_rotor]
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
