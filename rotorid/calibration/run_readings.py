@@ -112,8 +112,11 @@ class RunReadings:
         if self.bow:
             loads.append(self._bow_loads(start, rotor))
 
+        def size(path: str) -> float:  # also of a number near 0
+            return max(typical_size(each, path) for each in (start, rotor))
+
         def change(path: str) -> MatrixChange:
-            step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
+            step = STEP * size(path)
             return matrix_change(lambda by: with_changes(rotor, {path: by}), 0.0, step, speeds)
 
         own = [path for path in derivatives if not is_reading(path)]
@@ -131,7 +134,7 @@ class RunReadings:
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
         to = as_they_stand(start, {path: values[path] for path in own})
         for k, path in enumerate(own):  # what rounding leaves of a number that does nothing
-            seen = np.abs(found.by_number[k]).max() * typical_size(rotor, path)
+            seen = np.abs(found.by_number[k]).max() * size(path)
             found.by_number[k] *= seen > UNSEEN * np.abs(found.H).max()
         by_number = np.tensordot(to.T, found.by_number, 1)
         for k, path in enumerate(derivatives):
