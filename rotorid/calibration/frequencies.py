@@ -14,7 +14,13 @@ import numpy as np
 from fem.critical import NOT_COUNTED, lowest_critical_speeds
 from fem.matrices.undamped_matrices import static_stiffness
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import is_reading, typical_size, with_parameters
+from fem.model.rotor_parameters import (
+    as_they_stand,
+    is_reading,
+    typical_size,
+    with_changes,
+    with_parameters,
+)
 from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.rpm import rpm_text
@@ -68,10 +74,11 @@ class MeasuredFrequencies:
         ValueError
             For supports that are alike in x and y, and would not be with another number.
         """
-        if self.rest or not with_parameters(start, values).symmetric:
+        rotor = with_parameters(start, values)
+        if self.rest or not rotor.symmetric:
             return
         for path in paths:
-            if not all(rotor.symmetric for _, rotor in _beside(start, values, path)):
+            if not (is_reading(path) or all(each.symmetric for _, each in _beside(rotor, path))):
                 raise ValueError(
                     f"{path} alone makes supports differ in x and y: then backward critical speeds count, "
                     "too, and the numbers of modes are others; estimate what keeps them alike (as "
@@ -103,27 +110,31 @@ class MeasuredFrequencies:
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
         """Derivatives (rows, n) by the numbers."""
-        columns, by_shape = [], np.full(len(self.nodes) * len(self.modes), self.shape_std / ROUNDING[1])
-        for path in paths:
-            if is_reading(path):
-                columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
-                continue
-            (up, one), (down, other) = _beside(start, values, path)
+        rotor, m = with_parameters(start, values), len(self.modes)
+        own = {path: values[path] for path in paths if not is_reading(path)}
+        shapes = np.full(m * len(self.nodes), ROUNDING[1] / self.shape_std)
+        tiny = np.append(ROUNDING[0] * self.frequencies / self.std, shapes)
+        K = np.zeros((tiny.size, len(own)))
+        for k, path in enumerate(own):
+            (up, one), (down, other) = _beside(rotor, path)
             change = self.residual(one, {}) - self.residual(other, {})
-            seen = np.abs(change) * np.append(self.std / self.frequencies / ROUNDING[0], by_shape)
-            columns.append(change / ((up - down) or 1.0) * (seen > 1).any())
-        return np.stack(columns, axis=1)
+            if (np.abs(change) > tiny).any():
+                K[:, k] = change / (up - down)
+        by_own = K @ as_they_stand(start, own)
+        found = np.zeros((tiny.size, len(paths)))
+        found[:, [k for k, path in enumerate(paths) if path in own]] = by_own
+        return found
 
 
-def _beside(start: Rotor, values: Mapping[str, float], path: str) -> list[tuple[float, Rotor]]:
-    """The rotor with a little more and a little less of a number; as it is on a side where there is none."""
+def _beside(rotor: Rotor, path: str) -> list[tuple[float, Rotor]]:
+    """Changes of a number, and the rotors with a little more and a little less: none where that cannot be."""
+    step = STEP * typical_size(rotor, path)
     found = []
-    step = STEP * typical_size(with_parameters(start, values), path)
-    for value in (values[path] + step, values[path] - step):
+    for by in (step, -step):
         try:
-            found.append((value, with_parameters(start, {**values, path: value})))
+            found.append((by, with_changes(rotor, {path: by})))
         except ValueError:
-            found.append((values[path], with_parameters(start, values)))
+            found.append((0.0, rotor))
     return found
 
 
