@@ -22,6 +22,7 @@ from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
 from rotorid.calibration.unknowns import Unknown, check_different
+from rotorid.regression.linear import least_squares
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from
@@ -142,7 +143,9 @@ def calibrate(
     check_different(rotor, [unknown.path for unknown in unknowns])
     equations = _Equations(rotor, unknowns, readings, frequencies)
     names = tuple(unknown.label for unknown in unknowns)
+    limits = [unknown.limits(rotor) for unknown in unknowns]
     first = np.array([unknown.first(rotor) for unknown in unknowns])
+    first = np.clip(first, *_ends(limits))
     known = {unknown.label: unknown.prior for unknown in unknowns if unknown.prior}
     prior = prior_rows(names, known)
     for modes in frequencies:
@@ -150,7 +153,7 @@ def calibrate(
     equations.weigh(first)
     equations.residual(first)
     begin, others = _best_start(equations, unknowns, prior, first, starts, seed)
-    bounds = {unknown.label: unknown.limits(rotor) for unknown in unknowns}
+    bounds = dict(zip(names, limits, strict=True))
 
     def solve(begin: FloatArray, *, near: bool = False) -> NonlinearEstimate:
         return nonlinear_least_squares(
@@ -170,6 +173,14 @@ def calibrate(
     return _judged(equations, unknowns, prior, held, found, others)
 
 
+def _ends(limits: Sequence[tuple[float | None, float | None]]) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper ends (n,), infinite where there is none."""
+    ends = np.array(limits, dtype=float)
+    return np.where(np.isnan(ends[:, 0]), -np.inf, ends[:, 0]), np.where(
+        np.isnan(ends[:, 1]), np.inf, ends[:, 1]
+    )
+
+
 def _best_start(
     equations: _Equations,
     unknowns: Sequence[Unknown],
@@ -185,8 +196,7 @@ def _best_start(
     residual, jacobian = prior.beside(equations.residual, equations.jacobian)
     spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
     spread = np.where(spread > 0, spread, SPREAD * np.abs(first))
-    limits = np.array([unknown.limits(equations.rotor) for unknown in unknowns], dtype=float)
-    lower, upper = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
+    lower, upper = _ends([unknown.limits(equations.rotor) for unknown in unknowns])
     free = np.array([unknown.prior is None for unknown in unknowns]) & (first != 0)
     dof = max(residual(first).size - first.size - equations.besides, 1)
     ends: list[tuple[float, FloatArray]] = []
@@ -229,13 +239,18 @@ def _judged(
 
     theta = found.estimate.solution
     K, r = equations.jacobian(theta), equations.residual(theta)
-    unbalance = [rows.residual(equations.coefficients(rows.data, theta))[2] for rows in equations.rows]
+    unbalance, spent = [], sum(modes.scales for modes in equations.frequencies)
+    for rows in equations.rows:
+        _, basis, u = rows.residual(equations.coefficients(rows.data, theta))
+        alone = least_squares(basis, np.zeros(len(basis))) if u.size else None
+        spent += 0 if alone is None else alone.rank
+        unbalance.append(u if alone is None else u * np.where(np.isnan(alone.values[::2]), np.nan, 1.0))
 
     def mismatch(theta: FloatArray) -> float:
         return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))
 
     chi_square = mismatch(theta)
-    dof = r.size + len(prior) - equations.besides - found.estimate.rank
+    dof = r.size + len(prior) - spent - found.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
     tested = _tested(equations, prior, held, theta, K, r) if held else None
     misfit = chance < LEVEL or (tested is not None and tested.chance < LEVEL)

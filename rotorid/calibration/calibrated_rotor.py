@@ -164,6 +164,10 @@ class CalibratedRotor(Answered):
             found.append(self.held.words + trial)
         if self.prior is not None:
             found += self.prior.warnings
+        if unseen := [name for name, u in self._bare if np.isnan(u)]:
+            found.append(
+                f"these readings do not determine the unbalance of {listing(unseen, 'and')}: name fewer"
+            )
         if self.other_ends:
             values = listing(f"{n} = {v:.4g}" for n, v in zip(self.names, self.other_ends[0], strict=True))
             found.append(f"other numbers explain the data as well: {values}")
@@ -202,13 +206,18 @@ class CalibratedRotor(Answered):
         part.covariance = np.where(np.isnan(self.std), np.nan, self.covariance)[np.ix_(which, which)]
         return tuple(name for name, taken in zip(self.names, which, strict=True) if taken), part
 
-    def _unbalance_columns(self) -> tuple[Column, ...]:
-        """What the bare rotor's readings say of its unbalances and bows."""
-        found = [
+    @property
+    def _bare(self) -> list[tuple[str, complex]]:
+        """Unbalances of nodes, kg·m, and bows, m, of all sets of runs; NaN where not determined."""
+        return [
             (f"node {node}" if k < len(data.unbalance) else f"bow {k - len(data.unbalance) + 1}", value)
             for data, u in zip(self.readings, self.unbalance, strict=True)
             for k, (node, value) in enumerate(zip((*data.unbalance, *[0] * data.bow), u, strict=True))
         ]
+
+    def _unbalance_columns(self) -> tuple[Column, ...]:
+        """What the bare rotor's readings say of its unbalances and bows."""
+        found = self._bare
         if not found:
             return ()
         values = np.array([value for _, value in found])

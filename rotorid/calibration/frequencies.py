@@ -15,7 +15,7 @@ from fem.critical import NOT_COUNTED, critical_speeds_near, lowest_critical_spee
 from fem.matrices.undamped_matrices import static_stiffness
 from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import typical_size, with_parameters
+from fem.model.rotor_parameters import as_they_stand, typical_size, with_changes, with_parameters
 from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.rpm import rpm_text
@@ -69,10 +69,11 @@ class MeasuredFrequencies:
         ValueError
             For supports that are alike in x and y, and would not be with another number.
         """
-        if self.rest or not with_parameters(start, values).symmetric:
+        rotor = with_parameters(start, values)
+        if self.rest or not rotor.symmetric:
             return
         for path in paths:
-            if not all(rotor.symmetric for _, rotor in _beside(start, values, path)):
+            if not (is_reading(path) or all(each.symmetric for _, each in _beside(start, rotor, path))):
                 raise ValueError(
                     f"{path} alone makes supports differ in x and y: then backward critical speeds count, "
                     "too, and the numbers of modes are others; estimate what keeps them alike (as "
@@ -104,34 +105,36 @@ class MeasuredFrequencies:
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
         """Derivatives (rows, n) by the numbers; frequencies over tables are followed, not searched again."""
-        rotor = with_parameters(start, values)
+        rotor, m = with_parameters(start, values), len(self.modes)
+        own = {path: values[path] for path in paths if not is_reading(path)}
         follow = not (self.rest or self.nodes or rotor.constant)
-        here = self.residual(start, values) * self.std + self.frequencies if follow else None
-        columns, by_shape = [], np.full(len(self.nodes) * len(self.modes), self.shape_std / ROUNDING[1])
-        for path in paths:
-            if is_reading(path):
-                columns.append(np.zeros(len(self.modes) * (1 + len(self.nodes))))
-                continue
-            (up, one), (down, other) = _beside(start, values, path)
+        here = self.residual(rotor, {}) * self.std + self.frequencies if follow else None
+        shapes = np.full(m * len(self.nodes), ROUNDING[1] / self.shape_std)
+        tiny = np.append(ROUNDING[0] * self.frequencies / self.std, shapes)
+        K = np.zeros((tiny.size, len(own)))
+        for k, path in enumerate(own):
+            (up, one), (down, other) = _beside(start, rotor, path)
             if here is None:
                 change = self.residual(one, {}) - self.residual(other, {})
             else:
                 change = (critical_speeds_near(one, here) - critical_speeds_near(other, here)) / self.std
-            seen = np.abs(change) * np.append(self.std / self.frequencies / ROUNDING[0], by_shape)
-            columns.append(change / ((up - down) or 1.0) * (seen > 1).any())
-        return np.stack(columns, axis=1)
+            if (np.abs(change) > tiny).any():
+                K[:, k] = change / (up - down)
+        by_own = K @ as_they_stand(start, own)
+        found = np.zeros((tiny.size, len(paths)))
+        found[:, [k for k, path in enumerate(paths) if path in own]] = by_own
+        return found
 
 
-def _beside(start: Rotor, values: Mapping[str, float], path: str) -> list[tuple[float, Rotor]]:
-    """The rotor with a little more and a little less of a number; as it is on a side where there is none."""
+def _beside(start: Rotor, rotor: Rotor, path: str) -> list[tuple[float, Rotor]]:
+    """Changes of a number, and the rotors with a little more and a little less: none where that cannot be."""
+    step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
     found = []
-    rotors = (start, with_parameters(start, values))
-    step = STEP * max(typical_size(rotor, path) for rotor in rotors)  # a number near 0, too
-    for value in (values[path] + step, values[path] - step):
+    for by in (step, -step):
         try:
-            found.append((value, with_parameters(start, {**values, path: value})))
+            found.append((by, with_changes(rotor, {path: by})))
         except ValueError:
-            found.append((values[path], with_parameters(start, values)))
+            found.append((0.0, rotor))
     return found
 
 

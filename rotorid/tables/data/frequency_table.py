@@ -75,6 +75,8 @@ def read_frequencies(path: Path, rotor: Rotor) -> FrequencyTable:
     table.must_be("std", table.numbers("std") > 0, "a standard deviation above 0 percent")
     if stem is not None:
         table.must_be(stem, table.numbers(stem) > 0, "a number above 0")
+        below = [table.numbers(stem)[number < k].max(initial=0.0) for k in number]
+        table.must_be(stem, table.numbers(stem) >= below, "no less than of a mode with a lower number")
     stem = problems.need(stem)
     problems.stop()
     values = table.numbers(stem)

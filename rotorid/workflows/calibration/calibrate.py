@@ -132,11 +132,12 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
 
     model, files = rotor_source(rotor)
     given = [data] if isinstance(data, Path | str) else list(data)
-    own = (
-        [model.node(node) for node in nodes(options.unbalance_at, "--unbalance-at")]
-        if options.unbalance_at
-        else []
-    )
+    if len({*map(str, given)}) < len(given):
+        raise ValueError("one of the data files is given twice: it would count twice")
+    places = [] if options.unbalance_at is None else nodes(options.unbalance_at, "--unbalance-at")
+    own = [model.node(node) for node in places]
+    if len({*own}) < len(own):
+        raise ValueError("--unbalance-at: one of its nodes stands twice")
     if options.bow < 0 or options.starts < 1:
         raise ValueError("--bow takes a number from 0, --starts one from 1")
     if options.bow and not own:

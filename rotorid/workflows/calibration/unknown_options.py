@@ -130,7 +130,7 @@ def _prior(text: str, value: float, pattern: str) -> tuple[float, float]:
     centre, sign, spread = re.sub(r"\+-|±", "±", text).rpartition("±")
     try:
         middle = number(centre) if sign else value
-        std = number(spread.rstrip("%")) * (abs(middle) / 100 if spread.endswith("%") else 1.0)
+        std = number(spread.removesuffix("%")) * (abs(middle) / 100 if spread.endswith("%") else 1.0)
     except ValueError:
         std = middle = np.nan
     if not (np.isfinite(middle) and std > 0):

@@ -1,0 +1,249 @@
+"""`rotorid calibrate`: files and options in, numbers or one clear complaint out, and nothing half written."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fem_rotors import rotor23
+
+import fem
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+
+ROTOR23 = sample_data() / "rotor23.csv"
+COMPRESSOR = sample_data() / "compressor" / "rotor.toml"
+TRIAL = sample_data() / "calibration" / "trial.toml"
+TWO = "bearing[1].stiffness,bearing[2].stiffness"
+JOB = """runs = "runs.csv"
+weights = "weights.csv"
+rotor = "{rotor}"
+[errors]
+amplitude_percent = 1
+[planes.P]
+node = 9
+radius_mm = 100
+[sensors.a]
+node = 4
+[sensors.b]
+node = 20
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def critical(folder, k1=7e7, k2=1.4e8, head="mode,critical_speed_rpm"):
+    rotor = fem.Rotor(
+        rotor23().length,
+        rotor23().outer_diameter,
+        discs=rotor23().discs,
+        supports=[fem.Support(s.node, k) for s, k in zip(rotor23().supports, (k1, k2), strict=True)],
+    )
+    speeds = fem.critical_speeds(rotor, 3).frequencies * 30 / np.pi
+    path = folder / "critical.csv"
+    path.write_text("\n".join([head, *(f"{k},{v:.0f}" for k, v in enumerate(speeds, 1))]) + "\n")
+    return path
+
+
+def test_two_stiffnesses_from_three_rounded_critical_speeds(cli, folder):
+    told = cli("calibrate", ROTOR23, critical(folder), "--estimate", f"{TWO}", "--exact", "--json")
+    assert (told.code, told.err) == (0, "")
+    document = told.json
+    for path, truth in zip(TWO.split(","), (7e7, 1.4e8), strict=True):
+        found = document["parameters"][path]
+        assert found["ci95"][0] < truth < found["ci95"][1]
+        assert found["std"] < 0.01 * truth
+    assert document["explained"]
+    assert document["degrees_of_freedom"] == 1
+    read = [Path(entry["file"]).name for entry in document["provenance"]["inputs"]]
+    assert read == ["rotor23.csv", "critical.csv"]
+    text = cli("calibrate", ROTOR23, critical(folder), "--estimate", TWO, "--exact").out
+    assert text.startswith("The model explains the data")
+    assert "modes count the forward critical speeds" in text
+
+
+def test_the_calibrated_rotor_is_written_with_its_errors(cli, folder):
+    told = cli(
+        "calibrate", ROTOR23, critical(folder), "--estimate", TWO, "--exact", "--output", "new.toml", "--json"
+    )
+    assert told.code == 0, told.err
+    rotor = read_rotor(folder / "new.toml")
+    values = [told.json["parameters"][path]["value"] for path in TWO.split(",")]
+    assert [s.stiffness for s in rotor.supports] == pytest.approx(values, rel=1e-9)
+    assert rotor.calibration.names == tuple(TWO.split(","))
+    stds = [told.json["parameters"][path]["std"] for path in TWO.split(",")]
+    assert rotor.calibration.std == pytest.approx(stds, rel=1e-4)
+    assert told.json["rotor"] == "new.toml"
+
+
+def test_the_sample_finds_the_machine_it_was_made_of(cli):
+    """Its true numbers stand in make_data.py: each within 3.5 of its deviations."""
+    made = {}
+    exec(
+        (sample_data() / "calibration" / "make_data.py").read_text(encoding="utf-8").split("def main")[0],
+        {"__file__": str(TRIAL)},
+        made,
+    )
+    estimate, prior = "bearing[*].*", "bearing[*].*=20%"
+    told = cli("calibrate", COMPRESSOR, TRIAL, "--estimate", estimate, "--prior", prior, "--json")
+    assert told.code == 0, told.err
+    found = told.json["parameters"]
+    truth = {path: value for path, value in made["MACHINE"].items() if path in found}
+    truth |= {f"probe[{name}].angle": angle for name, angle in made["TURNED"].items()}
+    assert len(truth) > 20
+    z = {path: (found[path]["value"] - value) / found[path]["std"] for path, value in truth.items()}
+    assert max(z.values(), key=abs) == pytest.approx(0, abs=3.5)
+    assert np.mean([abs(each) < 1.96 for each in z.values()]) > 0.85
+
+
+def test_what_is_not_determined_is_null_and_no_rotor_is_written(cli, folder):
+    """One critical speed does not tell two stiffnesses."""
+    (folder / "one.csv").write_text("mode,critical_speed_rpm\n1,1290\n")
+    args = "calibrate", ROTOR23, "one.csv", "--estimate", TWO, "--exact"
+    told = cli(*args, "--json")
+    assert told.code == 0
+    assert [told.json["parameters"][path]["value"] for path in TWO.split(",")] == [None, None]
+    assert not told.json["identifiable"]
+    refused = cli(*args, "--output", "new.toml", "--plot", "new.png")
+    assert refused.code == 2
+    assert "new.toml: no rotor file can be written" in refused.err
+    assert sorted(path.name for path in folder.iterdir()) == ["one.csv"]
+    assert cli(*args, "--output", "new.csv").code == 0  # a table says it in its cells
+
+
+def job(folder, *, rotor="rotor.csv", runs=("base", "trial"), weights="trial,P,10,0", text=JOB):
+    (folder / "rotor.csv").write_bytes(ROTOR23.read_bytes())
+    (folder / "job.toml").write_text(text.format(rotor=rotor))
+    rows = [
+        f"{run},1000,{s},{a},{p}"
+        for run, a, p in (("base", 20, 10), ("trial", 25, 40))
+        for s in "ab"
+        if run in runs
+    ]
+    (folder / "runs.csv").write_text(
+        "\n".join(["run,speed_rpm,sensor,amplitude_um_pp,phase_deg", *rows]) + "\n"
+    )
+    (folder / "weights.csv").write_text(f"run,plane,mass_g,angle_deg\n{weights}\n")
+    return "job.toml"
+
+
+@pytest.mark.parametrize(
+    ("change", "args", "said"),
+    [
+        (("[planes.P]\nnode = 9\n", "[planes.P]\n"), (), "job.toml: "),
+        (("[sensors.b]\nnode = 20\n", ""), (), "[sensors.b]"),
+        (('rotor = "{rotor}"\n', ""), (), "rotor"),
+        (("radius_mm = 100\n", ""), (), "need the radius of every plane"),
+        (("node = 9", "node = 99"), (), "99"),
+        (("runs.csv", "none.csv"), (), "none.csv"),
+        (("", ""), ("--bow", "1"), "--unbalance-at"),
+        (("", ""), ("--bow", "99", "--unbalance-at", "9"), "shapes of a bow, not 99"),
+        (("", ""), ("--unbalance-at", ""), "--unbalance-at takes nodes"),
+        (("", ""), ("--unbalance-at", "9,9"), "--unbalance-at: one of its nodes stands twice"),
+        (("", ""), ("--unbalance-at", "44"), "node 44 does not exist"),
+        (("", ""), ("--starts", "0"), "--starts one from 1"),
+        (("", ""), ("--speeds", "1000rpm"), "--speeds are candidates for --design"),
+        (("", ""), ("job.toml",), "is given twice"),
+        (("", ""), ("--design", "0"), "--design 0: from 1 to 1 of the 1 candidate"),
+        (("", ""), ("--design", "9"), "--design 9: from 1 to 1"),
+        (("", ""), ("--design", "1"), "--design has no picture"),
+        (
+            ("", ""),
+            ("--design", "1", "--speeds", "0:100:50rpm"),
+            "speeds must be finite and greater than zero",
+        ),
+        (("", ""), ("--prior", "bearing[2].stiffness=5%"), "nothing that is estimated is called"),
+        (("", ""), ("--bounds", "bearing[1].stiffness=5:1"), "LOWEST:HIGHEST is needed"),
+        (("", ""), ("--bounds", "bearing[1].stiffness=-5:-1"), "must be finite and not negative"),
+    ],
+)
+def test_jobs_and_options_that_cannot_be(cli, folder, change, args, said):
+    name = job(folder, text=JOB.replace(*change) if change[0] else JOB)
+    before = sorted(path.name for path in folder.iterdir())
+    told = cli("calibrate", ROTOR23, name, *args, "--estimate", "bearing[1].stiffness", "--plot", "new.png")
+    assert told.code == 2
+    assert told.out == ""
+    assert said in told.err
+    assert told.err.startswith("rotorid: ")
+    assert len(told.err.splitlines()) <= 3  # a line for each place
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
+def test_runs_that_say_nothing_and_another_rotor(cli, folder):
+    args = "--estimate", "bearing[1].stiffness"
+    told = cli("calibrate", ROTOR23, job(folder, runs=("base",), weights=""), *args)
+    assert told.code == 2
+    assert "job.toml" in told.err
+    told = cli("calibrate", COMPRESSOR, job(folder), "--estimate", "bearing[1].kxx.scale")
+    assert told.code == 2
+    assert "job.toml: the job names a rotor of 24 nodes, this one has 25" in told.err
+    told = cli("calibrate", ROTOR23, job(folder), "--estimate", "bearing[1].stiffness", "--exact")
+    assert told.code == 0, told.err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "the file is empty"),
+        ("mode,critical_speed_rpm\n", "row 1: expected rows below the header"),
+        ("mode,speed\n1,5\n", "row 1, column speed"),
+        ("critical_speed_rpm\n5\n", "column mode"),
+        ("mode,critical_speed_rpm,natural_frequency_Hz\n1,5,6\n", "column natural_frequency_Hz"),
+        ("mode,critical_speed_rpm\n0,1290\n", "row 2, column mode: found '0'"),
+        ("mode,critical_speed_rpm\n1.5,1290\n", "row 2, column mode: found '1.5'"),
+        ("mode,critical_speed_rpm\n1e30,1290\n", "row 2, column mode: found '1e30'"),
+        (
+            "mode,critical_speed_rpm\n1,1290\n1,5148\n",
+            "row 3, column mode: found '1', expected another mode than in row 2",
+        ),
+        ("mode,critical_speed_rpm\n2,1290\n1,5148\n", "row 2, column critical_speed_rpm: found '1290'"),
+        ("mode,critical_speed_rpm\n1,-5\n", "row 2, column critical_speed_rpm: found '-5'"),
+        ("mode,critical_speed_rpm\n1,1e300\n", "row 2, column critical_speed_rpm: found '1e300'"),
+        ("mode,critical_speed_rpm\n1,abc\n", "row 2, column critical_speed_rpm: found 'abc'"),
+        ("mode,critical_speed_rpm,std_percent\n1,1290,0\n", "row 2, column std_percent: found '0'"),
+        ("mode,critical_speed_rpm\n99,1290\n", "the model has only 48 critical speeds"),
+        ("mode,frequency_Hz,node,shape\n1,21,1,1\n1,21,77,2\n", "row 3, column node: found '77'"),
+        ("mode,frequency_Hz,node,shape,frequency_std_percent\n1,21,1,1,0\n", "column frequency_std_percent"),
+        ("mode,frequency_Hz,node,shape,shape_std_percent\n1,21,1,1,0\n", "column shape_std_percent"),
+    ],
+)
+def test_tables_that_cannot_be(cli, folder, text, said):
+    (folder / "bad.csv").write_text(text)
+    told = cli("calibrate", ROTOR23, "bad.csv", "--estimate", "bearing[1].stiffness", "--output", "new.toml")
+    assert (told.code, told.out) == (2, "")
+    assert said in told.err
+    assert [path.name for path in folder.iterdir()] == ["bad.csv"]
+
+
+def test_critical_speeds_and_an_estimate_that_doubles_them(cli, folder):
+    told = cli("calibrate", ROTOR23, critical(folder), "--estimate", "bearing[*].kxx")
+    assert told.code == 2
+    assert "bearing[1].kxx alone makes supports differ in x and y" in told.err
+
+
+def test_a_design_of_the_sample(cli, folder):
+    args = "calibrate", COMPRESSOR, TRIAL, "--estimate", "bearing[*].kxx", "--prior", "bearing[*].kxx=20%"
+    told = cli(
+        *args,
+        "--estimate",
+        "bearing[*].kxx.scale",
+        "--design",
+        "2",
+        "--speeds",
+        "2000:6000:1000rpm",
+        "--json",
+    )
+    assert told.code == 0, told.err
+    assert len(told.json["runs"]) == 2
+    assert [p["parameter"] for p in told.json["parameters"]] == [
+        "bearing[1].kxx.scale",
+        "bearing[2].kxx.scale",
+    ]
+    assert all(p["std_after"] < p["std_before"] == 0.2 for p in told.json["parameters"])
+    refused = cli(*args, "--estimate", "bearing[*].kxx.scale", "--design", "2", "--output", "new.toml")
+    assert refused.code == 2
+    assert "new.toml: --design finds no rotor; a table of the runs is .csv or .xlsx" in refused.err
+    assert list(folder.iterdir()) == []

@@ -1,0 +1,198 @@
+"""What people write after --estimate, --prior and --bounds: read as meant, or refused with one sentence."""
+
+from dataclasses import replace
+
+import pytest
+from calibration_jobs import machine
+from fem_rotors import rotor23
+
+import fem
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+from rotorid.workflows.calibration.unknown_options import unknowns
+
+COEFFICIENTS = ("kxx", "kxy", "kyx", "kyy", "cxx", "cyy")
+
+
+def read(estimate, prior="", bounds="", *, rotor=None, probes=(), exact=True):
+    return unknowns(rotor or machine(), probes, estimate, prior, bounds, exact=exact)
+
+
+def paths(*args, **more):
+    return [unknown.path for unknown in read(*args, **more)]
+
+
+def test_names_and_commas():
+    found = read("bearing[DE].kxx, k2 = bearing[2].kxx,damping=bearing[1,2].cxx")
+    assert [u.path for u in found] == ["bearing[DE].kxx", "bearing[2].kxx", "bearing[1,2].cxx"]
+    assert [u.label for u in found] == ["bearing[DE].kxx", "k2", "damping"]
+    assert paths(["bearing[1].kxx", "disc[2].mass"]) == ["bearing[1].kxx", "disc[2].mass"]
+
+
+@pytest.mark.parametrize("which", ["bearing[1]", "bearing[DE]", "bearing[1,2]", "bearing"])
+def test_every_coefficient_that_is_not_zero(which):
+    plain = paths(f"{which}.*")
+    several = which in ("bearing[1,2]", "bearing")  # of two bearings that differ one factor for both
+    assert plain == [f"{which}.{name}{'.scale' if several else ''}" for name in COEFFICIENTS]
+    assert paths("bearing[*].*") == [f"bearing[{i}].{name}" for i in (1, 2) for name in COEFFICIENTS]
+
+
+def test_tables_have_scales():
+    rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
+    found = paths("bearing[1].*", rotor=rotor)
+    assert found == [f"bearing[1].{name}.scale" for name in COEFFICIENTS]
+    assert all(path.endswith(".scale") for path in paths("seal[*].*", rotor=rotor))
+
+
+def test_what_is_not_known_exactly_comes_beside():
+    found = read("bearing[1].kxx", exact=False, probes=["a", "b"])
+    beside = {u.path: u.prior for u in found if u.beside}
+    assert beside == {
+        "material.youngs_modulus.scale": (1.0, 0.01),
+        "disc[1].scale": (1.0, 0.01),
+        "disc[2].scale": (1.0, 0.01),
+        "bearing[2].pedestal_stiffness.scale": (1.0, 0.1),
+        "probe[a].angle": (0.0, 2.0),
+        "probe[b].angle": (0.0, 2.0),
+    }
+
+
+@pytest.mark.parametrize(
+    ("estimate", "taken"),
+    [
+        ("bearing[NDE].pedestal_stiffness_x", "bearing[2].pedestal_stiffness.scale"),
+        ("bearing[2].pedestal_stiffness.scale", "bearing[2].pedestal_stiffness.scale"),
+        ("disc[1].mass", "disc[1].scale"),
+        ("disc.scale", "disc[2].scale"),
+        ("material.youngs_modulus", "material.youngs_modulus.scale"),
+    ],
+)
+def test_a_number_that_is_estimated_is_not_a_second_time_beside(estimate, taken):
+    assert taken not in [u.path for u in read(estimate, exact=False) if u.beside]
+    assert "probe[a].angle" in paths(estimate, exact=False, probes=["a"])
+
+
+@pytest.mark.parametrize(
+    ("prior", "expected"),
+    [
+        ("bearing[1].kxx=20%", (4e7, 8e6)),
+        ("bearing[1].kxx=1e6", (4e7, 1e6)),
+        ("bearing[1].kxx=7e7+-20%", (7e7, 1.4e7)),
+        ("k=7e7±1e6", (7e7, 1e6)),
+        ("bearing[*].k*=5%", (4e7, 2e6)),
+        ("bearing[*].*=5%", (4e7, 2e6)),
+        ({"bearing[1].kxx": "5%"}, (4e7, 2e6)),
+    ],
+)
+def test_priors(prior, expected):
+    (found,) = read("k=bearing[1].kxx", prior)
+    assert found.prior == pytest.approx(expected)
+    assert found.first(machine()) == expected[0]
+
+
+def test_a_prior_without_its_suffix_is_of_the_scale():
+    rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
+    found = read("bearing[*].kxx.scale", "bearing[*].kxx=20%", rotor=rotor)
+    assert [u.prior for u in found] == [(1.0, 0.2), (1.0, 0.2)]
+    assert read("bearing[1].kxx", "material.youngs_modulus=5%", exact=False)[1].prior == (1.0, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("path", "bounds", "expected"),
+    [
+        ("bearing[1].kxx", "bearing[1].kxx=1e6:1e12", (1e6, 1e12)),
+        ("bearing[1].kxy", "bearing[1].kxy=-1e7:1e7", (-1e7, 1e7)),
+        ("material.youngs_modulus", "*=1.9e11:2.2e11", (1.9e11, 2.2e11)),
+        ("probe[a].angle", "probe[a].angle=-5:5", (-5.0, 5.0)),
+        ("bearing[1].kxx", "", (0.0, None)),
+        ("bearing[1].kxy", "", (None, None)),
+        ("bearing[1].kxx.offset", "", (None, None)),
+        ("bearing[1].kxx.slope", "", (None, None)),
+        ("bearing[1].kxx.scale", "", (1e-3, None)),
+        ("disc[1].mass", "", (0.0, None)),
+        ("seal[1].kxx", "", (None, None)),
+        ("seal[1].cxx.scale", "", (1e-3, None)),
+        ("material.density", "", (7.8, None)),
+    ],
+)
+def test_bounds(path, bounds, expected):
+    seal = fem.Support(3, ((1e6, 2e5), (-2e5, 1e6)), 100.0, kind="seal")
+    rotor = replace(machine(), supports=[*machine().supports, seal])
+    (found,) = read(path, bounds=bounds, rotor=rotor, probes=["a"])
+    assert found.limits(rotor) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "said"),
+    [
+        ("", "'' is no parameter"),
+        ("bearing[1].kxx,", "'' is no parameter"),
+        ("k1", "'k1' is no parameter"),
+        ("bearing[1.kxx", "is no parameter"),
+        ("bearing[7].kxx", "of 2 bearings none is called '7'"),
+        ("bearing[1].kzz", "'kzz' is not known"),
+        ("bearing[DX].*", "none is called 'DX'"),
+        ("seal[*].*", "the rotor has no seal"),
+        ("disc[*].*", "of a disc, 'kxx' is not known"),
+        ("probe[z].angle", "the probe 'z' is not known"),
+        ("bearing[1].kxx,bearing[1].kxx", "bearing[1].kxx stands twice"),
+        ("bearing[*].kxx,bearing[2].kxx", "bearing[2].kxx stands twice"),
+        ("bearing[1].kxx,bearing[DE].kxx", "are the same number of the rotor"),
+        ("bearing[1].kxx,bearing[1].kxx.scale", "are the same number of the rotor"),
+        ("k=bearing[*].kxx", "one name for 2 numbers"),
+        ("k=bearing[1].kxx,k=bearing[2].kxx", "two numbers are called k"),
+        ("bearing[2].kxx=bearing[1].kxx,bearing[2].kxx", "two numbers are called bearing[2].kxx"),
+    ],
+)
+def test_estimates_that_cannot_be_read(estimate, said):
+    with pytest.raises(ValueError) as error:
+        read(estimate, probes=["a"])
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_supports_without_any_coefficient():
+    rotor = replace(rotor23(), supports=[fem.Support(1), fem.Support(24)])
+    with pytest.raises(ValueError, match="all coefficients of these supports are 0"):
+        read("bearing[*].*", rotor=rotor)
+
+
+@pytest.mark.parametrize(
+    ("prior", "said"),
+    [
+        *(
+            (f"bearing[1].kxx={text}", "a standard deviation is needed")
+            for text in ("", "x", "0", "-1", "nan", "20%%")
+        ),
+        *(
+            (f"bearing[1].kxx={text}", "a standard deviation is needed")
+            for text in ("7e7+-", "+-5%", "1+-2+-3", "1e400")
+        ),
+        ("bearing[1].kxx", "is no NAME=VALUE"),
+        ("=5%", "is no NAME=VALUE"),
+        ("bearing[1].kxx=5%,bearing[1].kxx=6%", "stands twice"),
+        ("bearing[2].kxx=5%", "nothing that is estimated is called 'bearing[2].kxx'"),
+    ],
+)
+def test_priors_that_cannot_be_read(prior, said):
+    with pytest.raises(ValueError, match="--prior") as error:
+        read("bearing[1].kxx", prior)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "said"),
+    [
+        *(
+            (f"bearing[1].kxx={text}", "LOWEST:HIGHEST is needed")
+            for text in ("", "5", "9:1", "a:b", "1:2:3")
+        ),
+        *((f"bearing[1].kxx={text}", "LOWEST:HIGHEST is needed") for text in ("1:1", "nan:5", "1e6:1e9rpm")),
+        ("bearing[1].kxx", "is no NAME=VALUE"),
+        ("disc[1].mass=1:2", "nothing that is estimated is called 'disc[1].mass'"),
+    ],
+)
+def test_bounds_that_cannot_be_read(bounds, said):
+    with pytest.raises(ValueError, match="--bounds") as error:
+        read("bearing[1].kxx", bounds=bounds)
+    assert said in str(error.value)
