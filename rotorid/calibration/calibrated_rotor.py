@@ -15,7 +15,7 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import range_text
-from rotorid.base.text import capital, counted, listing
+from rotorid.base.text import capital, counted, error_figures, listing
 from rotorid.calibration.run_readings import RunReadings
 from rotorid.calibration.unknowns import Unknown
 from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
@@ -56,7 +56,10 @@ class CalibratedRotor(Answered):
     chi_square, dof, chance
         Of data and priors together, and the probability of a larger χ².
     unbalance
-        Of each set of runs the unbalances of its nodes, kg·m, then the amplitudes of its bows, m.
+        Of each set of runs the unbalances of its nodes, kg·m, then the amplitudes of its bows, m; NaN where
+        its readings do not determine one.
+    unbalance_std
+        Of each one standard deviation in one direction.
     readings
         Those sets.
     stated
@@ -75,6 +78,7 @@ class CalibratedRotor(Answered):
     dof: int
     chance: float
     unbalance: tuple[ComplexArray, ...]
+    unbalance_std: tuple[FloatArray, ...]
     readings: tuple[RunReadings, ...]
     stated: bool
     other_ends: tuple[FloatArray, ...]
@@ -212,10 +216,12 @@ class CalibratedRotor(Answered):
         if not found:
             return ()
         values = np.array([value for _, value in found])
+        std = np.concatenate(self.unbalance_std)
         units = ["m" if name.startswith("bow") else "kg·m" for name, _ in found]
         return (
             Column("unbalance", [name for name, _ in found], str),
             Column("size", np.abs(values), "{:.4g}".format),
+            Column("std", std, error_figures, "±"),
             Column("unit", units, str),
             Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
         )
