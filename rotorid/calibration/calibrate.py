@@ -22,7 +22,6 @@ from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
 from rotorid.calibration.unknowns import Unknown, check_different
-from rotorid.regression.linear import least_squares
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from
@@ -239,12 +238,12 @@ def _judged(
 
     theta = found.estimate.solution
     K, r = equations.jacobian(theta), equations.residual(theta)
-    unbalance, spent = [], sum(modes.scales for modes in equations.frequencies)
-    for rows in equations.rows:
-        _, basis, u = rows.residual(equations.coefficients(rows.data, theta))
-        alone = least_squares(basis, np.zeros(len(basis))) if u.size else None
-        spent += 0 if alone is None else alone.rank
-        unbalance.append(u if alone is None else u * np.where(np.isnan(alone.values[::2]), np.nan, 1.0))
+    values = equations.values(theta)
+    besides = [
+        rows.bare(*rows.data.coefficients(equations.rotor, values, equations.paths))
+        for rows in equations.rows
+    ]
+    spent = sum(bare.rank for bare in besides) + sum(modes.scales for modes in equations.frequencies)
 
     def mismatch(theta: FloatArray) -> float:
         return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))
@@ -256,9 +255,8 @@ def _judged(
     misfit = chance < LEVEL or (tested is not None and tested.chance < LEVEL)
     covariance = found.estimate.solution_covariance
     covariance = np.zeros((theta.size,) * 2) if covariance is None else np.nan_to_num(covariance)
-    if misfit:
-        covariance = covariance * max(chi_square / dof, 1.0)
-    values = equations.values(theta)
+    times = max(chi_square / dof, 1.0) if misfit else 1.0
+    covariance = covariance * times
     to = as_they_stand(equations.rotor, values)
     lack = _lack_of_fit(equations, theta) if misfit else {}
     speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
@@ -289,7 +287,8 @@ def _judged(
         dof=dof,
         chance=chance,
         held=tested,
-        unbalance=tuple(unbalance),
+        unbalance=tuple(bare.u for bare in besides),
+        unbalance_std=tuple(bare.std(covariance, times) for bare in besides),
         readings=tuple(equations.readings),
         stated=all(rows.stated for rows in equations.rows),
         other_ends=tuple(apart),
@@ -326,7 +325,7 @@ def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, 
         left = left + bare[:, None]
         square = (np.abs(left) ** 2 / 2 - rows.variance.reshape(*left.shape, 2).mean(axis=3)).sum(axis=1)
         effect = np.abs(bare[:, None] + rows.effect(W)) if data.modelled else np.abs(rows.effect(W))
-        size, share = (effect**2).sum(axis=1), 2 / left.shape[1]
+        size, share = np.maximum((effect**2).sum(axis=1), np.finfo(float).tiny), 2 / left.shape[1]
         mean = max(float(square.sum() / size.sum()), 0.0)
         relative = np.sqrt((share * mean + np.maximum(square, 0.0) / size) / (1 + share))
         for (s, c), value in np.ndenumerate(relative):

@@ -15,7 +15,7 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import range_text
-from rotorid.base.text import capital, counted, listing
+from rotorid.base.text import capital, counted, error_figures, listing
 from rotorid.calibration.held_numbers import HeldNumbers
 from rotorid.calibration.run_readings import RunReadings
 from rotorid.calibration.unknowns import Unknown
@@ -61,7 +61,10 @@ class CalibratedRotor(Answered):
     held
         What the data say of numbers that were taken as they stand; None: of none.
     unbalance
-        Of each set of runs the unbalances of its nodes, kg·m, then the amplitudes of its bows, m.
+        Of each set of runs the unbalances of its nodes, kg·m, then the amplitudes of its bows, m; NaN where
+        its readings do not determine one.
+    unbalance_std
+        Of each one standard deviation in one direction.
     readings
         Those sets.
     stated
@@ -81,6 +84,7 @@ class CalibratedRotor(Answered):
     chance: float
     held: HeldNumbers | None
     unbalance: tuple[ComplexArray, ...]
+    unbalance_std: tuple[FloatArray, ...]
     readings: tuple[RunReadings, ...]
     stated: bool
     other_ends: tuple[FloatArray, ...]
@@ -221,10 +225,12 @@ class CalibratedRotor(Answered):
         if not found:
             return ()
         values = np.array([value for _, value in found])
+        std = np.concatenate(self.unbalance_std)
         units = ["m" if name.startswith("bow") else "kg·m" for name, _ in found]
         return (
             Column("unbalance", [name for name, _ in found], str),
             Column("size", np.abs(values), "{:.4g}".format),
+            Column("std", std, error_figures, "±"),
             Column("unit", units, str),
             Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
         )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from fem.solvers.receptance import unit_loads
 from fem.solvers.receptance_derivatives import MatrixChange, matrix_change, receptance_with_derivatives
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
-from rotorid.regression import solution, stretch
+from rotorid.regression import least_squares, solution, stretch
 
 STEP = 1e-4
 """Of a number's typical size, for differences of matrices."""
@@ -165,7 +166,8 @@ class RunReadings:
         if self.bow > (most := finite_modes(pencil) - still):
             raise ValueError(f"the shaft has {counted(most, 'shape')} of a bow, not {self.bow}")
         shapes = lowest_modes(first, A, self.bow + still, pencil).vectors[:, still:]
-        return multiply(assemble(now).shaft, shapes / np.abs(shapes[A.deflections]).max(axis=0))
+        bent: FloatArray = shapes / np.abs(shapes[A.deflections]).max(axis=0)
+        return multiply(assemble(now).shaft, bent)
 
     def rows(self, W: ComplexArray) -> ReadingRows:
         """The rows with their errors, which coefficients W (S, C, P + q) of about this size tell."""
@@ -193,6 +195,24 @@ def run_errors(trials: Trials, runs: Runs) -> RunErrors:
     if trials.run_errors is not None:
         return given([], runs, *trials.run_errors, "stated")
     return RunErrors() if error_model(trials).source == "stated" else assumed(runs)
+
+
+class Bare(NamedTuple):
+    """Unbalances and bows u (q,) of a bare rotor, NaN where not determined, and what their errors come from.
+
+    Covariance (2q, 2q) of their parts by errors of the readings, derivatives (2q, n) by the numbers, and how
+    many parts are determined.
+    """
+
+    u: ComplexArray
+    own: FloatArray
+    by: FloatArray
+    rank: int
+
+    def std(self, covariance: FloatArray, times: float) -> FloatArray:
+        """One standard deviation in each direction (q,), with the covariance of the numbers (n, n)."""
+        parts = np.diag(times * self.own + self.by @ covariance @ self.by.T).reshape(-1, 2)
+        return np.asarray(np.where(np.isnan(self.u), np.nan, np.sqrt(parts.mean(axis=1))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,13 +256,29 @@ class ReadingRows:
 
     def jacobian(self, W: ComplexArray, dW: ComplexArray) -> FloatArray:
         """Derivatives (m, n) of the residuals by n numbers, dW (n, S, C, P + q)."""
+        if not self.data.modelled:
+            return self._changes(dW)
+        _, basis, u = self.residual(W)
+        J = self._changes(dW, u)
+        return np.asarray(J - basis @ solution(basis, J))
+
+    def bare(self, W: ComplexArray, dW: ComplexArray) -> Bare:
+        """What was found of the bare rotor besides."""
+        _, basis, u = self.residual(W)
+        if not u.size:
+            return Bare(u, np.zeros((0, 0)), np.zeros((0, len(dW))), 0)
+        alone = least_squares(basis, np.zeros(len(basis)), sigma=1.0)
+        u = np.where(np.isnan(alone.values[::2] + alone.values[1::2]), np.nan, u)
+        assert alone.solution_covariance is not None
+        return Bare(u, alone.solution_covariance, solution(basis, self._changes(dW, u)), alone.rank)
+
+    def _changes(self, dW: ComplexArray, u: ComplexArray | None = None) -> FloatArray:
+        """Derivatives (m, n) of what the rows say, with what dW makes of the unknowns u."""
         change = self.effect(dW)
-        if self.data.modelled:
-            _, basis, u = self.residual(W)
+        if u is not None:
             bare = np.einsum("nscq,q->nsc", dW[..., len(self.data.nodes) :], u)
             change = change + bare[:, :, None, :] * self.take.sum(axis=1)[:, None]
-        J = self._white(np.moveaxis(change, 0, -1))
-        return J - basis @ solution(basis, J) if self.data.modelled else J
+        return self._white(np.moveaxis(change, 0, -1))
 
     def _project(self, W: ComplexArray, r: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
         if not self.data.modelled:

@@ -71,7 +71,8 @@ def run_readings(
             f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, this one has {rotor.n_nodes}: "
             "its planes and sensors would be elsewhere"
         )
-    if not (candidates or unbalance or bow or (len(trials.runs) > 1 and trials.weights.any())):
+    changed = bool((trials.weights != trials.weights[0]).any())
+    if not (candidates or unbalance or bow or changed):
         raise ValueError(
             "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
             "are needed, or nodes at which the unbalance may stand (--unbalance-at)"

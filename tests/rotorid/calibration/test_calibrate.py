@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_jobs import Runs, machine
 from fem_rotors import rotor23, uniform
+from helpers.calibration.jobs import Runs, machine
 from scipy.stats import chi2
 
 import fem
@@ -89,6 +89,7 @@ def truth_of(runs, values):
         (tabled(), SCALES, {"derivative": 1, "planes": {"P": (4, 0.12), "Q": (8, 0.2)}}),
         (machine(), MASSES, {}),
         (machine(), MASSES, {"free": False}),
+        (machine(), COEFFICIENTS, {"weights": ((0, 0), (2e-3, 0), (1e-3j, 0), (-1e-3, 1e-3), (0, 2e-3))}),
         (machine(), PROBES, {"key_phasor": 15.0}),
     ],
 )
@@ -272,7 +273,7 @@ def test_chi_square_and_errors_of_simulated_readings():
     """Noise as stated: χ² has its mean and quantile, and the numbers scatter as their deviations say."""
     values = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy": 2.2e4, "disc[1].mass": 25.0}
     truth = with_parameters(machine(), values)
-    runs, rng, draws = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(8), 50
+    runs, rng, draws = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(8), 40
     exact = runs.readings(truth)
     unknowns = [Unknown(path, start=value) for path, value in values.items()]
     found = []
@@ -287,6 +288,9 @@ def test_chi_square_and_errors_of_simulated_readings():
     chi = np.array([each.chi_square for each in found])
     assert chi.mean() == pytest.approx(dof, abs=4 * np.sqrt(2 * dof / draws))
     assert np.mean(chi > chi2.ppf(0.8, dof)) == pytest.approx(0.2, abs=4 * np.sqrt(0.16 / draws))
+    u = np.array([each.unbalance[0] - list(runs.unbalance.values()) for each in found])
+    u = u / np.array([each.unbalance_std[0] for each in found])
+    assert np.sqrt((abs(u) ** 2).mean(axis=0) / 2) == pytest.approx(1.0, abs=4 / np.sqrt(4 * draws))
     z = np.array([(each.values - list(values.values())) / each.std for each in found])
     assert z.std(axis=0) == pytest.approx(1.0, abs=4 / np.sqrt(2 * draws))
     assert abs(z.mean(axis=0)).max() < 4 / np.sqrt(draws)
@@ -419,3 +423,27 @@ def test_covariance_stands_as_the_rotor_does():
     again = calibrate(found.rotor, [Unknown(path) for path in values], [data], starts=1)
     assert found.rotor.calibration.covariance == pytest.approx(again.covariance, rel=1e-4)
     assert found.covariance != pytest.approx(again.covariance, rel=1e-2)
+
+
+def test_unbalances_that_the_readings_do_not_tell_apart_have_no_number():
+    """Two sensors at one speed tell two numbers, not three; degrees of freedom count those."""
+    runs = Runs(speeds=(250.0,), sensors={"a": (2, 0.0), "b": (10, 90.0)}, free=False)
+    runs.unbalance = {3: 1e-3, 6: 2e-3j, 9: -1e-3}
+    data = runs.data(runs.readings(machine()), errors=ERRORS)
+    found = calibrate(machine(), [Unknown("bearing[1].kxx", prior=(4e7, 1e6))], [data], starts=1)
+    assert np.isnan(found.unbalance[0]).all()
+    assert np.isnan(found.unbalance_std[0]).all()
+    assert found.dof == 2 * 2 * 3 + 1 - 4 - 1
+    assert "do not determine the unbalance of node 3, node 6 and node 9: name fewer" in found.warnings[-1]
+    told = found.to_dict()["unbalance"]
+    assert [each["size"] for each in told] == [None] * 3
+
+
+def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
+    """Of a symmetric rotor the derivatives by kxx alone couple forward and backward whirl."""
+    rotor = uniform(10, discs=[fem.Disc(4, 20.0)], supports=[fem.Support(n, 5e7, 1e4) for n in (1, 11)])
+    values = {"bearing[1].kxx": 4e7, "bearing[1].kyy": 6e7, "bearing[2].kxy": 5e6}
+    runs = Runs(unbalance={})
+    data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
+    found = calibrate(rotor, [Unknown(path) for path in values], [data])
+    assert found.values == pytest.approx(list(values.values()), rel=1e-6)

@@ -177,6 +177,10 @@ def test_runs_that_say_nothing_and_another_rotor(cli, folder):
     told = cli("calibrate", ROTOR23, job(folder, runs=("base",), weights=""), *args)
     assert told.code == 2
     assert "job.toml" in told.err
+    same = "\n".join(f"{run},P,10,0" for run in ("base", "trial"))  # and no difference between them
+    told = cli("calibrate", ROTOR23, job(folder, weights=same), *args)
+    assert told.code == 2
+    assert "job.toml: these runs say nothing of the rotor: no weights change" in told.err
     told = cli("calibrate", COMPRESSOR, job(folder), "--estimate", "bearing[1].kxx.scale")
     assert told.code == 2
     assert "job.toml: the job names a rotor of 24 nodes, this one has 25" in told.err

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from calibration_jobs import Runs, machine
+from helpers.calibration.jobs import Runs, machine
 
 from balancing.data.trials import ReadingErrors, RunScatter
 from fem.model.rotor_parameters import parameter_value, with_parameters

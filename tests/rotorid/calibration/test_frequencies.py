@@ -5,8 +5,8 @@ from dataclasses import replace
 import dense_rotor
 import numpy as np
 import pytest
-from calibration_jobs import machine
 from fem_rotors import rotor23, uniform
+from helpers.calibration.jobs import machine
 from scipy.linalg import eigh
 
 import fem

@@ -5,7 +5,7 @@ from dataclasses import replace
 import dense_rotor
 import numpy as np
 import pytest
-from calibration_jobs import Runs, bent, machine
+from helpers.calibration.jobs import Runs, bent, machine
 from scipy.linalg import eigh
 from scipy.stats import chi2
 

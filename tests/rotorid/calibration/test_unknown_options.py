@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from calibration_jobs import machine
 from fem_rotors import rotor23
+from helpers.calibration.jobs import machine
 
 import fem
 from rotorid.samples import sample_data
