@@ -69,8 +69,9 @@ class Machine(NamedTuple):
         return tuple(fem.Sensor(node, angle) for node in self.probes for angle in (45.0, 135.0))
 
     def unknowns(self, *, exact: bool = False) -> list[Unknown]:
-        """What `rotorid calibrate --estimate "bearing[*].*" --prior "bearing[*].*=20%"` takes as unknown."""
-        return unknowns(self.rotor, PROBES, "bearing[*].*", "bearing[*].*=20%", "", exact=exact)
+        """What `rotorid calibrate --estimate "bearing[*].*" --prior "…=20%"` takes as unknown."""
+        prior = "bearing[*].k*=20%, bearing[*].c*=20%"
+        return unknowns(self.rotor, PROBES, "bearing[*].*", prior, "", exact=exact)
 
 
 class Truth(NamedTuple):
@@ -274,6 +275,8 @@ def one_machine(
     numbers = machine.unknowns(exact=exact)
     held = [one for one in machine.unknowns() if exact and one.beside]
     found = calibrate(machine.rotor, numbers, [data], held=held, starts=1)
+    if not found.explained:  # else more starts, as the program makes them, end where one does
+        found = calibrate(machine.rotor, numbers, [data], held=held)
     try:
         return shot(random, machine, truth, found)
     except UndeterminedError as error:  # which leaves the machine as it is
@@ -349,8 +352,8 @@ def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: 
 
 def simulate(machines: int, seed: int, name: str, case: str) -> list[Outcome]:
     """So many machines of a kind."""
-    random = np.random.default_rng([seed, list(MACHINES).index(name), list(CASES).index(case)])
-    return [one_machine(random, name, **CASES[case]) for _ in range(machines)]
+    key = [seed, list(MACHINES).index(name), list(CASES).index(case)]
+    return [one_machine(np.random.default_rng([*key, k]), name, **CASES[case]) for k in range(machines)]
 
 
 def shots(name: str, found: Sequence[Outcome]) -> str:
