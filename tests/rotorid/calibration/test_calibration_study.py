@@ -1,4 +1,4 @@
-"""Drawn machines, calibrated and balanced in one shot: how well, how honest the intervals, what is recognised.
+"""Drawn machines, calibrated, balanced in one shot: how well, how honest the intervals, what is recognised.
 
 The example with few machines; bounds are those of what it prints for many (docs/coverage_calibrate.md), by
 the binomial distribution of so few.
