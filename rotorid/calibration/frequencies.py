@@ -6,7 +6,7 @@ rest, in the plane x without gyroscopic moments. Derivatives are central differe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -109,21 +109,58 @@ class MeasuredFrequencies:
         return np.concatenate(left)
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
-        """Derivatives (rows, n) by the numbers."""
+        """Derivatives (rows, n) by the numbers.
+
+        Over bearing tables a search at every step would take long: there Ω = f(Ω, θ) with the frequency f on
+        supports as they are at Ω, so that dΩ = ∂f/∂θ dθ / (1 − ∂f/∂Ω).
+        """
         rotor, m = with_parameters(start, values), len(self.modes)
         own = {path: values[path] for path in paths if not is_reading(path)}
         shapes = np.full(m * len(self.nodes), ROUNDING[1] / self.shape_std)
         tiny = np.append(ROUNDING[0] * self.frequencies / self.std, shapes)
+        rows = self._over_tables(rotor) if not (self.rest or rotor.constant) else self.residual
         K = np.zeros((tiny.size, len(own)))
         for k, path in enumerate(own):
             (up, one), (down, other) = _beside(rotor, path)
-            change = self.residual(one, {}) - self.residual(other, {})
+            change = rows(one, {}) - rows(other, {})
             if (np.abs(change) > tiny).any():
                 K[:, k] = change / (up - down)
         by_own = K @ as_they_stand(start, own)
         found = np.zeros((tiny.size, len(paths)))
         found[:, [k for k, path in enumerate(paths) if path in own]] = by_own
         return found
+
+    def _over_tables(self, rotor: Rotor) -> Callable[[Rotor, Mapping[str, float]], FloatArray]:
+        """Frequencies of rotors near this one, at the supports and modes of its critical speeds, as rows."""
+        most = int(self.modes.max())
+        speeds = self.frequencies + self.std * self.residual(rotor, {})
+
+        def listed(other: Rotor, speed: float) -> FloatArray:
+            return lowest_critical_speeds(as_at(other, speed), most).frequencies
+
+        which = [int(np.abs(listed(rotor, speed) - speed).argmin()) for speed in speeds]
+        step = STEP * speeds
+        ends = [
+            [listed(rotor, v)[k] for v in (w + h, w - h)] for w, h, k in zip(speeds, step, which, strict=True)
+        ]
+        steeper = 1.0 - (np.array(ends) @ (1.0, -1.0)) / (2 * step)
+
+        def rows(other: Rotor, _: Mapping[str, float]) -> FloatArray:
+            found = [listed(other, speed)[k] for speed, k in zip(speeds, which, strict=True)]
+            return np.asarray((found - self.frequencies) / self.std / steeper)
+
+        return rows
+
+
+def as_at(rotor: Rotor, speed: float) -> Rotor:
+    """The undamped rotor on supports as they are at a speed."""
+    return replace(
+        rotor,
+        supports=[
+            replace(s, stiffness=tuple(map(tuple, s.at(speed)[0].tolist())), damping=0.0, speeds=())
+            for s in rotor.supports
+        ],
+    )
 
 
 def _beside(rotor: Rotor, path: str) -> list[tuple[float, Rotor]]:
