@@ -447,3 +447,16 @@ def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
     data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
     found = calibrate(rotor, [Unknown(path) for path in values], [data])
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
+
+
+def test_critical_speeds_over_bearing_tables():
+    tables = [
+        replace(s, speeds=(1.0, 300.0, 800.0, 3000.0), stiffness=[3e7, 5e7, 9e7, 1.2e8])
+        for s in rotor23().supports
+    ]
+    rotor = replace(rotor23(), supports=tables)
+    values = {"bearing[1].stiffness.scale": 1.2, "bearing[2].stiffness.scale": 0.85}
+    speeds = fem.critical_speeds(with_parameters(rotor, values), 3).frequencies
+    data = MeasuredFrequencies(np.arange(1, 4), speeds, 1e-4 * speeds)
+    found = calibrate(rotor, [Unknown(path) for path in values], frequencies=[data], starts=1)
+    assert found.values == pytest.approx(list(values.values()), rel=1e-6)

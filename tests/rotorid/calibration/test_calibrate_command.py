@@ -1,5 +1,6 @@
 """`rotorid calibrate`: files and options in, numbers or one clear complaint out, and nothing half written."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,26 @@ def test_two_stiffnesses_from_three_rounded_critical_speeds(cli, folder):
     text = cli("calibrate", ROTOR23, critical(folder), "--estimate", TWO, "--exact").out
     assert text.startswith("The model explains the data")
     assert "modes count the forward critical speeds" in text
+
+
+def test_a_table_of_modes_at_rest(cli, folder):
+    """Frequencies and shapes of another stiffness; errors that are not stated are assumed, and said so."""
+    supports = [fem.Support(s.node, 9e7) for s in rotor23().supports]
+    modes = fem.critical_speeds(replace(rotor23(), supports=supports), 2)
+    rows = [
+        f"{k + 1},{modes.frequencies[k] / (2 * np.pi):.6f},{node},{-2 * modes.shapes[node - 1, k]:.6f}"
+        for k in (0, 1)
+        for node in (1, 8, 15, 24)
+    ]
+    (folder / "modes.csv").write_text("\n".join(["mode,frequency_Hz,node,shape", *rows]) + "\n")
+    told = cli("calibrate", ROTOR23, "modes.csv", "--estimate", "bearing.stiffness", "--exact", "--json")
+    assert told.code == 0, told.err
+    found = told.json["parameters"]["bearing.stiffness"]
+    assert found["value"] == pytest.approx(9e7, rel=1e-5)
+    assert told.json["degrees_of_freedom"] == 2 + 2 * 4 - 2 - 1
+    text = cli("calibrate", ROTOR23, "modes.csv", "--estimate", "bearing.stiffness", "--exact").out
+    assert "0.5 % of each frequency is assumed" in text
+    assert "5 % of each shape is assumed" in text
 
 
 def test_the_calibrated_rotor_is_written_with_its_errors(cli, folder):

@@ -137,3 +137,17 @@ def test_at_rest_the_pedestal_counts_in_x():
     support = fem.Support(1, ((3e7, 1e6), (2e6, 9e7)), 1e3, pedestal=stand)
     found = at_rest(uniform(4, supports=[support, fem.Support(5, 1e7)])).supports[0]
     assert (found.stiffness, found.damping, found.pedestal) == (3e7, 0.0, fem.Pedestal(20.0, 1e8))
+
+
+def test_over_tables_derivatives_are_those_of_the_critical_speeds_themselves():
+    """Of steep tables, by differences of what `critical_speeds` finds, whose own tests judge it."""
+    stiffness = [3e7, 5e7, 9e7, 1.2e8]
+    tables = [replace(s, speeds=(1.0, 300.0, 800.0, 3000.0), stiffness=stiffness) for s in rotor23().supports]
+    rotor = replace(rotor23(), supports=tables, model=fem.Model(gyroscopic=True, rotary_inertia=True))
+    values = {"bearing[1].stiffness.scale": 1.2, "bearing[2].stiffness.offset": 4e6, "disc[3].scale": 0.9}
+    found = measured([1, 2, 3], [200.0, 400.0, 900.0], 1.0).jacobian(rotor, values, list(values))
+    for k, (path, value) in enumerate(values.items()):
+        h = 1e-3 * (value if value < 1e3 else 1e7)
+        two = [with_parameters(rotor, {**values, path: value + by}) for by in (h, -h)]
+        up, down = (fem.critical_speeds(each, 3).frequencies for each in two)
+        assert found[:, k] == pytest.approx((up - down) / (2 * h), rel=1e-4)
