@@ -1,6 +1,6 @@
 """Unbalance from influence coefficients: trial runs in, correction weights out."""
 
-from balancing.coefficients.coefficients_from_model import modal_shapes, model_influence
+from balancing.coefficients.coefficients_from_model import modal_shapes, model_influence, with_parameters
 from balancing.coefficients.combined_coefficients import combine
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
@@ -76,4 +76,5 @@ __all__ = [
     "unbalance_of_run",
     "verdict_of_check",
     "verdict_of_prediction",
+    "with_parameters",
 ]

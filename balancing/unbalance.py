@@ -68,6 +68,7 @@ def estimate_unbalance(  # noqa: PLR0913
     names: Sequence[str] | None = None,
     covariance: ArrayLike | None = None,
     common: ComplexArray | None = None,
+    parameters: ComplexArray | None = None,
     ridge: float | None = None,
     shapes: ArrayLike | None = None,
     masses: ArrayLike | None = None,
@@ -91,6 +92,8 @@ def estimate_unbalance(  # noqa: PLR0913
     common
         What of it the readings have in common, as `balancing.Influence.common`, (2, M, S, C, Q + 1) with
         S C = N; default: nothing.
+    parameters
+        What of it errors of a model's parameters do, as `balancing.Influence.parameters`, (M, S, C, Q + 1).
     ridge
         λ relative to the largest singular value, for "ridge"; default: chosen as described above.
     shapes
@@ -133,12 +136,12 @@ def estimate_unbalance(  # noqa: PLR0913
     if channels is not None:
         variance = prediction_covariance(-U[: (channels.shape[1] - 2) // 2], channels)
         rows = np.moveaxis(stretch(G).reshape(2 * Q, N, 2), 1, 0)
-        shared = _shared(common, U, N)
-        own = variance - marginal(shared[..., None]).reshape(N, 2, 2)
-        out = symmetric(
-            sum(common_covariance(rows, shared[..., None]), np.einsum("nai,nij,nbj->ab", rows, own, rows))
-        )
-        white = _whitening(own, shared)
+        shared, known = _shared(common, U, N, (2,)), _shared(parameters, U, N, ())
+        known = known.reshape(-1, *shared.shape[2:])
+        own = variance - marginal(shared[..., None], known[..., None]).reshape(N, 2, 2)
+        parts = common_covariance(rows, shared[..., None], known[..., None])
+        out = symmetric(sum(parts, np.einsum("nai,nij,nbj->ab", rows, own, rows)))
+        white = _whitening(own, shared, known)
         left = white(residual[:, None])[:, :1]
         if used is None:  # the least that unbalance at the stations leaves
             fitted = white((A @ basis).astype(complex))
@@ -197,6 +200,7 @@ def unbalance_of_run(
         names=influence.planes,
         covariance=None if start.covariance is None else start.covariance.reshape(-1, n, n),
         common=start.common,
+        parameters=start.parameters,
         ridge=ridge,
         shapes=shapes,
         masses=masses,
@@ -232,22 +236,23 @@ def _channels(covariance: ArrayLike | None, N: int, Q: int) -> FloatArray | None
     return channels
 
 
-def _shared(common: ComplexArray | None, U: ComplexArray, N: int) -> ComplexArray:
-    """What Y − W U has in common, (2, M, S, C)."""
-    if common is None:
-        return np.zeros((2, 0, 1, N), dtype=complex)
-    if common.shape[2] * common.shape[3] != N or common.shape[4] != len(U) + 1:
-        raise ValueError(f"what {N} readings have in common has not the shape {common.shape}")
-    return np.asarray(common @ np.concatenate(([1.0], -U)))
+def _shared(columns: ComplexArray | None, U: ComplexArray, N: int, kinds: tuple[int, ...]) -> ComplexArray:
+    """What Y − W U has in common, or of parameters, (*kinds, M, S, C)."""
+    if columns is None:
+        return np.zeros((*kinds, 0, 1, N), dtype=complex)
+    if columns.shape[-3] * columns.shape[-2] != N or columns.shape[-1] != len(U) + 1:
+        raise ValueError(f"what {N} readings have in common has not the shape {columns.shape}")
+    return np.asarray(columns @ np.concatenate(([1.0], -U)))
 
 
-def _whitening(own: FloatArray, shared: ComplexArray) -> Callable[[ComplexArray], FloatArray]:
+def _whitening(
+    own: FloatArray, shared: ComplexArray, known: ComplexArray
+) -> Callable[[ComplexArray], FloatArray]:
     """How to divide readings (N, j) by the root of their covariance, into real ones (2N, 2j)."""
     S, C = shared.shape[2:]
     diagonal = np.repeat(_sigma(own) ** 2, 2).reshape(S, 2 * C)
-    white, _ = whitening(
-        diagonal[..., None] * np.eye(2 * C), real_columns(shared[1]), real_columns(shared[0])
-    )
+    run = np.concatenate((real_columns(shared[0]), real_columns(known)[..., ::2]), axis=-1)
+    white, _ = whitening(diagonal[..., None] * np.eye(2 * C), real_columns(shared[1]), run)
     return lambda z: white(stretch(z).reshape(S, 2 * C, -1)).reshape(2 * len(z), -1)
 
 

@@ -21,6 +21,7 @@ BENCHMARKS = (
     "balancing_discrete",
     "reduction",
     "motion",
+    "calibrate",
 )
 
 

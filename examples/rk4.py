@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,24 +71,45 @@ def scatter(trials: balancing.Trials) -> dict[str, float]:
 
 def table(trials: balancing.Trials, known: dict[str, Sequence[str]], method: str) -> None:
     """One line a run: error of disc 1, disc 2 and their sum, and whether the regions hold the truth."""
+    lines(
+        {run: (balancing.estimate_influence(of(trials, known[run])), of(trials, [run])) for run in known},
+        method,
+    )
+
+
+def lines(runs: dict[str, tuple[balancing.Influence, balancing.Trials]], method: str) -> None:
+    """The same, of coefficients with the bare rotor's vibration and each run itself."""
     print("  run        disk 1         disk 2         sum of both    (g·mm)")
-    held, warned = np.zeros(3, dtype=int), 0
-    for run, others in known.items():
-        one = of(trials, [run])
-        correction = balancing.correct(
-            difference(balancing.estimate_influence(of(trials, others)), one), refuse=False, method=method
-        )
-        error = DISC_1_2_AND_SUM @ (-correction.weights - one.weights[0])
-        covariance, radius2 = regions(correction)
-        z = np.column_stack([error.real, error.imag])
-        inside = np.einsum("ki,kij,kj->k", z, np.linalg.inv(covariance), z) <= radius2
-        sizes = np.sqrt(radius2 * np.linalg.eigvalsh(covariance)[:, -1])
-        rows = zip(G_MM * np.abs(error), G_MM * sizes, inside, strict=True)
+    found = {run: estimated(influence, one, method) for run, (influence, one) in runs.items()}
+    for run, (errors, sizes, inside, warned) in found.items():
+        rows = zip(errors, sizes, inside, strict=True)
         cells = [f"{e:5.2f} ± {size:5.2f} {'in' if i else '--'}" for e, size, i in rows]
-        print(f"  {run}  {'  '.join(cells)}  {'warned' if correction.warnings else 'silent'}")
-        held, warned = held + inside, warned + bool(correction.warnings)
+        print(f"  {run}  {'  '.join(cells)}  {'warned' if warned else 'silent'}")
+    held, warned = (
+        np.sum([getattr(one, name) for one in found.values()], axis=0) for name in ("inside", "warned")
+    )
     counts = f"disk 1 {held[0]}, disk 2 {held[1]}, sum {held[2]}"
-    print(f"  regions that hold the truth, of {len(known)}: {counts}; warned: {warned}")
+    print(f"  regions that hold the truth, of {len(found)}: {counts}; warned: {warned}")
+
+
+class Estimated(NamedTuple):
+    """Of disc 1, disc 2, their sum: errors, half the longest axes of the regions, g·mm; what these hold."""
+
+    errors: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    inside: NDArray[np.bool_]
+    warned: bool
+
+
+def estimated(influence: balancing.Influence, one: balancing.Trials, method: str) -> Estimated:
+    """Weights of a run from what it differs from the bare rotor by, beside what was mounted."""
+    correction = balancing.correct(difference(influence, one), refuse=False, method=method)
+    error = DISC_1_2_AND_SUM @ (-correction.weights - one.weights[0])
+    covariance, radius2 = regions(correction)
+    z = np.column_stack([error.real, error.imag])
+    inside = np.einsum("ki,kij,kj->k", z, np.linalg.inv(covariance), z) <= radius2
+    sizes = np.sqrt(radius2 * np.linalg.eigvalsh(covariance)[:, -1])
+    return Estimated(G_MM * np.abs(error), G_MM * sizes, inside, bool(correction.warnings))
 
 
 def difference(influence: balancing.Influence, one: balancing.Trials) -> balancing.Influence:
@@ -106,7 +128,8 @@ def difference(influence: balancing.Influence, one: balancing.Trials) -> balanci
     own = mean_covariance(one, errors)[0] + columns.own[0, ..., None, None] * np.eye(2)
     joint[..., :2, :2] += own
     both = np.concatenate((common * flip[::2], more), axis=1)
-    return replace(influence, baseline=one.mean[0] - bare, covariance=joint, common=both)
+    model = None if influence.parameters is None else influence.parameters * flip[::2]
+    return replace(influence, baseline=one.mean[0] - bare, covariance=joint, common=both, parameters=model)
 
 
 def regions(correction: balancing.Correction) -> tuple[NDArray[np.float64], float]:

@@ -68,6 +68,8 @@ class Campbell(Answered):
         Ranges of speed in which any mode grows, listed or not.
     cut
         What the list of critical speeds leaves out because only n modes were asked for; else empty.
+    std
+        Standard deviations of `frequencies`, from the calibration of the rotor; None without.
     """
 
     speeds: FloatArray
@@ -84,6 +86,7 @@ class Campbell(Answered):
     unstable: tuple[Growing, ...] = ()
     windows: tuple[Window, ...] = ()
     cut: str = ""
+    std: FloatArray | None = None
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -97,10 +100,12 @@ class Campbell(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
+        own = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
         return plain(
             {
                 "speeds_rad_s": self.speeds,
                 "frequencies_rad_s": self.frequencies.T,
+                **own,
                 "log_decrements": self.log_decrements.T,
                 "direction": self._ways().T,
                 "damped_critical_speeds_rad_s": self.critical_speeds,
@@ -120,6 +125,7 @@ class Campbell(Answered):
                 Column("speed_rad_s", np.repeat(self.speeds, n)),
                 Column("mode", np.tile(np.arange(1, n + 1), S)),
                 Column("frequency_rad_s", self.frequencies.ravel()),
+                *(Column("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
                 Column("log_decrement", self.log_decrements.ravel()),
                 Column("direction", self._ways().ravel()),
             )

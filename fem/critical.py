@@ -20,6 +20,7 @@ _LINE = 1e-6  # relative difference of forward and backward amplitude below whic
 _USUAL = 3  # critical speeds, where nothing else is asked for
 _FEW, _MANY = 4, 32  # looked for at first; over tables all are found at once, however many are asked for
 _NAMED = 5  # critical speeds beyond the end of a list that are named
+_SECANTS, _SAME = 12, 1e-12  # steps that follow a critical speed, and a step that is none
 NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
 _SLOW = 1e-6  # of the last speed of the tables: no motion of a rotor is slower, but as a rigid body
 
@@ -104,6 +105,42 @@ def critical_speeds_below(rotor: Rotor, top: float, most: float = np.inf) -> Flo
         if found.size < n or found[-1] > top or n >= most:
             return np.asarray(found[(found > 0) & (found <= top)])
         n *= 2
+
+
+def critical_speeds_near(rotor: Rotor, speeds: FloatArray) -> FloatArray:
+    """Critical speeds of a rotor that differs little from one with these, rad/s, each followed by secants.
+
+    Parameters
+    ----------
+    rotor
+        The other rotor.
+    speeds
+        rad/s, shape (n,); 0 of a rigid-body motion stays.
+
+    Raises
+    ------
+    ValueError
+        Where one leaves the bearing tables, or does not come to rest.
+    """
+    A = assemble(rotor)
+
+    def gap(speed: float) -> float:
+        """λ − Ω² of the mode nearest to the speed."""
+        squares = positive_modes(whole_rotor(rotor, A, speed), 1, speed * speed).squares
+        return float(squares[np.argmin(np.abs(squares - speed * speed))]) - speed * speed
+
+    def followed(speed: float) -> float:
+        before, now = gap(speed), speed
+        speed = float(np.sqrt(now * now + before))
+        for _ in range(_SECANTS):
+            if abs(speed - now) <= _SAME * speed:
+                return speed
+            here = gap(speed)
+            step = here * (speed - now) / (here - before) if here != before else 0.0
+            before, now, speed = here, speed, speed - step
+        raise ValueError(f"the critical speed near {speed:.6g} rad/s cannot be followed")
+
+    return np.array([followed(speed) if speed > 0 else 0.0 for speed in speeds.tolist()])
 
 
 def _check_number(n: int, available: int, reason: str = "") -> None:

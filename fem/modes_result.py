@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.model.rotor import Rotor
+from fem.parameter_bands import NORMAL_95
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.rpm import RPM
-from rotorid.base.text import counted, listing
+from rotorid.base.text import counted, error_figures, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,6 +50,8 @@ class Modes(Answered):
         What the reader must know.
     cut
         Which critical speeds the bearing tables hold beyond the n asked for; else empty.
+    std
+        Standard deviations of `frequencies`, from the calibration of the rotor; None without.
     """
 
     frequencies: FloatArray
@@ -60,6 +63,7 @@ class Modes(Answered):
     y: ComplexArray
     warnings: tuple[str, ...] = ()
     cut: str = ""
+    std: FloatArray | None = None
 
     @property
     def positions(self) -> FloatArray:
@@ -73,9 +77,11 @@ class Modes(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid critical`."""
+        own = {} if self.std is None else {"critical_speeds_std_rad_s": self.std}
         return plain(
             {
                 "critical_speeds_rad_s": self.frequencies,
+                **own,
                 "critical_speeds_rpm": self.rpm,
                 "positions_m": self.positions,
                 "mode_shapes": self.shapes.T,
@@ -96,10 +102,12 @@ class Modes(Answered):
         own = [f"{speed:.6g}" for speed in self.rpm if speed > 0]
         shown = listing(own, "and") if len(own) < _NAMED else f"{', '.join(own[:_NAMED])} …"
         ways = zip(self.frequencies, self.direction, strict=True)
+        error = () if self.std is None else (NORMAL_95 * RPM * self.std,)
         columns = (
             Column("mode", range(1, self.frequencies.size + 1), str),
             Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways], str),
             Column("rpm", self.rpm, "{:.2f}".format),
+            *(Column("error", values, error_figures, "± (95 %)") for values in error),
             Column("Hz", self.frequencies / (2 * np.pi), "{:.4f}".format),
             Column("rad/s", self.frequencies, "{:.4f}".format),
         )

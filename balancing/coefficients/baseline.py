@@ -40,7 +40,8 @@ class Start(NamedTuple):
 
     Y₀ (S, C), the covariance of (Y₀, W) per channel or None, errors of a reading, words for the user, how to
     print, what is mounted: run, planes, weights (None: nothing), what of the errors the channels have in
-    common (as `Influence.common`), and whether Y₀ is of new runs, which have not yet told of the errors.
+    common (as `Influence.common`), whether Y₀ is of new runs, which have not yet told of the errors, and what
+    errors of a model's parameters do (as `Influence.parameters`).
     """
 
     readings: ComplexArray
@@ -51,13 +52,14 @@ class Start(NamedTuple):
     mounted: tuple[str, tuple[str, ...], ComplexArray] | None
     common: ComplexArray | None = None
     fresh: bool = False
+    parameters: ComplexArray | None = None
 
     @property
     def own(self) -> FloatArray | None:
         """The covariance without what the channels have in common."""
-        if self.covariance is None or self.common is None:
-            return self.covariance
-        return symmetric(self.covariance - marginal(self.common))
+        if self.covariance is None:
+            return None
+        return symmetric(self.covariance - marginal(self.common, self.parameters))
 
 
 def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients") -> list[int]:
@@ -116,7 +118,8 @@ def _as_measured(influence: Influence, readings: ComplexArray) -> Start:
     """The vibration that the coefficients were measured with: their errors belong together."""
     known = ErrorModel(influence.errors, influence.reading_dof, influence.error_source)
     mounted = _last_run(influence)
-    return Start(readings, influence.covariance, known, (), influence.labels, mounted, influence.common)
+    start = Start(readings, influence.covariance, known, (), influence.labels, mounted, influence.common)
+    return start._replace(parameters=influence.parameters)
 
 
 def _same(influence: Influence, readings: ComplexArray) -> bool:
@@ -240,6 +243,8 @@ def _with_coefficients(
     """Covariance of (Y₀, W) per channel where Y₀ is the mean of runs (R, S, C) less what was mounted does."""
     S, C, P = influence.W.shape
     covariance = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
+    change = np.eye(P + 1, dtype=complex)
+    change[0] = [0.0, *-mounted.mean(axis=0)]
     warnings = model.warnings
     if influence.covariance is None:
         warnings += (
@@ -247,11 +252,7 @@ def _with_coefficients(
             "baseline run alone, the real ones are larger",
         )
     else:
-        effect = stretch(mounted.mean(axis=0)[None])  # W T as a row
-        change = np.eye(2 * P + 2)
-        change[:2, :2] = 0.0
-        change[:2, 2:] = -effect
-        covariance = change @ influence.covariance @ change.T
+        covariance = stretch(change) @ influence.covariance @ stretch(change).T
     columns = run_columns(influence.run_errors, runs_of(runs, mounted, influence.W))
     R = len(runs)
     further = columns.common.reshape(2, -1, S, C) / R
@@ -260,10 +261,10 @@ def _with_coefficients(
     common[..., 0] = further
     covariance += marginal(common)
     if influence.common is not None:
-        before = influence.common.copy()
-        before[..., 0] = -before[..., 1:] @ mounted.mean(axis=0)
-        common = np.concatenate((before, common), axis=1)
-    return Start(readings, symmetric(covariance), model, warnings, influence.labels, None, common, fresh=True)
+        common = np.concatenate((influence.common @ change.T, common), axis=1)
+    parameters = None if influence.parameters is None else influence.parameters @ change.T
+    covariance = symmetric(covariance)
+    return Start(readings, covariance, model, warnings, influence.labels, None, common, True, parameters)
 
 
 def _joined(model: ErrorModel, known: ErrorModel) -> ErrorModel:

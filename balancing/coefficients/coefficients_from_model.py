@@ -17,12 +17,14 @@ Offsets that cancel in trial runs (κ, β, peak or peak to peak) do not cancel h
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.influence import Influence
+from balancing.coefficients.run_errors import marginal
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
@@ -107,6 +109,34 @@ def model_influence(  # noqa: PLR0913
     )
 
 
+def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -> Influence:
+    """Coefficients of a model with the errors of its parameters.
+
+    Parameters
+    ----------
+    influence
+        As of `model_influence`; a covariance of its own is replaced.
+    columns
+        What independent errors of variance 1 change W by, to first order, in its unit: shape (M, S, C, P).
+        For parameters of covariance L Lᵀ: the derivatives of W by them, times L.
+    lack
+        What the lack of fit leaves: one standard deviation of each coefficient's real and imaginary part,
+        relative to its size, independent of each other; (S, C), or a number.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit, and what is not finite or below 0.
+    """
+    far = np.asarray(lack, dtype=np.float64)
+    if not (np.isfinite(far) & (far >= 0)).all():
+        raise ValueError("the relative errors that the lack of fit leaves must be finite numbers ≥ 0")
+    F = np.asarray(columns, dtype=complex)
+    found = replace(influence, parameters=np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1))
+    own = _model_covariance(found.W, np.broadcast_to(far, found.W.shape[:2])[..., None])
+    return replace(found, covariance=own + marginal(None, found.parameters))
+
+
 def modal_shapes(
     rotor: Rotor, planes: Mapping[str, str | int] | Sequence[str | int], modes: int
 ) -> FloatArray:
@@ -159,7 +189,7 @@ def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -
     return out
 
 
-def _model_covariance(W: ComplexArray, relative_error: float) -> FloatArray:
+def _model_covariance(W: ComplexArray, relative_error: float | FloatArray) -> FloatArray:
     """Covariance (S, C, 2P + 2, 2P + 2): (relative error · |W|)² of each part, nothing in common."""
     S, C, P = W.shape
     out = np.zeros((S, C, 2 * P + 2, 2 * P + 2))

@@ -9,8 +9,8 @@ of the same plane they must agree: A z = 0 for the differences A z. The best lin
 (least (ẑ − z)ᵀ C⁻¹ (ẑ − z), Lagrange). For a single number it is the mean weighted by 1/variance, both
 directions of a reading as their mean. What is measured together with a coefficient profits too: the reading
 of the bare rotor, and planes that only one side has, through their correlation. M also acts on what the
-channels of the measurement have in common; it is chosen for each channel alone. Errors of the model are taken
-as independent of each other (`balancing.model_influence`).
+channels of the measurement have in common, and on what errors of the model's parameters do to all of them; it
+is chosen for each channel alone.
 
 Whether both agree within their errors: d = W_measured − W_computed of one plane and reading has the
 covariance S = C_measured + C_computed, and χ² = dᵀ S⁻¹ d has two degrees of freedom.
@@ -73,7 +73,9 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     S, C, P = len(speeds), len(sensors), len(planes)
     W, Y = np.empty((S, C, P), dtype=complex), np.zeros((S, C), dtype=complex)
     covariance = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    common = np.zeros((2, _columns(measured) + _columns(computed), S, C, P + 1), dtype=complex)
+    each = [*_columns(measured), *_columns(computed)]
+    columns = np.zeros((sum(map(len, each)), S, C, P + 1), dtype=complex)
+    sides = np.concatenate(each[:3]), np.concatenate(each[3:])
     known, differences = np.zeros((S, C), dtype=bool), []
     for s, c in np.ndindex(S, C):
         a = _place(measured, ours[s], sensors[c])
@@ -85,7 +87,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
                 f"there is neither a measured nor a computed coefficient of plane {lacking!r} at sensor "
                 f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
             )
-        z, covariance[s, c], common[:, :, s, c], found = _reading(measured, a, computed, b, planes)
+        z, covariance[s, c], columns[:, s, c], found = _reading(measured, a, computed, b, planes, sides)
         Y[s, c], W[s, c] = z[0], z[1:]
         known[s, c] = a is not None
         differences += [(chi, p, c, s) for p, chi in found]
@@ -93,6 +95,8 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     if mounted is not None:
         by_name = dict(zip(measured.planes, mounted, strict=True))
         mounted = np.array([by_name.get(p, 0.0) for p in planes], dtype=complex)
+    parts = np.split(columns, np.cumsum([len(part) for part in each])[:-1])
+    run, speed, parameters = map(np.concatenate, zip(parts[:3], parts[3:], strict=True))
     dropped = measured.baseline is not None and not known.all()
     lost = (
         "the measured baseline does not cover all speeds and sensors of the combined coefficients: give the "
@@ -106,7 +110,8 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         W=W,
         baseline=Y if measured.baseline is not None and not dropped else None,
         covariance=covariance,
-        common=common,
+        common=np.stack((run, speed)),
+        parameters=parameters if len(parameters) else None,
         digits=None,
         warnings=measured.warnings
         + computed.warnings
@@ -164,27 +169,26 @@ def _reading(
     computed: Influence,
     b: tuple[int, int] | None,
     planes: tuple[str, ...],
+    sides: tuple[ComplexArray, ComplexArray],
 ) -> tuple[ComplexArray, FloatArray, ComplexArray, list[tuple[int, float]]]:
-    """(Y₀, W) of one reading (P + 1,), covariance, common columns, χ² of the planes that both sides have."""
+    """(Y₀, W) of one reading (P + 1,), covariance, columns, χ² of the planes that both sides have."""
     first = measured.planes if a is not None else ()
     second = computed.planes if b is not None else ()
-    n, m = 1 + len(first), _columns(measured)
+    n, m = 1 + len(first), len(sides[0])
     z = np.zeros(n + len(second), dtype=complex)
     covariance = np.zeros((2 * len(z), 2 * len(z)))
-    common = np.zeros((2, m + _columns(computed), len(z)), dtype=complex)
+    columns = np.zeros((m + len(sides[1]), len(z)), dtype=complex)
     if a is not None:
         assert measured.covariance is not None
         z[0] = 0.0 if measured.baseline is None else measured.baseline[a]
         z[1:n] = measured.W[a]
         covariance[: 2 * n, : 2 * n] = measured.covariance[a]
-        if measured.common is not None:
-            common[:, :m, :n] = measured.common[(slice(None), slice(None), *a)]
+        columns[:m, :n] = sides[0][:, *a]
     if b is not None:
         assert computed.covariance is not None
         z[n:] = computed.W[b]
         covariance[2 * n :, 2 * n :] = computed.covariance[b][2:, 2:]
-        if computed.common is not None:
-            common[:, m:, n:] = computed.common[(slice(None), slice(None), *b)][..., 1:]
+        columns[m:, n:] = sides[1][:, *b, 1:]
     M, chi = np.eye(len(z), dtype=complex), []
     both = [(1 + first.index(p), n + second.index(p), planes.index(p)) for p in first if p in second]
     if both:
@@ -197,11 +201,14 @@ def _reading(
         H = hermitian(covariance[None])[0]
         M -= H @ A.T @ _inverse(A @ H @ A.T) @ A
     M = M[[0, *(1 + first.index(p) if p in first else n + second.index(p) for p in planes)]]
-    return M @ z, symmetric(stretch(M) @ covariance @ stretch(M).T), common @ M.T, chi
+    return M @ z, symmetric(stretch(M) @ covariance @ stretch(M).T), columns @ M.T, chi
 
 
-def _columns(side: Influence) -> int:
-    return 0 if side.common is None else side.common.shape[1]
+def _columns(side: Influence) -> tuple[ComplexArray, ...]:
+    """What is common to the run, at a speed, and to errors of parameters, each (M, S, C, P + 1)."""
+    nothing = np.zeros((0, *side.W.shape[:2], side.W.shape[2] + 1), dtype=complex)
+    common = (nothing, nothing) if side.common is None else side.common
+    return *common, nothing if side.parameters is None else side.parameters
 
 
 def _inverse(S: AnyArray) -> AnyArray:

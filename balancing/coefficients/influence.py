@@ -103,6 +103,10 @@ class Influence:
         The runs; None: stored coefficients.
     last_run, last_weights
         Name of the last run, and the weights mounted in it, shape (P,); None for stored coefficients.
+    parameters
+        What of it errors of a model's parameters do, which are known: (Y₀, W₁, …) errs by the sum of these
+        columns, each times an independent real number of variance 1, the same at all speeds and sensors.
+        Shape (M, S, C, P + 1).
     """
 
     speeds: FloatArray
@@ -127,6 +131,7 @@ class Influence:
 
     contradictions: tuple[str, ...] = ()
     trials: Trials | None = None
+    parameters: ComplexArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
@@ -140,6 +145,8 @@ class Influence:
         self._frozen("last_weights", (P,), complex)
         if self.common is not None:
             self._frozen("common", (2, np.shape(self.common)[1], S, C, P + 1), complex)
+        if self.parameters is not None:
+            self._frozen("parameters", (len(self.parameters), S, C, P + 1), complex)
 
     def _frozen(self, name: str, shape: tuple[int, ...], kind: type) -> None:
         value = getattr(self, name)
@@ -160,7 +167,8 @@ class Influence:
             return None
         if self.run_errors.origin != "assumed" or self.common is None:
             return self.covariance
-        return symmetric((self.covariance - marginal(self.common)) * (1 - self.own_between))
+        own = self.covariance - marginal(self.common, self.parameters)
+        return symmetric(own * (1 - self.own_between) + marginal(None, self.parameters))
 
     @property
     def unit(self) -> str:
@@ -181,9 +189,9 @@ class Influence:
         def cut(array: FloatArray | None) -> FloatArray | None:
             return None if array is None else array[np.ix_(speeds, sensors, own, own)]
 
-        common = self.common
-        if common is not None:
-            common = common[:, :, speeds][:, :, :, sensors][..., chosen]
+        def columns(array: ComplexArray | None) -> ComplexArray | None:
+            return None if array is None else array[..., speeds, :, :][..., sensors, :][..., chosen]
+
         return replace(
             self,
             speeds=self.speeds[list(speeds)],
@@ -192,7 +200,8 @@ class Influence:
             W=self.W[np.ix_(speeds, sensors, planes)],
             baseline=None if self.baseline is None else self.baseline[np.ix_(speeds, sensors)],
             covariance=cut(self.covariance),
-            common=common,
+            common=columns(self.common),
+            parameters=columns(self.parameters),
             digits=cut(self.digits),
             last_weights=None if self.last_weights is None else self.last_weights[planes],
         )

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from balancing.coefficients.run_errors import Origin, RunErrors, Runs
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import gain
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.regression import gain, stretch
 
 SIZES = np.geomspace(3e-4, 1.0, 12)
 """Whole size relative to the root mean square reading; refined where the likelihood is."""
@@ -200,9 +200,7 @@ def _outer(columns: ComplexArray) -> ComplexArray:
     return np.asarray(columns.T @ columns.conj())
 
 
-def _without(
-    free: ComplexArray, e: ComplexArray, V: ComplexArray, known: ComplexArray
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+def _without(free: AnyArray, e: AnyArray, V: AnyArray, known: AnyArray) -> tuple[AnyArray, ...]:
     """Residuals and their covariances, (…, n, n) both, without what the free unknowns do."""
     P = free.shape[-1]
     if not P:
@@ -261,12 +259,7 @@ def scatter(
 
 
 def seen_in(
-    run: RunErrors,
-    residual: ComplexArray,
-    own: FloatArray,
-    between: float,
-    common: ComplexArray | None,
-    W: ComplexArray,
+    run: RunErrors, residual: ComplexArray, parts: FloatArray, W: ComplexArray
 ) -> tuple[float, RunErrors]:
     """Probability that errors alone leave more of a corrected reading than was found; what it says of them.
 
@@ -276,28 +269,19 @@ def seen_in(
         Errors between runs: how sure their size is.
     residual, W
         Y₀ + W D, (S, C), and coefficients, (S, C, P).
-    own, between
-        Its variance in one direction without common errors, (S, C); share of errors between runs in it.
-    common
-        Columns of the residual in common, as `Influence.common`: (2, M, S, C).
+    parts
+        What of its covariance comes from what, as `RunErrors.degrees` takes it, (5, 2N, 2N).
     """
     dof = residual.size - W.shape[-1]
     if dof <= 0:
         return 1.0, run
     likely = run.probability > _UNLIKELY * run.probability.max()
     probability, ratios = _normal(np.log(run.probability[likely])), run.ratios[likely]
-    first = ratios[:, 0]
-    factor = (1 - between) * (first if run.merged else 1.0) + between * first
-    n = residual.size
-    F = np.zeros((2, 1, n)) if common is None else common.reshape(2, -1, n)
-    whole, by_speed = F.swapaxes(1, 2) @ F.conj()
-    by_speed = by_speed * np.kron(np.eye(len(residual)), np.ones((residual.shape[1],) * 2))
-    parts = 2 * np.stack((np.diag(own.ravel()).astype(complex), by_speed, whole))
-    e, parts, _ = _without(W, residual, parts, parts[0])
-    V = np.einsum("gk,kij->gij", np.column_stack((factor, ratios[:, 1:])), parts)
+    e, parts, _ = _without(stretch(W.reshape(residual.size, -1)), stretch(residual.ravel()), parts, parts[0])
+    V = np.einsum("gk,kij->gij", run.factors(ratios), parts)
     V += 1e-12 * np.trace(V, axis1=1, axis2=2).max() * np.eye(len(e))
-    q = (e.conj() @ np.linalg.solve(V, e[None, :, None])[..., 0].T).real
-    seen = _normal(np.log(probability) - np.linalg.slogdet(V)[1] - q)
+    q = e @ np.linalg.solve(V, e[None, :, None])[..., 0].T / 2
+    seen = _normal(np.log(probability) - np.linalg.slogdet(V)[1] / 2 - q)
     return _chance(q, dof, probability), replace(run, probability=seen, ratios=ratios)
 
 

@@ -72,13 +72,19 @@ class RunErrors:
         p, w, f = np.sum(self.sizes**2, axis=1)
         return np.asarray(p * np.abs(readings) ** 2 + w * np.abs(effect) ** 2 + f)
 
+    def factors(self, ratios: FloatArray) -> FloatArray:
+        """Of the readings' own errors, the three kinds (G, 3), and known errors of a model, (G, 5)."""
+        known = np.ones(len(ratios))
+        return np.column_stack((ratios[:, 0] if self.merged else known, ratios, known))
+
     def degrees(self, parts: FloatArray, reading_dof: float | None = None) -> tuple[float, float | None]:
         """Scale and degrees of freedom of a covariance that holds these errors.
 
         Parameters
         ----------
         parts
-            What of it comes from the readings' own errors and from the three kinds, (4, n, n).
+            What of it comes from the readings' own errors, from the three kinds, and from errors of a model,
+            which are known; (4, n, n) without them, or (5, n, n).
         reading_dof
             Degrees of freedom of the readings' own errors; None: known.
 
@@ -97,8 +103,7 @@ class RunErrors:
         spread = 0.0 if reading_dof is None else share**2 / reading_dof
         likely = self.probability > _LIKELY * self.probability.max()
         weight, ratios = self.probability[likely] / self.probability[likely].sum(), self.ratios[likely]
-        first = ratios[:, 0] if self.merged else np.ones(len(ratios))
-        each = np.einsum("gk,kij->gij", np.column_stack((first, ratios)), white)
+        each = np.einsum("gk,kij->gij", self.factors(ratios)[:, : len(white)], white)
         values = np.linalg.eigvalsh(each).clip(1e-9)
         size = float(np.exp(weight @ np.log(values).mean(axis=1)))
         if values.max() - values.min() < 1e-3 * size:
@@ -174,11 +179,16 @@ def unbalances(W: ComplexArray) -> ComplexArray:
     return np.asarray(columns / np.where(size > 0, size, 1.0))
 
 
-def marginal(common: ComplexArray) -> FloatArray:
-    """Covariance of each channel by common columns (…, M, S, C, n), (S, C, 2n, 2n)."""
-    F = common.reshape(-1, *common.shape[-3:])
-    H = np.einsum("mscp,mscq->scpq", F, F.conj())
-    return stretch(H)
+def marginal(common: ComplexArray | None, parameters: ComplexArray | None = None) -> FloatArray:
+    """Covariance of each channel by common columns (…, M, S, C, n) and of parameters, (S, C, 2n, 2n)."""
+    out = np.zeros((1, 1, 1, 1))
+    if common is not None:
+        F = common.reshape(-1, *common.shape[-3:])
+        out = stretch(np.einsum("mscp,mscq->scpq", F, F.conj()))
+    if parameters is not None:
+        real = stretch(parameters[..., None])[..., 0]
+        out = out + np.einsum("mscp,mscq->scpq", real, real)
+    return out
 
 
 def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:

@@ -98,16 +98,19 @@ def compare_check(
         single = reading_covariance(predicted, both_directions(used)) / check.repeats[..., None, None]
         single += (_EXACT * np.abs(before).max()) ** 2 * np.eye(2)
         further = run_columns(influence.run_errors, runs_of(predicted, T, W))
-        V, common = _joint(start, pick, T, single, further)
-        blocks = V + marginal(common)
+        V, common, parameters = _joint(start, pick, T, single, further)
+        blocks = V + marginal(common, parameters)
         R = len(check.runs)
         covariance = np.einsum("scrarb->rscab", blocks.reshape(*blocks.shape[:2], R, 2, R, 2))
         d = _vectors(achieved - predicted)
         distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, np.linalg.solve(covariance, d[..., None])[..., 0]))
-        white, shares = whitening(_by_speed(V), *map(_columns, common[::-1]))
+        run, speed, known = *map(_columns, common), _columns(parameters)[..., ::2]
+        white, shares = whitening(_by_speed(V), speed, np.concatenate((run, known), axis=-1))
+        model = float(np.sum(white(known) ** 2)) / d.size
         stacked = np.moveaxis(d, 0, 2).reshape(len(at), -1, 1)
         between = influence.own_between
-        kinds = np.array([shares[0] * (1 - between), shares[0] * between, *shares[1:]])
+        own_share, at_speed, whole = shares
+        kinds = np.array([own_share * (1 - between), own_share * between, at_speed, whole - model, model])
         # all directions alike: so many tell the degrees of freedom
         unit = np.eye(min(d.size, _DIRECTIONS))
         scale, dof = influence.run_errors.degrees(kinds[:, None, None] * unit, dof)
@@ -165,10 +168,10 @@ def _index(name: str, names: tuple[str, ...], what: str) -> int:
 
 def _joint(
     start: Start, pick: tuple[IndexArray, ...], T: ComplexArray, single: FloatArray, further: RunColumns
-) -> tuple[FloatArray, ComplexArray]:
-    """Own covariance of all differences of each sensor and speed (S, C, 2R, 2R), and common columns.
+) -> tuple[FloatArray, ComplexArray, ComplexArray]:
+    """Own covariance of all differences of each sensor and speed (S, C, 2R, 2R), and columns.
 
-    The latter as `Influence.common`, (2, M, S, C, R).
+    The latter as `Influence.common`, (2, M, S, C, R), and `Influence.parameters`, (M, S, C, R).
     """
     R, S, C = single.shape[:3]
     factors = np.column_stack((np.ones(R), T))
@@ -180,10 +183,12 @@ def _joint(
     each = np.einsum("krmsc,rq->krmscq", further.common, np.eye(R)).reshape(2, -1, S, C, R)
     for r in range(R):
         blocks[:, :, r, :, r, :] += own[r]
-    if start.common is None:
-        return symmetric(V), each
-    before = start.common[:, :, pick[0], pick[1]] @ factors.T
-    return symmetric(V), np.concatenate((before, each), axis=1)
+    if start.common is not None:
+        each = np.concatenate((start.common[:, :, pick[0], pick[1]] @ factors.T, each), axis=1)
+    known = np.zeros((0, S, C, R), dtype=complex)
+    if start.parameters is not None:
+        known = start.parameters[:, pick[0], pick[1]] @ factors.T
+    return symmetric(V), each, known
 
 
 def _by_speed(V: FloatArray) -> FloatArray:
@@ -193,7 +198,8 @@ def _by_speed(V: FloatArray) -> FloatArray:
 
 
 def _columns(common: ComplexArray) -> FloatArray:
-    return real_columns(common.reshape(*common.shape[:2], -1))
+    M, S, C, R = common.shape
+    return real_columns(common.reshape(M, S, C * R))
 
 
 def _change(

@@ -130,6 +130,7 @@ def correct(  # noqa: PLR0913
         start.labels.weight_words,
         None if errors is None else errors.common,
         None if errors is None else errors.explain,
+        None if errors is None else errors.parameters,
     )
     fitted, method = _fitted(
         stack, method, strength, keep, assumed=asked is None and start.model.source == "assumed"

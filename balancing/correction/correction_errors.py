@@ -18,7 +18,7 @@ from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.correction_methods import Fitted
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorid.regression import stretch
 
 
@@ -33,8 +33,8 @@ class StackErrors:
     channels, total
         Covariance of (Re Y, Im Y, Re W₁, …) of each reading, without and with what readings have in common,
         (N, 2P + 2, 2P + 2).
-    common
-        As `Influence.common`, (2, M, S, C, P + 1).
+    common, parameters
+        As of `Influence`, (2, M, S, C, P + 1) and (M, S, C, P + 1).
     start
         Errors of a further reading.
     run
@@ -48,6 +48,7 @@ class StackErrors:
     channels: FloatArray
     total: FloatArray
     common: ComplexArray | None
+    parameters: ComplexArray | None
     start: Start
     run: RunErrors
     between: float
@@ -61,9 +62,7 @@ class StackErrors:
         if fitted.covariance is None or not fitted.parts:
             return fitted.covariance, self.start.model.dof
         run = self._after(fitted.weights)[1] if self.start.fresh and fitted.explained else self.run
-        own, speed, whole = fitted.parts
-        parts = np.stack((own * (1 - self.between), own * self.between, speed, whole))
-        scale, dof = run.degrees(parts, self.start.model.dof)
+        scale, dof = run.degrees(self._parts(*fitted.parts), self.start.model.dof)
         return fitted.covariance * scale, dof
 
     def check_run(self, D: ComplexArray, after: ComplexArray) -> FloatArray:
@@ -84,27 +83,33 @@ class StackErrors:
 
         each = self.check_run(D, after).reshape(-1, 2, 2)
         further = run_columns(self.run, runs_of(after[None], D[None], self.W)).common
-        columns = further.reshape(2, -1, *after.shape)
-        if self.common is not None:
-            columns = np.concatenate((self.common @ np.concatenate(([1.0], D)), columns), axis=1)
-        shared = columns[0].reshape(-1, after.size)
-        joint = shared.T @ shared.conj()
-        C = after.shape[1]
-        for s, part in enumerate(np.moveaxis(columns[1], 1, 0)):
-            joint[s * C : s * C + C, s * C : s * C + C] += part.T @ part.conj()
-        a = stretch(after.ravel()).reshape(-1, 2)
-        mean = float(np.sum(a**2) + np.trace(each, axis1=1, axis2=2).sum())
-        apart = joint - np.diag(np.diag(joint))
-        variance = 2 * float(np.sum(each**2)) + 4 * float(np.einsum("ni,nij,nj->", a, each, a))
-        variance += 4 * float(np.sum(np.abs(apart) ** 2))
-        variance += 4 * float((after.ravel().conj() @ apart @ after.ravel()).real)
+        joint = sum(self._shared(D, further.reshape(2, -1, *after.shape)), np.zeros((2 * after.size,) * 2))
+        n = np.arange(after.size)
+        joint.reshape(len(n), 2, len(n), 2)[n, :, n] = each
+        a = stretch(after.ravel())
+        mean = float(a @ a + np.trace(joint))
+        variance = 2 * float(np.sum(joint**2)) + 4 * float(a @ joint @ a)
         shape = 1 / (variance / mean**2 + (0 if dof is None else 2 / dof))
         return float(np.sqrt(mean * gammaincinv(shape, 0.95) / shape / after.size))
 
     def _after(self, D: ComplexArray) -> tuple[float, RunErrors]:
-        own = np.trace(prediction_covariance(D, self.channels), axis1=1, axis2=2).reshape(self.Y.shape) / 2
-        shared = None if self.common is None else self.common @ np.concatenate(([1.0], D))
-        return seen_in(self.run, self.Y + self.W @ D, own, self.between, shared, self.W)
+        own = np.trace(prediction_covariance(D, self.channels), axis1=1, axis2=2) / 2
+        parts = self._parts(np.diag(np.repeat(own, 2)), *self._shared(D, np.zeros((2, 0, *self.Y.shape))))
+        return seen_in(self.run, self.Y + self.W @ D, parts, self.W)
+
+    def _parts(self, own: FloatArray, *others: FloatArray) -> FloatArray:
+        """As `RunErrors.degrees` takes them, (5, n, n)."""
+        return np.stack((own * (1 - self.between), own * self.between, *others))
+
+    def _shared(self, D: ComplexArray, further: AnyArray) -> tuple[FloatArray, ...]:
+        """Of Y₀ + W D what is common at a speed, to the run (`further` too), of parameters, (2N, 2N) each."""
+        z = np.concatenate(([1.0], D))
+        S, C = self.Y.shape
+        common = further if self.common is None else np.concatenate((self.common @ z, further), axis=1)
+        run, speed = (stretch(F.T @ F.conj()) for F in common.reshape(2, -1, S * C))
+        moved = np.zeros((0, S, C)) if self.parameters is None else self.parameters @ z
+        columns = stretch(moved.reshape(-1, S * C).T)[:, ::2]
+        return speed * np.kron(np.eye(S), np.ones((2 * C,) * 2)), run, columns @ columns.T
 
 
 def stack_errors(
@@ -124,13 +129,17 @@ def stack_errors(
         return None
     index: IntArray = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
     n = len(index)
-    common = None if start.common is None else start.common[:, :, used][..., [0, *(1 + p for p in chosen)]]
+    common, parameters = (
+        None if columns is None else columns[..., used, :, :][..., [0, *(1 + p for p in chosen)]]
+        for columns in (start.common, start.parameters)
+    )
     return StackErrors(
         influence.W[used][..., chosen],
         start.readings[used],
         own[used][..., index[:, None], index].reshape(-1, n, n),
         start.covariance[used][..., index[:, None], index].reshape(-1, n, n),
         common,
+        parameters,
         start,
         influence.run_errors,
         influence.own_between,

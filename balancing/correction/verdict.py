@@ -250,9 +250,10 @@ def verdict_of_check(
         W, Y = known.W[..., chosen].reshape(-1, len(chosen)), start.readings.ravel()
         check_planes(W, used)
         errors = stack_errors(known, start, list(range(len(at))), chosen)
-        own, common = (None, None) if errors is None else (errors.channels, errors.common)
+        own, *columns = (None,) * 3 if errors is None else (errors.channels, errors.common, errors.parameters)
         names = reading_names(start.labels, known.sensors, known.speeds)
-        found = fit_weights(Stack(W, Y, own, None, None, used, names, str, str, common), "least-squares")
+        stack = Stack(W, Y, own, None, None, used, names, str, str, columns[0], parameters=columns[1])
+        found = fit_weights(stack, "least-squares")
         covariance, dof = (None, None) if errors is None else errors.weights(found)
         if errors is not None and not errors.explain(found.weights, POOR):
             warnings += (_UNEXPLAINED,)

@@ -21,7 +21,7 @@ from balancing.solvers.effective_variance import FLOOR, Effective, effective_var
 from balancing.solvers.error_propagation import common_covariance, correction_jacobian
 from balancing.solvers.least_squares_minmax import Criterion, Solution, solve
 from balancing.solvers.monte_carlo import sampled_covariance
-from balancing.solvers.regularised import ridge, truncated
+from balancing.solvers.regularised import Regularised, ridge, truncated
 from balancing.solvers.weighted_limits import (
     RIVAL,
     SETTLED_DRAWN,
@@ -52,6 +52,8 @@ class Stack:
         What the readings have in common, as `balancing.Influence.common`.
     explained
         Whether the errors explain what weights leave.
+    parameters
+        Errors of a model's parameters, as `balancing.Influence.parameters`.
     row_weights
         How much each reading counts, (N,); None: all alike.
     limits
@@ -73,6 +75,7 @@ class Stack:
     weight: Callable[[float], str]
     common: ComplexArray | None = None
     explained: Callable[[ComplexArray], bool] | None = None
+    parameters: ComplexArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +89,8 @@ class Fitted:
     covariance
         (2P, 2P); None where errors are unknown.
     parts
-        What of it comes from own errors, from those common at a speed and to a run, three times (2P, 2P).
+        What of it comes from own errors, those common at a speed, to a run, and of a model's parameters, four
+        times (2P, 2P).
     gap
         Certified relative distance from the optimum; None for a closed form or a search.
     chi_square, dof
@@ -194,15 +198,7 @@ def _propagated(stack: Stack, D: ComplexArray, row_weights: FloatArray | None) -
     W, r = w[:, None] * stack.W, w * (stack.Y + stack.W @ D)
     J = w[:, None, None] * correction_jacobian(W, D, r)
     own = symmetric(np.sum(J @ stack.channels @ np.swapaxes(J, 1, 2), axis=0))
-    return (own, *_shared(J, stack))
-
-
-def _shared(J: FloatArray, stack: Stack) -> tuple[FloatArray, FloatArray]:
-    """By errors common at a speed, and to a run."""
-    if stack.common is None:
-        return np.zeros((J.shape[1],) * 2), np.zeros((J.shape[1],) * 2)
-    run, speed = common_covariance(J, stack.common)
-    return speed, run
+    return (own, *common_covariance(J, stack.common, stack.parameters))
 
 
 def _weighted(stack: Stack) -> Fitted:
@@ -229,7 +225,7 @@ def _weighted(stack: Stack) -> Fitted:
 
 
 def _unlimited(stack: Stack, free: Effective) -> Fitted:
-    parts = (free.covariance, *_shared(free.derivatives, stack))
+    parts = (free.covariance, *common_covariance(free.derivatives, stack.common, stack.parameters))
     total = symmetric(sum(parts[1:], parts[0]))
     told = free.model_error == 0
     return Fitted(free.weights, total, parts, chi_square=free.chi_square, dof=free.dof, explained=told)
@@ -269,7 +265,7 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
     return Fitted(
         D,
         covariance,
-        (free.covariance, *_shared(free.derivatives, stack)),
+        (free.covariance, *common_covariance(free.derivatives, stack.common, stack.parameters)),
         chi_square=given(stack.W, stack.Y, 0.0).chi_square(D),
         dof=free.dof,
         explained=free.model_error == 0,
@@ -289,16 +285,18 @@ def _sampled(
     stack: Stack, solver: Callable[[ComplexArray, ComplexArray], ComplexArray], channels: FloatArray
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
     """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
+    common, known = stack.common, stack.parameters
     try:
-        return sampled_covariance(solver, stack.W, stack.Y, channels, common=stack.common), ()
+        return sampled_covariance(solver, stack.W, stack.Y, channels, common=common, parameters=known), ()
     except ValueError as error:
         return None, (str(error),)
 
 
 def _ridge(stack: Stack, strength: float | str) -> Fitted:
     total = stack.channels
-    if total is not None and stack.common is not None:
-        total = total + marginal(stack.common).reshape(total.shape)
+    if total is not None:
+        shared = marginal(stack.common, stack.parameters)
+        total = total + shared.reshape(-1, *shared.shape[2:])
     found = ridge(
         stack.W,
         stack.Y,
@@ -308,7 +306,14 @@ def _ridge(stack: Stack, strength: float | str) -> Fitted:
         total=total,
         planes=stack.planes,
     )
-    return Fitted(found.weights, found.covariance, warnings=(found.words,))
+    return Fitted(found.weights, _with_model(stack, found), warnings=(found.words,))
+
+
+def _with_model(stack: Stack, found: Regularised) -> FloatArray | None:
+    """Covariance with what errors of a model's parameters do."""
+    if found.covariance is None:
+        return None
+    return symmetric(found.covariance + common_covariance(found.jacobian, None, stack.parameters)[2])
 
 
 def _truncated(stack: Stack, keep: float) -> Fitted:
@@ -326,7 +331,7 @@ def _truncated(stack: Stack, keep: float) -> Fitted:
                 f"the last combination of planes that is kept has only {share:.1g} of the effect of the "
                 "first: no instrument measures that; keep fewer"
             )
-    return Fitted(found.weights, found.covariance, warnings=tuple(words))
+    return Fitted(found.weights, _with_model(stack, found), warnings=tuple(words))
 
 
 METHODS: tuple[Method[Callable[[Stack], Fitted]], ...] = (

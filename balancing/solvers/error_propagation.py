@@ -72,22 +72,29 @@ def error_form(covariance: FloatArray, row_weights: FloatArray | None = None) ->
     return np.asarray(2 * np.einsum("n,npq->qp", rows, hermitian(covariance)))
 
 
-def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Covariances (2P, 2P) by errors that readings have in common: those of the whole run, of each speed.
+def common_covariance(
+    J: FloatArray, common: ComplexArray | None, parameters: ComplexArray | None
+) -> tuple[FloatArray, ...]:
+    """Covariances (2P, 2P) by errors common at a speed, to the whole run, and of a model's parameters.
 
     Parameters
     ----------
     J
         Derivatives of the stretched D by (Re Y₀, Im Y₀, Re W₁, …) of each reading, (N, 2P, 2P + 2).
-    common
-        As `balancing.Influence.common`, (2, M, S, C, P + 1), N = S C.
+    common, parameters
+        As of `balancing.Influence`, (2, M, S, C, P + 1) and (M, S, C, P + 1), N = S C.
     """
-    _, M, S, C, n = common.shape
-    F = stretch(common[..., None]).reshape(2, M, S * C, 2 * n, 2)
-    moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, J.shape[1], 2).sum(axis=3)
-    run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, J.shape[1], 2)
-    first, second = (np.einsum("mqu,mpu->qp", part, part) for part in (run, speed))
-    return first, second
+    size = J.shape[1]
+    run, speed, known = np.zeros((3, 0, size, 2))
+    if common is not None:
+        _, M, S, C, n = common.shape
+        F = stretch(common[..., None]).reshape(2, M, S * C, 2 * n, 2)
+        moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, size, 2).sum(axis=3)
+        run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, size, 2)
+    if parameters is not None:
+        F = stretch(parameters[..., None])[..., :1].reshape(len(parameters), *J.shape[::2], 1)
+        known = np.einsum("nqz,mnzu->mqu", J, F)
+    return tuple(np.einsum("mqu,mpu->qp", part, part) for part in (speed, run, known))
 
 
 def whitening(
@@ -123,7 +130,7 @@ def whitening(
 
 
 def real_columns(common: ComplexArray) -> FloatArray:
-    """Columns (M, S, n) of complex numbers as real ones of real and imaginary parts, (S, 2n, 2M)."""
+    """Columns (M, S, n) of complex numbers as real ones, (S, 2n, 2M); every other one is that of Re."""
     return stretch(np.transpose(common, (1, 2, 0)))
 
 

@@ -26,6 +26,7 @@ def sampled_covariance(
     draws: int = 400,
     seed: int = 0,
     common: ComplexArray | None = None,
+    parameters: ComplexArray | None = None,
 ) -> FloatArray:
     """Covariance of the weights of any solver, from readings drawn at random from their errors.
 
@@ -40,8 +41,8 @@ def sampled_covariance(
         Covariance of (Re Y, Im Y, Re W₁, …) of each reading, shape (N, 2P + 2, 2P + 2); may be singular.
     draws
         How many; standard deviations have a relative error of 1/√(2 draws), 3.5 % for 400.
-    common
-        What else the readings have in common, as `balancing.Influence.common`.
+    common, parameters
+        What else the readings have in common, and errors of parameters, as of `balancing.Influence`.
     seed
         The same seed gives the same draws.
 
@@ -71,6 +72,8 @@ def sampled_covariance(
         drawn = mean + (errors[:, ::2] + 1j * errors[:, 1::2])
         if common is not None:
             drawn += _shared(rng, common)
+        if parameters is not None:
+            drawn += np.tensordot(rng.standard_normal(len(parameters)), parameters, 1).reshape(N, -1)
         try:
             D = np.asarray(solver(drawn[:, 1:].copy(), drawn[:, 0].copy()), dtype=complex)
         except ValueError as error:

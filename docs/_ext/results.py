@@ -45,6 +45,7 @@ ANSWERS = (
         "fit-run_down",
         "simulate-lesson-5",
         "modes-chain",
+        "calibrate",
         "validate",
         "demo-main",
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -12,6 +13,15 @@ from rotorid.base.arrays import FloatArray, read_only
 
 _ROUNDING = 1e-9
 """Of correlations: what lies below is no contradiction."""
+
+
+def is_reading(path: str) -> bool:
+    """Whether it is `probe[NAME].angle`, `.gain` or `key_phasor.angle`: of readings, no number of a rotor.
+
+    Angles in degrees with the rotation: the true one less the one that the job says. A gain is what is
+    read over what is there.
+    """
+    return re.fullmatch(r"probe\[[^*]+\]\.(angle|gain)|key_phasor\.angle", path) is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +37,6 @@ class Calibration:
     covariance
         Of the parameters as they now stand in the rotor, shape (n, n): of absolute ones in their unit, of a
         scale relative to the rotor as it is now.
-    readings
-        Angles of the readings that were found besides, `{"probe[…].angle" or "key_phasor.angle": degrees}`.
     speeds
         Where the model was compared with readings, rad/s, shape (S,).
     sensors
@@ -37,6 +45,8 @@ class Calibration:
         Relative standard deviation of a coefficient that the model leaves, shape (S, C).
     needs_trial_run
         Whether the data contradict the model, so that its coefficients alone are not to be trusted.
+    data
+        Files it was made from, `{name: SHA-256}`: they must not count twice.
 
     Raises
     ------
@@ -48,11 +58,11 @@ class Calibration:
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
-    readings: Mapping[str, float] = field(default_factory=dict)
     speeds: FloatArray = field(default_factory=lambda: np.zeros(0))
     sensors: tuple[str, ...] = ()
     lack_of_fit: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     needs_trial_run: bool = False
+    data: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
@@ -70,7 +80,7 @@ class Calibration:
             object.__setattr__(self, name, tuple(getattr(self, name)))
             if len({*getattr(self, name)}) < len(getattr(self, name)):
                 raise ValueError(f"calibration: one of its {name} comes twice")
-        object.__setattr__(self, "readings", dict(self.readings))
+        object.__setattr__(self, "data", dict(self.data))
         R = self.correlation
         if not np.allclose(R, R.T, rtol=0.0, atol=_ROUNDING):
             raise ValueError("calibration: the covariance must be symmetric")
@@ -79,6 +89,12 @@ class Calibration:
             or min(np.linalg.eigvalsh(R), default=0.0) < -_ROUNDING
         ):
             raise ValueError("calibration: the covariance must not be negative in any direction")
+
+    @property
+    def readings(self) -> dict[str, float]:
+        """Those of the parameters that are no numbers of a rotor: angles in degrees, and gains."""
+        found = zip(self.names, self.values.tolist(), strict=True)
+        return {name: value for name, value in found if is_reading(name)}
 
     @property
     def std(self) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
 from fem.model.supports import KINDS, Pedestal, Support
 from rotorid.base.arrays import FloatArray
@@ -51,15 +52,6 @@ class _Parameter(NamedTuple):
     items: tuple[int, ...]
     keys: tuple[str, ...]
     suffix: str
-
-
-def is_reading(path: str) -> bool:
-    """Whether it is `probe[NAME].angle`, `.gain` or `key_phasor.angle`: of readings, no number of a rotor.
-
-    Angles in degrees with the rotation: the true one less the one that the job says. A gain is what is
-    read over what is there.
-    """
-    return re.fullmatch(r"probe\[[^*]+\]\.(angle|gain)|key_phasor\.angle", path) is not None
 
 
 def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:

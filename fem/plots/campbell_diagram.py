@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import cycle, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
+from fem.parameter_bands import NORMAL_95
 from fem.windows import ranges
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
@@ -26,6 +27,7 @@ from rotorid.base.plot_style import (
     plain,
     rad_s_above,
     scale_beside,
+    shade_bands,
     shade_operating,
     shade_unstable,
 )
@@ -85,6 +87,9 @@ def draw_campbell(
     shade_unstable(ax, ranges(campbell.windows), "unstable")
     plain(ax)
     ax.set(xlabel="speed, rpm", ylabel="whirl frequency, rpm")
+    if campbell.std is not None:
+        half = NORMAL_95 * RPM * campbell.std
+        shade_bands(ax, campbell.speeds * RPM, campbell.frequencies * RPM, half, cycle(COLORS))
     rad_s_above(ax)
     scale_beside(ax, 60.0, "whirl frequency, Hz")
     _legend(ax, campbell, bool(seen))

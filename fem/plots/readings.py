@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.model.sensors import SensorLike, as_sensor, label
+from fem.parameter_bands import NORMAL_95
 from fem.peak_refinement import smooth_curves
 from fem.plots.bode import draw_bode, draw_polar
 from fem.plots.drawing import draw_rotor
 from fem.plots.orbit_paths import MOST_ORBITS, draw_orbits
-from rotorid.base.plot_style import COLORS, MARKERS, QUIET, new_figure, on_figure
+from rotorid.base.arrays import FloatArray
+from rotorid.base.plot_style import COLORS, MARKERS, QUIET, look, new_figure, on_figure, shade_bands
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -30,15 +32,18 @@ def bode_figure(
     operating: tuple[float, float] | None = None,
     factors: bool = True,
     figure: Figure | None = None,
+    std: FloatArray | None = None,
 ) -> Figure:
     """Make a figure of the amplitude and phase of sensors over speed, each marked at its peaks.
 
     `factors`: amplification factors are written at the marks. `figure`: what to draw on instead of a new one.
+    `std`: standard deviations of the amplitudes, m, shape (S, C): 95 % are shaded.
     """
     figure = new_figure(6.0) if figure is None else figure
-    draw_bode(
+    Z = response.readings(sensors)
+    above, _ = draw_bode(
         response.speeds,
-        response.readings(sensors),
+        Z,
         _labels(sensors),
         figure.subplots(2, sharex=True, height_ratios=(3, 2)),
         peaks=peaks,
@@ -46,6 +51,12 @@ def bode_figure(
         operating=operating,
         windows=response.windows,
     )
+    if std is not None:
+        middle = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan)
+        half = NORMAL_95 * 1e6 * std
+        colors = (look(k)["color"] for k in range(len(sensors)))
+        shade_bands(above, response.speeds * RPM, middle, half, colors)
+        above.set_ylim(top=max(above.get_ylim()[1], 1.05 * np.nanmax(middle + half, initial=0.0)))
     return figure
 
 

@@ -13,20 +13,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.model.calibration import Calibration
+from fem.model.calibration import Calibration, is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import as_they_stand, is_reading, with_parameters
+from fem.model.rotor_parameters import as_they_stand, with_parameters
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.calibration.calibrated_rotor import CalibratedRotor
+from rotorid.calibration.calibrated_rotor import LEVEL, CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
+from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
 from rotorid.calibration.unknowns import Unknown, check_different
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from
 
-LEVEL = 0.01
-"""Probability of a χ² as large, below which the model does not explain the data."""
 SPREAD, ASIDE = 0.3, 0.7
 """Relative, of starting values without a prior: drawn ones, and along what the data see least."""
 LIMIT, MORE = 40, 3
@@ -89,9 +88,12 @@ class _Equations:
         return 2 * complex_ones + sum(modes.scales for modes in self.frequencies)
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
-        values = self.values(theta)
-        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, self.paths)) for rows in self.rows]
-        parts += [data.jacobian(self.rotor, values, self.paths) for data in self.frequencies]
+        return self.by(self.paths, self.values(theta))
+
+    def by(self, paths: Sequence[str], values: dict[str, float]) -> FloatArray:
+        """Derivatives by any numbers that have values."""
+        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, paths)) for rows in self.rows]
+        parts += [data.jacobian(self.rotor, values, paths) for data in self.frequencies]
         return np.vstack(parts)
 
 
@@ -101,6 +103,7 @@ def calibrate(
     readings: Sequence[RunReadings] = (),
     frequencies: Sequence[MeasuredFrequencies] = (),
     *,
+    held: Sequence[Unknown] = (),
     starts: int = 3,
     seed: int = 0,
 ) -> CalibratedRotor:
@@ -114,6 +117,9 @@ def calibrate(
         Its n unknown numbers.
     readings, frequencies
         The data, of any mixture.
+    held
+        Numbers that are taken as they stand, with priors of what they might be off by: the data are asked
+        whether they contradict that.
     starts
         Searches: from the starting values; from 70 % beside where that ends, to both sides, along what the
         data see least of the numbers without a prior; from others drawn by priors (or 30 % of the value).
@@ -163,7 +169,7 @@ def calibrate(
     found = solve(begin)
     equations.weigh(found.estimate.solution)
     found = solve(found.estimate.solution, near=True)
-    return _judged(equations, unknowns, prior, found, others)
+    return _judged(equations, unknowns, prior, held, found, others)
 
 
 def _ends(limits: Sequence[tuple[float | None, float | None]]) -> tuple[FloatArray, FloatArray]:
@@ -223,6 +229,7 @@ def _judged(
     equations: _Equations,
     unknowns: Sequence[Unknown],
     prior: Prior,
+    held: Sequence[Unknown],
     found: NonlinearEstimate,
     others: Sequence[FloatArray],
 ) -> CalibratedRotor:
@@ -244,10 +251,11 @@ def _judged(
     chi_square = mismatch(theta)
     dof = r.size + len(prior) - spent - found.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
-    misfit = chance < LEVEL
+    tested = _tested(equations, prior, held, theta, K, r) if held else None
+    misfit = chance < LEVEL or (tested is not None and tested.chance < LEVEL)
     covariance = found.estimate.solution_covariance
     covariance = np.zeros((theta.size,) * 2) if covariance is None else np.nan_to_num(covariance)
-    times = chi_square / dof if misfit else 1.0
+    times = max(chi_square / dof, 1.0) if misfit else 1.0
     covariance = covariance * times
     to = as_they_stand(equations.rotor, values)
     lack = _lack_of_fit(equations, theta) if misfit else {}
@@ -256,11 +264,10 @@ def _judged(
         names=tuple(equations.paths),
         values=theta,
         covariance=to @ covariance @ to.T,
-        readings={path: value for path, value in values.items() if is_reading(path)},
         speeds=np.array(speeds),
         sensors=tuple(sensors),
         lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),
-        needs_trial_run=misfit or not found.converged,
+        needs_trial_run=misfit or not (found.converged and found.estimate.full_rank),
     )
     known = ~np.isnan(found.values)
     same = 3 * np.sqrt(np.diag(covariance)) + SAME * np.abs(theta)
@@ -279,12 +286,30 @@ def _judged(
         chi_square=chi_square,
         dof=dof,
         chance=chance,
+        held=tested,
         unbalance=tuple(bare.u for bare in besides),
         unbalance_std=tuple(bare.std(covariance, times) for bare in besides),
         readings=tuple(equations.readings),
         stated=all(rows.stated for rows in equations.rows),
         other_ends=tuple(apart),
     )
+
+
+def _tested(
+    equations: _Equations,
+    prior: Prior,
+    held: Sequence[Unknown],
+    theta: FloatArray,
+    K: FloatArray,
+    r: FloatArray,
+) -> HeldNumbers:
+    """Whether data and priors contradict what is held."""
+    known = [(number.path, *number.prior) for number in held if number.prior]
+    values = equations.values(theta) | {path: value for path, value, _ in known}
+    H = equations.by([path for path, *_ in known], values) * np.array([std for *_, std in known])
+    H = np.vstack((H, np.zeros((len(prior), len(known)))))
+    names = [number.label for number in held if number.prior]
+    return held_numbers(names, prior.below(K), H, np.append(r, prior.residual(theta)))
 
 
 def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, str], float]:

@@ -16,6 +16,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import range_text
 from rotorid.base.text import capital, counted, error_figures, listing
+from rotorid.calibration.held_numbers import HeldNumbers
 from rotorid.calibration.run_readings import RunReadings
 from rotorid.calibration.unknowns import Unknown
 from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
@@ -26,6 +27,8 @@ from rotorid.regression.undetermined_combinations import combination_words
 if TYPE_CHECKING:
     import pandas as pd
 
+LEVEL = 0.01
+"""Probability of as large a contradiction by chance, below which the model does not explain the data."""
 SEEN, VAGUE = 1 / 3, 2 / 3
 """Deviations, in those known before: a combination below the first is seen, a number above the second not."""
 TERM = 0.3
@@ -55,6 +58,8 @@ class CalibratedRotor(Answered):
         Derivatives of the data's rows, (m, n), per standard deviation.
     chi_square, dof, chance
         Of data and priors together, and the probability of a larger χ².
+    held
+        What the data say of numbers that were taken as they stand; None: of none.
     unbalance
         Of each set of runs the unbalances of its nodes, kg·m, then the amplitudes of its bows, m; NaN where
         its readings do not determine one.
@@ -77,6 +82,7 @@ class CalibratedRotor(Answered):
     chi_square: float
     dof: int
     chance: float
+    held: HeldNumbers | None
     unbalance: tuple[ComplexArray, ...]
     unbalance_std: tuple[FloatArray, ...]
     readings: tuple[RunReadings, ...]
@@ -149,7 +155,7 @@ class CalibratedRotor(Answered):
     def warnings(self) -> tuple[str, ...]:
         """What must be known before the numbers are used."""
         found = list(self.found.end_warnings)
-        if self.chance < 1 and not self.explained and self.found.converged:
+        if self.chance < LEVEL and self.found.converged:
             times = np.sqrt(self.chi_square / self.dof)
             errors = "the stated errors explain" if self.stated else "the assumed errors explain"
             found.append(
@@ -157,6 +163,9 @@ class CalibratedRotor(Answered):
                 "balancing with this rotor needs a trial run; free more numbers, state larger errors, or "
                 "look for what the model lacks (a bow, a bearing, a loose part)"
             )
+        if self.held is not None and self.held.chance < LEVEL and self.found.converged:
+            trial = "" if self.chance < LEVEL else "; balancing with this rotor needs a trial run"
+            found.append(self.held.words + trial)
         if self.prior is not None:
             found += self.prior.warnings
         if unseen := [name for name, u in self._bare if np.isnan(u)]:
@@ -253,11 +262,18 @@ class CalibratedRotor(Answered):
                 "identifiable": estimate.full_rank,
                 "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
                 "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+                "correlation": self._part(self._every)[1].correlation,
                 "seen": self.seen or None,
                 "residual_rms": np.sqrt(np.mean(r**2)),
                 "chi_square": self.chi_square,
                 "degrees_of_freedom": self.dof,
                 "probability": self.chance,
+                "held": None
+                if self.held is None
+                else {
+                    "probability": self.held.chance,
+                    "away": dict(zip(self.held.names, self.held.away, strict=True)),
+                },
                 "explained": self.explained,
                 "lack_of_fit": [
                     {"speed_rad_s": speed, "sensor": sensor, "relative": value}

@@ -6,21 +6,16 @@ rest, in the plane x without gyroscopic moments. Derivatives are central differe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.critical import NOT_COUNTED, lowest_critical_speeds
+from fem.critical import NOT_COUNTED, critical_speeds_near, lowest_critical_speeds
 from fem.matrices.undamped_matrices import static_stiffness
+from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import (
-    as_they_stand,
-    is_reading,
-    typical_size,
-    with_changes,
-    with_parameters,
-)
+from fem.model.rotor_parameters import as_they_stand, typical_size, with_changes, with_parameters
 from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.rpm import rpm_text
@@ -78,7 +73,7 @@ class MeasuredFrequencies:
         if self.rest or not rotor.symmetric:
             return
         for path in paths:
-            if not (is_reading(path) or all(each.symmetric for _, each in _beside(rotor, path))):
+            if not (is_reading(path) or all(each.symmetric for _, each in _beside(start, rotor, path))):
                 raise ValueError(
                     f"{path} alone makes supports differ in x and y: then backward critical speeds count, "
                     "too, and the numbers of modes are others; estimate what keeps them alike (as "
@@ -109,20 +104,20 @@ class MeasuredFrequencies:
         return np.concatenate(left)
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
-        """Derivatives (rows, n) by the numbers.
-
-        Over bearing tables a search at every step would take long: there Ω = f(Ω, θ) with the frequency f on
-        supports as they are at Ω, so that dΩ = ∂f/∂θ dθ / (1 − ∂f/∂Ω).
-        """
+        """Derivatives (rows, n) by the numbers; frequencies over tables are followed, not searched again."""
         rotor, m = with_parameters(start, values), len(self.modes)
         own = {path: values[path] for path in paths if not is_reading(path)}
+        follow = not (self.rest or self.nodes or rotor.constant)
+        here = self.residual(rotor, {}) * self.std + self.frequencies if follow else None
         shapes = np.full(m * len(self.nodes), ROUNDING[1] / self.shape_std)
         tiny = np.append(ROUNDING[0] * self.frequencies / self.std, shapes)
-        rows = self._over_tables(rotor) if not (self.rest or rotor.constant) else self.residual
         K = np.zeros((tiny.size, len(own)))
         for k, path in enumerate(own):
-            (up, one), (down, other) = _beside(rotor, path)
-            change = rows(one, {}) - rows(other, {})
+            (up, one), (down, other) = _beside(start, rotor, path)
+            if here is None:
+                change = self.residual(one, {}) - self.residual(other, {})
+            else:
+                change = (critical_speeds_near(one, here) - critical_speeds_near(other, here)) / self.std
             if (np.abs(change) > tiny).any():
                 K[:, k] = change / (up - down)
         by_own = K @ as_they_stand(start, own)
@@ -130,42 +125,10 @@ class MeasuredFrequencies:
         found[:, [k for k, path in enumerate(paths) if path in own]] = by_own
         return found
 
-    def _over_tables(self, rotor: Rotor) -> Callable[[Rotor, Mapping[str, float]], FloatArray]:
-        """Frequencies of rotors near this one, at the supports and modes of its critical speeds, as rows."""
-        most = int(self.modes.max())
-        speeds = self.frequencies + self.std * self.residual(rotor, {})
 
-        def listed(other: Rotor, speed: float) -> FloatArray:
-            return lowest_critical_speeds(as_at(other, speed), most).frequencies
-
-        which = [int(np.abs(listed(rotor, speed) - speed).argmin()) for speed in speeds]
-        step = STEP * speeds
-        ends = [
-            [listed(rotor, v)[k] for v in (w + h, w - h)] for w, h, k in zip(speeds, step, which, strict=True)
-        ]
-        steeper = 1.0 - (np.array(ends) @ (1.0, -1.0)) / (2 * step)
-
-        def rows(other: Rotor, _: Mapping[str, float]) -> FloatArray:
-            found = [listed(other, speed)[k] for speed, k in zip(speeds, which, strict=True)]
-            return np.asarray((found - self.frequencies) / self.std / steeper)
-
-        return rows
-
-
-def as_at(rotor: Rotor, speed: float) -> Rotor:
-    """The undamped rotor on supports as they are at a speed."""
-    return replace(
-        rotor,
-        supports=[
-            replace(s, stiffness=tuple(map(tuple, s.at(speed)[0].tolist())), damping=0.0, speeds=())
-            for s in rotor.supports
-        ],
-    )
-
-
-def _beside(rotor: Rotor, path: str) -> list[tuple[float, Rotor]]:
+def _beside(start: Rotor, rotor: Rotor, path: str) -> list[tuple[float, Rotor]]:
     """Changes of a number, and the rotors with a little more and a little less: none where that cannot be."""
-    step = STEP * typical_size(rotor, path)
+    step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
     found = []
     for by in (step, -step):
         try:

@@ -16,17 +16,17 @@ from typing import NamedTuple
 import numpy as np
 
 from balancing.coefficients.run_error_estimate import given
-from balancing.coefficients.run_errors import RunErrors, assumed, run_columns, runs_of
+from balancing.coefficients.run_errors import RunErrors, Runs, assumed, run_columns, runs_of
 from balancing.data.reading_errors import error_model, mean_covariance
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from fem.matrices.banded_matrices import assemble, multiply
 from fem.matrices.support_dynamic_stiffness import supported
 from fem.matrices.undamped_matrices import one_plane
+from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import (
     as_they_stand,
-    is_reading,
     typical_size,
     with_changes,
     with_parameters,
@@ -64,7 +64,7 @@ class RunReadings:
     key_phasor
         Direction of the key phasor, degrees from x with the rotation.
     unbalance, bow
-        Nodes of the bare rotor's unknown unbalances and number of its bow's shapes, the lowest modes at rest;
+        Nodes of the bare rotor's unknown unbalances, and number of its bow's shapes, modes of the free shaft;
         none: the bare rotor's readings are free.
     """
 
@@ -113,8 +113,11 @@ class RunReadings:
         if self.bow:
             loads.append(self._bow_loads(start, rotor))
 
+        def size(path: str) -> float:  # also of a number near 0
+            return max(typical_size(each, path) for each in (start, rotor))
+
         def change(path: str) -> MatrixChange:
-            step = STEP * typical_size(rotor, path)
+            step = STEP * size(path)
             return matrix_change(lambda by: with_changes(rotor, {path: by}), 0.0, step, speeds)
 
         own = [path for path in derivatives if not is_reading(path)]
@@ -132,7 +135,7 @@ class RunReadings:
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
         to = as_they_stand(start, {path: values[path] for path in own})
         for k, path in enumerate(own):  # what rounding leaves of a number that does nothing
-            seen = np.abs(found.by_number[k]).max() * typical_size(rotor, path)
+            seen = np.abs(found.by_number[k]).max() * size(path)
             found.by_number[k] *= seen > UNSEEN * np.abs(found.H).max()
         by_number = np.tensordot(to.T, found.by_number, 1)
         for k, path in enumerate(derivatives):
@@ -174,7 +177,7 @@ class RunReadings:
         model = error_model(trials)
         reading = mean_covariance(trials, model.errors)
         runs = runs_of(Y, trials.weights, W[..., :P])
-        run = _run_errors(trials, runs, stated=model.source == "stated")
+        run = run_errors(trials, runs)
         columns = run_columns(run, runs)
         take = np.eye(R) if self.modelled else np.column_stack((-np.ones(R - 1), np.eye(R - 1)))
         n, least = len(take) * C, (NO_ERROR * np.abs(Y).max()) ** 2
@@ -187,11 +190,11 @@ class RunReadings:
         return ReadingRows(self, take, white, np.einsum("sii->si", own), stated)
 
 
-def _run_errors(trials: Trials, runs: object, *, stated: bool) -> RunErrors:
-    """As stated; none beside stated errors of a reading; else assumed."""
+def run_errors(trials: Trials, runs: Runs) -> RunErrors:
+    """Errors between these runs: as stated; none beside stated errors of a reading; else assumed."""
     if trials.run_errors is not None:
-        return given([], runs, *trials.run_errors, "stated")  # type: ignore[arg-type]
-    return RunErrors() if stated else assumed(runs)  # type: ignore[arg-type]
+        return given([], runs, *trials.run_errors, "stated")
+    return RunErrors() if error_model(trials).source == "stated" else assumed(runs)
 
 
 class Bare(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from fem.plots.mode_shapes import smooth_shapes
+from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.report.document import NOTHING, Cells, Document
 from rotorid.report.number_tables import Grid, Part, evenly, every_warning, figures, numbered, words
@@ -83,6 +84,7 @@ def response_report(
     *,
     provenance: Mapping[str, Any],
     operating: Band = None,
+    std: FloatArray | None = None,
 ) -> bytes:
     """Make the sheet of an unbalance response, HTML in UTF-8.
 
@@ -100,6 +102,8 @@ def response_report(
         Program version, input files, date and options.
     operating
         Range of operating speeds, rad/s.
+    std
+        Of the amplitudes, as `bode_figure` takes them.
     """
     document = Document(document)
     rotor = response.rotor
@@ -118,7 +122,7 @@ def response_report(
         Part(
             "Vibration",
             tables=(_largest(document), *_peaks(document, operating)),
-            drawings=(bode_picture(response, places, peaks, operating),),
+            drawings=(bode_picture(response, places, peaks, operating, std),),
         ),
         *_forces(document, rotor),
         Part("Readings", tables=_readings(document)),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import legend_above
 from rotorid.plots import plot
 from rotorid.report.page import inline_svg
@@ -93,13 +94,14 @@ def bode_picture(
     places: Sequence[SensorLike],
     peaks: Sequence[Peaks],
     operating: tuple[float, float] | None,
+    std: FloatArray | None = None,
 ) -> Drawing:
     """Amplitude and phase over speed, marked where each sensor has its peaks."""
 
     def draw(figure: Figure) -> None:
         from fem.plots import bode_figure
 
-        bode_figure(response, places, peaks, operating=operating, factors=False, figure=figure)
+        bode_figure(response, places, peaks, operating=operating, factors=False, figure=figure, std=std)
 
     caption = "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading."
     return sketch(5.0, draw, caption)

@@ -4,6 +4,7 @@ Nothing here prints; the command line, reports, `validate`, the demo, a notebook
 """
 
 from rotorid.workflows.balance import Balance, BalanceOptions, balance
+from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.workflows.campbell import CampbellDiagram, CampbellOptions, campbell
 from rotorid.workflows.critical import CriticalOptions, CriticalSpeeds, critical
 from rotorid.workflows.demo import Demo, DemoOptions, demo
@@ -29,6 +30,8 @@ __all__ = [
     "BalanceOptions",
     "BearingEquilibria",
     "BearingsOptions",
+    "CalibrateOptions",
+    "Calibrated",
     "CampbellDiagram",
     "CampbellOptions",
     "Coefficients",
@@ -64,6 +67,7 @@ __all__ = [
     "UnbalanceOptions",
     "balance",
     "bearings",
+    "calibrate",
     "campbell",
     "critical",
     "demo",

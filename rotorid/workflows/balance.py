@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rotorid.report.equations import Equations
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource
+    from rotorid.workflows.calibration.one_shot import NextTrial
     from rotorid.workflows.option_quantities import Amount, Amplitudes, Positions, Weights
 
     JobGiven = Job | Path | str | Sequence[Path | str]
@@ -162,6 +163,8 @@ class Balance(Parts):
     mounted, check, verdict, tolerance, subsets, curve, history
         Pieces in holes, check runs beside their prediction, what limits and tolerances say, the tolerance
         itself, choices of planes, residual against total weight, all runs; None where there is nothing.
+    next_trial
+        Of a calibrated rotor: the trial run that would tell most.
     """
 
     result: Correction
@@ -175,6 +178,7 @@ class Balance(Parts):
     subsets: Subsets | None
     curve: TradeOff | None
     history: History | None
+    next_trial: NextTrial | None = None
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -187,12 +191,17 @@ class Balance(Parts):
             "best_planes": self.subsets,
             "trade_off": self.curve,
             "history": self.history,
+            "next_trial": self.next_trial,
         }
 
     @property
     def answer(self) -> Answer:
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+        from rotorid.workflows.calibration.one_shot import NEEDS_TRIAL, needs_trial_run
+
         weights, sound = self.result.answer, self.result.sound
+        if needs_trial_run(self.job, self.influence):
+            weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
         if sound and (self.check or self.mounted):
             weights = replace(weights, judgement="")
         if self.mounted:
@@ -206,6 +215,8 @@ class Balance(Parts):
         notes = list(found.notes)
         if self.check:
             notes.insert(0, "--refine adds the check run, and gives the trim")
+        if self.next_trial is not None:
+            notes.insert(0, self.next_trial.words)
         if self.result.limits is not None and (self.subsets or self.curve):
             notes.append("the comparison of planes and the trade-off do not look at the limits")
         return replace(found, notes=tuple(notes))
@@ -284,6 +295,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     """
     from balancing import compare_check
     from rotorid.tables.job.job_as_written import JobSource
+    from rotorid.workflows.calibration.one_shot import next_trial
 
     options = options or BalanceOptions()
     _check(options)
@@ -311,6 +323,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
         history=_history(result, influence, read) if options.history else None,
+        next_trial=next_trial(read, influence, result.weights, result.planes),
         provenance=provenance(read.files, options),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Campbell, Rotor
+    from rotorid.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -79,11 +81,20 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> CampbellDia
         For a rotor or an option that cannot be.
     """
     import fem
+    from fem.parameter_bands import band as error_band
+    from fem.parameter_bands import nearest_modes
 
     operating = band(options.operating)
     model, files = rotor_source(rotor)
     speeds = rising_speeds(options.speeds)
     with phase(f"whirl at {counted(len(speeds), 'speed')}"):
         whirl = fem.campbell(model, speeds, options.number)
+
+    def frequencies(other: Rotor) -> FloatArray:
+        found = whirl if other is model else fem.campbell(other, speeds, options.number)
+        return nearest_modes(whirl.frequencies, found.frequencies)
+
+    std, said = error_band(model, "the frequencies", frequencies)
+    whirl = dataclasses.replace(whirl, std=std, warnings=(*whirl.warnings, *said))
     log_rotor(model, speeds=len(speeds), estimated_relative_error=whirl.error)
     return CampbellDiagram(whirl=whirl, operating=operating, provenance=provenance(files, options))

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from balancing import Influence, Trials
-    from balancing.coefficients.coefficients_from_model import Quantity
-    from fem import Sensor
     from rotorid.tables import Job
 
 KINDS = ("measured", "computed", "combined")
@@ -43,12 +40,13 @@ def choose(
     """
     from balancing import estimate_influence
     from balancing.coefficients.combined_coefficients import combine
+    from rotorid.workflows.calibration.one_shot import counted_before
 
     has_trials = bool(job.trials.weights.any())
     if kind is None:
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
-            kind = "combined"
+            kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
     if kind == "measured" and model_error is not None:
         raise ValueError(
             "--model-error is for computed coefficients: add --coefficients computed or combined"
@@ -65,6 +63,17 @@ def choose(
             error = 0.0  # it states its own
         measured = combine(measured, computed(job, error))
     return measured, baseline
+
+
+def _separate(trials: Trials) -> bool:
+    """Whether the runs tell baseline and planes apart, so that there are measured coefficients to combine."""
+    from balancing.coefficients.identifiability import UndeterminedError, check_runs
+
+    try:
+        check_runs(trials.runs, trials.planes, trials.weights)
+    except UndeterminedError:
+        return False
+    return True
 
 
 def used_planes(job: Job, influence: Influence) -> list[str]:
@@ -85,53 +94,6 @@ def _refined(job: Job, kind: str) -> Influence:
     return refine(job.trials, job.check, corrections=mounted)
 
 
-@dataclass(frozen=True)
-class ModelPlaces:
-    """Where the planes and sensors of a job are in its rotor model, and what the sensors read.
-
-    Radii are those that make an unbalance, kg·m, of the job's masses; None where its weights are unbalances.
-    """
-
-    nodes: Mapping[str, int]
-    sensors: Mapping[str, Sensor]
-    radii: Mapping[str, float] | None
-    quantity: Quantity
-
-
-def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPlaces:
-    """The places of all planes, or of given stations per unbalance, and of all sensors.
-
-    Raises
-    ------
-    ValueError
-        Where the job has no rotor, or no place in it for a plane or sensor.
-    """
-    from rotorid.tables.reader.units import weight
-
-    if job.rotor is None:
-        raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
-    missing = [f"[sensors.{s}]" for s in job.trials.sensors if s not in job.sensor_places]
-    nodes = stations or {p: job.plane_nodes[p] for p in job.planes if p in job.plane_nodes}
-    missing += [f"[planes.{p}]" for p in job.planes if stations is None and p not in nodes]
-    if missing or not nodes:
-        raise ValueError(
-            "computed coefficients need the place of every sensor and plane in the model: node = … (or "
-            f"station) in {', '.join(missing) or 'a [planes.NAME]'}"
-        )
-    by_mass = stations is None and weight(job.trials.labels.weight_unit).kind == "mass"
-    if by_mass and (lost := [p for p in job.planes if p not in job.radii]):
-        raise ValueError(
-            f"weights as masses need the radius of every plane: radius_mm in [planes.{lost[0]}], or weights "
-            "as unbalances"
-        )
-    return ModelPlaces(
-        nodes,
-        {s: job.sensor_places[s] for s in job.trials.sensors},
-        {p: job.radii[p] for p in job.planes} if by_mass else None,
-        _quantity(job.trials.labels.vibration_unit),
-    )
-
-
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:
     """Coefficients from the rotor model of the job, at its planes, or per unbalance at given stations.
 
@@ -145,6 +107,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     from dataclasses import replace
 
     from balancing.coefficients.coefficients_from_model import model_influence
+    from rotorid.workflows.calibration.model_places import model_places
     from rotorid.workflows.calibration.one_shot import calibrated
 
     places = model_places(job, stations)
@@ -163,29 +126,4 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
         key_phasor=job.key_phasor,
         labels=labels,
     )
-    return found if job.rotor.calibration is None else calibrated(found, job.rotor, places, job.key_phasor)
-
-
-def _quantity(unit: str) -> Quantity:
-    """What an amplitude in this unit is.
-
-    Raises
-    ------
-    ValueError
-        For a unit that is only a label.
-    """
-    from rotorid.tables.reader.units import vibration
-
-    kinds: dict[str, Quantity] = {
-        "length": "displacement",
-        "displacement": "displacement",
-        "velocity": "velocity",
-        "acceleration": "acceleration",
-    }
-    kind = vibration(unit).kind if unit else ""
-    if kind not in kinds:
-        raise ValueError(
-            "computed coefficients need amplitudes in a unit of length, velocity or acceleration, such as "
-            f"um_pp or mm_s_rms; {unit or 'a column without a unit'} is none"
-        )
-    return kinds[kind]
+    return found if job.rotor.calibration is None else calibrated(found, job, places)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import MeshCheck, Modes, Rotor, SpeedMap
+    from rotorid.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,8 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         For a rotor or an option that cannot be.
     """
     import fem
+    from fem.critical import critical_speeds_near
+    from fem.parameter_bands import band as error_band
 
     options = options or CriticalOptions()
     operating = band(options.operating)
@@ -114,9 +117,15 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         n = options.number or sum(frequency > 0 for frequency in modes.frequencies.tolist()) or 1
         mesh = fem.mesh_check(model, n) if options.mesh_check else None
         chart, left_out = _map(model, n) if options.speed_map else (None, [])
+
+    def speeds(other: Rotor) -> FloatArray:
+        found = modes.frequencies
+        return found if other is model else critical_speeds_near(other, found)
+
+    std, said = error_band(model, "the critical speeds", speeds)
     log_rotor(model)
     return CriticalSpeeds(
-        modes=dataclasses.replace(modes, warnings=(*modes.warnings, *left_out)),
+        modes=dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *said)),
         mesh=mesh,
         chart=chart,
         operating=operating,

@@ -173,4 +173,21 @@ SAMPLES = {
             ),
         ),
     ),
+    "calibration": Sample(
+        "bearings of a compressor from one trial run, then weights without one",
+        ("compressor", "calibration"),
+        (
+            Step(
+                "calibrate",
+                "Bearings from a run with two weights",
+                "calibrate {}/compressor/rotor.toml {}/calibration/trial.toml --estimate 'bearing[*].*' "
+                "--prior 'bearing[*].*=20%' --plot {}/calibration.png",
+            ),
+            Step(
+                "balance",
+                "Another day: one run, no trial weight",
+                "balance {}/calibration/later.toml --plot {}/balance.png",
+            ),
+        ),
+    ),
 }

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import cell
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import counted, listing
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from fem import Peak, Peaks, Response, Rotor
     from fem.model.sensors import SensorLike
     from fem.response import Unbalance
-    from rotorid.base.arrays import AnyArray
+    from rotorid.base.arrays import AnyArray, FloatArray
 
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
@@ -78,6 +79,8 @@ class RotorResponse(Outcome):
         Operating range, rad/s.
     orbits_at
         Which speed of `finer` the orbits are drawn at; None: that of the largest reading.
+    std
+        Of the amplitudes of `finer` from the rotor's calibration, m, shape (S, C); None without.
     """
 
     response: Response
@@ -86,6 +89,7 @@ class RotorResponse(Outcome):
     peaks: Sequence[Peaks]
     operating: tuple[float, float] | None
     orbits_at: int | None
+    std: FloatArray | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance: what is largest, and the peaks, with the speeds between."""
@@ -93,8 +97,10 @@ class RotorResponse(Outcome):
         warnings = document.pop("warnings")
         at_support = self._largest(self.finer.bearing_forces().largest)
         readings = self._largest(self.finer.readings(self.sensors))
+        own = {} if self.std is None else {"amplitude_std_m": cell(self._asked(self.std).T)}
         return {
             **document,
+            **own,
             "orbits": self._orbits(),
             "largest": [
                 {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
@@ -178,7 +184,8 @@ class RotorResponse(Outcome):
         Z = self.response.readings(self.sensors)
         S, C = Z.shape
         speed = Column("speed_rad_s", self.response.speeds.repeat(C))
-        return frame((speed, Column("sensor", self.labels * S), *polar("amplitude_m", "phase_deg", Z)))
+        own = () if self.std is None else (Column("amplitude_std_m", self._asked(self.std).ravel()),)
+        return frame((speed, Column("sensor", self.labels * S), *polar("amplitude_m", "phase_deg", Z), *own))
 
     def figure(self, view: View = "bode") -> Figure:
         """Amplitude and phase over speed, polar curves, or orbits.
@@ -192,7 +199,7 @@ class RotorResponse(Outcome):
 
         one_of(view, "view", get_args(View))
         if view == "bode":
-            return bode_figure(self.finer, self.sensors, self.peaks, operating=self.operating)
+            return bode_figure(self.finer, self.sensors, self.peaks, operating=self.operating, std=self.std)
         if view == "polar":
             return polar_figure(self.finer, self.sensors)
         return orbits_figure(self.finer, self.sensors, self._speed_of_orbits())
@@ -208,6 +215,7 @@ class RotorResponse(Outcome):
             self.peaks,
             provenance=self.provenance,
             operating=self.operating,
+            std=self.std,
         )
 
     @property
@@ -216,6 +224,10 @@ class RotorResponse(Outcome):
         from fem.model.sensors import label
 
         return [str(label(place)) for place in self.sensors]
+
+    def _asked(self, finer: FloatArray) -> FloatArray:
+        """Of values at the speeds of `finer` those at the speeds asked for."""
+        return finer[self.finer.speeds.searchsorted(self.response.speeds)]
 
     def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None]]:
         """The largest size in each column of values where a steady response exists, and its speed, rad/s."""
@@ -288,8 +300,11 @@ def response(
     ValueError
         For a rotor, an unbalance or an option that cannot be.
     """
+    import numpy as np
+
     from fem import resolve_peaks
     from fem.model.sensors import as_sensor
+    from fem.parameter_bands import band as error_band
     from fem.response import response_from_rest
     from rotorid.tables import read_unbalance
 
@@ -307,10 +322,19 @@ def response(
         found = response_from_rest(model, unbalance, speeds, [*nodes])
     with phase("peaks"):
         finer, peaks = resolve_peaks(found, places, operating=operating)
+
+    def amplitudes(other: Rotor) -> FloatArray:
+        new = other is not model
+        found = response_from_rest(other, unbalance, finer.speeds, [*nodes]) if new else finer
+        return np.abs(found.readings(places))
+
+    std, said = error_band(model, "the amplitudes", amplitudes)
+    finer = dataclasses.replace(finer, warnings=(*finer.warnings, *said))
     log_rotor(model, speeds=len(speeds))
     return RotorResponse(
         response=dataclasses.replace(found, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
+        std=std,
         sensors=places,
         peaks=peaks,
         operating=operating,

@@ -155,15 +155,21 @@ def provenance(
         For a file that cannot be read.
     """
     from rotorid import __version__
-    from rotorid.tables.reader.input_file import file_content
 
     return {
         "program": "rotorid",
         "version": __version__,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
+        "inputs": [{"file": str(f), "sha256": hash_of(f)} for f in files],
         "options": {key: plain(value) for key, value in (given | changed(options)).items()},
     }
+
+
+def hash_of(file: Path) -> str:
+    """SHA-256 of a file."""
+    from rotorid.tables.reader.input_file import file_content
+
+    return hashlib.sha256(file_content(file)).hexdigest()
 
 
 def text_of(file: object) -> str:

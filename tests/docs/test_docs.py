@@ -31,6 +31,7 @@ PACKAGES = (
     "rotorid.harmonic",
     "rotorid.timedomain",
     "rotorid.reduction",
+    "rotorid.calibration",
     "rotorid.tables",
     "rotorid.workflows",
 )

@@ -47,6 +47,20 @@ PINNED = {
         "sum_um_per_g_mm": 0.882868546,
         "couple_um_per_g_mm": 0.036482639,
     },
+    "rk4_calibrated": {
+        "both_1206_disk_1": 7.41659687,
+        "both_1206_disk_2": 7.24313188,
+        "both_1206_sum": 1.68939356,
+        "other_1206_disk_1": 8.4292032,
+        "other_1206_disk_2": 7.91521194,
+        "other_1206_sum": 2.1024028,
+        "both_1005_disk_1": 7.03131564,
+        "both_1005_disk_2": 6.59325982,
+        "both_1005_sum": 2.06069081,
+        "other_1005_disk_1": 7.11301559,
+        "other_1005_disk_2": 6.4864313,
+        "other_1005_sum": 2.20278893,
+    },
     "rotor_critical_speeds": {
         "first_critical_rpm": 4066.83591,
         "second_critical_rpm": 4375.18551,
@@ -230,6 +244,14 @@ def test_the_page_of_the_rig_shows_what_the_example_prints(ran):
     all_others = ["A001", "A002", "A007", "A008", "A009", "A015", "A017", "A018", "A019", "A020"]
     assert runs == [*all_others, *(run for run in all_others if run not in ("A007", "A015"))]
     assert len([line for line in text.splitlines() if "regions that hold the truth" in line]) == 2
+
+
+def test_the_page_of_the_calibrated_rig_shows_what_its_example_prints(ran):
+    _, text, _ = ran("rk4_calibrated")
+    page = blocks(FOLDER.parent / "docs" / "rk4_calibrated.md")
+    shown = [block.text for block in page if block.kind == "{code-block} text" and not block.caption]
+    assert [len(part.splitlines()) for part in shown] == [6, 27]
+    assert first_difference("...\n".join(shown).splitlines(), text) is None
 
 
 def test_the_page_on_the_masses_in_motion_shows_what_its_example_prints(ran):

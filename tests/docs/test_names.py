@@ -11,7 +11,8 @@ from pathlib import Path
 from cases import each_of
 
 PACKAGES = ("fem", "balancing", "rotorid")
-LISTS = (*PACKAGES, "rotorid.harmonic", "rotorid.timedomain", "rotorid.reduction", "rotorid.tables")
+ROOMS = ("harmonic", "timedomain", "reduction", "calibration", "tables")
+LISTS = (*PACKAGES, *(f"rotorid.{room}" for room in ROOMS))
 
 
 def modules():

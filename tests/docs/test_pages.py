@@ -16,7 +16,7 @@ DOCS = sample_data().parent / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
-SINGLE = [DOCS / "rk4.md", DOCS / "validation.md"]
+SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "validation.md"]
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 

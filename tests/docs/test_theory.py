@@ -10,6 +10,7 @@ import pytest
 
 from balancing import correct
 from fem import equations_of_motion, influence, probe
+from fem.solvers.receptance_derivatives import receptance_with_derivatives
 from rotorid import equivalent_masses, stretch
 from rotorid.harmonic.experiments import experiments
 from rotorid.samples import sample_data
@@ -40,7 +41,7 @@ def formulas(text):
 
 def test_the_index_lists_every_page():
     assert sorted(PAGES) == sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
-    assert len(PAGES) == 9
+    assert len(PAGES) == 10
 
 
 def run(page):
@@ -101,6 +102,11 @@ def record_less_model(*arguments):
     return replace(found, S=-found.S)
 
 
+def stiffer_moves_more(*arguments):
+    found = receptance_with_derivatives(*arguments)
+    return replace(found, by_number=-found.by_number)
+
+
 @pytest.mark.parametrize(
     ("page", "place", "wrong"),
     [
@@ -112,6 +118,11 @@ def record_less_model(*arguments):
         ("reduction", "rotorid.equivalent_masses", pushing_seal),
         ("identification", "rotorid.harmonic.experiments.experiments", lagging_amplitudes),
         ("records", "rotorid.timedomain.simulate", record_less_model),
+        (
+            "calibration",
+            "fem.solvers.receptance_derivatives.receptance_with_derivatives",
+            stiffer_moves_more,
+        ),
     ],
 )
 def test_a_wrong_sign_is_found(page, place, wrong, monkeypatch):

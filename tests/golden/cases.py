@@ -64,6 +64,11 @@ ROTOR23 = "sample_data/rotor23.csv"
 MOTION = "sample_data/motion/rotor.toml"
 COMPRESSOR = "sample_data/compressor/rotor.toml"
 RESPONSE = f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv"
+CALIBRATE = (
+    f'calibrate {COMPRESSOR} sample_data/calibration/trial.toml --estimate "bearing[*].*" '
+    '--prior "bearing[*].*=20%"'
+)
+SUPPORTS = f"calibrate {ROTOR23} sample_data/calibration/critical.csv --estimate"
 TURBO = "sample_data/turbo_job"
 MODEL_JOB = "sample_data/model_job/job.toml"
 PRINTED = (
@@ -84,6 +89,8 @@ critical-rotor23-mesh       critical {ROTOR23} -n 5 --mesh-check --output modes.
 critical-model-job          critical sample_data/model_job/rotor.csv -n 2
 critical-compressor         critical {COMPRESSOR} -n 4 --operating 5300:6500rpm --output modes.xlsx
 critical-compressor-map     critical {COMPRESSOR} -n 3 --map --plot map.png
+critical-rk4                critical sample_data/rk4/calibrated.toml -n 2
+calibrate-rk4               calibrate sample_data/rk4/rotor.toml sample_data/rk4/few.toml sample_data/rk4/few_1005.toml --estimate "bearing.kxx, bearing.kyy, bearing.cxx, bearing.cyy, bearing.tilting_stiffness, key_phasor.angle, probe[*].gain" --prior "bearing.k*=40%, bearing.c*=40%, bearing.tilting_stiffness=100%, key_phasor.angle=0+-100, probe[*].gain=50%, probe[*].angle=0+-30" --table
 critical-misspelt           critical misspelt.csv
 critical-missing            critical nowhere.csv
 critical-too-many           critical {ROTOR23} -n 1000
@@ -107,6 +114,14 @@ motion-run-up               motion sample_data/motion/unbalanced.toml --run-up 3
 motion-bode                 motion sample_data/motion/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode --plot run_up.png
 motion-from-rest            motion sample_data/motion/small.toml --run-up 0:3000rpm --time 1s
 periodic-jumps              periodic sample_data/motion/damper.toml --speeds 1000:5000rpm --plot jumps.png
+calibrate                   {CALIBRATE} --plot calibration.png
+calibrate-table             {CALIBRATE} --exact --table --output numbers.csv --verbose
+calibrate-design            {CALIBRATE} --design 4 --speeds 2000:7000:500rpm
+calibrate-critical          {SUPPORTS} "bearing[*].stiffness" --prior "bearing[*].stiffness=30%"
+calibrate-unexplained       {SUPPORTS} bearing.stiffness --prior bearing.stiffness=30%
+calibrate-no-bearing        {SUPPORTS} "bearing[3].stiffness"
+calibrate-says-nothing      calibrate {COMPRESSOR} sample_data/calibration/later.toml --estimate bearing.kxx.scale
+critical-calibrated         critical sample_data/calibration/calibrated.toml -n 2
 reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
@@ -166,7 +181,10 @@ left-in                     balance sample_data/left_in/job.toml --history
 left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
+rk4-few                     balance sample_data/rk4/few.toml
+rk4-few-1005                balance sample_data/rk4/few_1005.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
+one-shot                    balance sample_data/calibration/later.toml
 template                    balance --template job.xlsx
 schema-job                  schema job
 schema-rotor                schema rotor
@@ -316,7 +334,7 @@ PRINTED_ONLY = (
     "task_8_2",
 )
 RECORDS = ("limit_cycle", "quasilinearization", "run_down", "three_masses")
-DEMOS = ("main", "balancing", "holes", "rig", "rotor", "reduction", "identification", "record")
+DEMOS = ("main", "balancing", "holes", "rig", "rotor", "reduction", "identification", "record", "calibration")
 COMMANDS = (
     *(
         "demo",
@@ -330,7 +348,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "calibrate", "schema", "validate"),
 )
 
 MODELLED = {

@@ -15,6 +15,7 @@ NO_ANSWER = ("schema", "--version")
 JUDGEMENTS = {
     "balance": r"(Mount|Remove) (these|this|nothing)|Do not mount|Measure again|"
     r"(Pass|Fail|Not decidable) \(|As predicted: |Not as predicted: |Not judged: |written: ",
+    "calibrate": r"The model (explains|does NOT explain) the data |Run \d+ trial weights?: ",
     "modes": r"\d+ modes?: |Not every mode is determined: ",
     "split": r"Mount |Instead of adding .*(take away opposite:|grind off )|.* from two weights:$",
     "trial-weight": r"Trial weight in plane ",

@@ -66,6 +66,7 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("*minmax*", "*", "a conic solver stops within 5e-9 of the best", relative=1e-7),
     Tolerance("turbo-max-mass", "*", "the same, along limits that χ² hardly tells apart", relative=1e-5),
     Tolerance("turbo-trade-off", "trade_off.points.*", "a conic solver, along a flat optimum", relative=1e-4),
+    Tolerance("calibrate*", "*", "a search stops where a step no longer helps", relative=1e-6),
     # covariances
     Tolerance("*minmax*", "corrections.*std*", _CONSTRAINED, relative=5e-4),
     Tolerance("*minmax*", "corrections.covariance", _CONSTRAINED, relative=5e-4),

@@ -16,17 +16,14 @@ from rotorid.workflows.calibration.calibrate import calibrate as work
 
 @command(
     CalibrateOptions,
-    panels={
-        "What is unknown": "estimate prior bounds exact unbalance_at bow",
-        "How to search, or what to measure": "starts design speeds",
-    },
+    panels={"How to search, or what to measure": "starts design speeds"},
 )
 def calibrate(
     rotor: RotorArgument,
     data: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DATA...",
+            metavar="DATA",
             help="Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.",
         ),
     ],
@@ -38,10 +35,10 @@ def calibrate(
     --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
     critical, campbell and response show bands.
 
-    Example: rotorid calibrate sample_data/calibration/rotor.toml sample_data/calibration/trial.toml
+    Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
     --estimate "bearing[*].*" --prior "bearing[*].*=20%" --output calibrated.toml
 
-    Example: rotorid calibrate sample_data/calibration/rotor.toml sample_data/calibration/trial.toml
+    Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
     --estimate "bearing[*].*" --prior "bearing[*].*=20%" --design 4 --speeds 2000:7000:500rpm
     """
     dataclasses.replace(to, output=None).deliver(

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem.model.calibration import Calibration
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import expand, is_reading
+from fem.model.rotor_parameters import expand
 from rotorid.base.text import counted
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.settings_keys import Key, Said
@@ -24,9 +24,9 @@ PARAMETER = (
         "with all parameters in their order; default: with none",
     ),
 )
-READING = (
-    Key("name", TEXT, "`probe[NAME].angle` or `key_phasor.angle`", required="its name"),
-    Key("angle_deg", number(), "true angle less the job's, with rotation", required="its angle"),
+DATA = (
+    Key("file", TEXT, "name of a file that it was made from", required="its name"),
+    Key("sha256", TEXT, "hash of its content", required="its hash"),
 )
 COMPARED = (
     Key("sensor", TEXT, "name", required="its name"),
@@ -41,8 +41,8 @@ CALIBRATION = (
     Key("needs_trial_run", FLAG, "whether the data contradict the model", default=False),
     Key("speeds_rad_s", numbers("speeds such as [300, 350]", "300; 350"), "speeds compared", default=()),
     Key("parameter", each(PARAMETER), "what was fitted", default=()),
-    Key("reading", each(READING), "an angle of the readings that was found besides", default=()),
     Key("compared", each(COMPARED), "a sensor, and how well the model agrees", default=()),
+    Key("data", each(DATA), "a file that it was made from, which must not count twice", default=()),
 )
 
 
@@ -60,9 +60,6 @@ def read_calibration(said: Said, rotor: Rotor, problems: Problems) -> Calibratio
                 one.section.complain("name", "a single parameter, without [*]")
         if one["correlation"] and len(one["correlation"]) != n:
             one.section.complain("correlation", f"{counted(n, 'number')}, one for each parameter")
-    for one in said["reading"]:
-        if not is_reading(one["name"]):
-            one.section.complain("name", "probe[NAME].angle or key_phasor.angle")
     for one in compared:
         if len(one["lack_of_fit"]) != len(speeds):
             expected = f"{counted(len(speeds), 'number')}, one for each of speeds_rad_s"
@@ -75,11 +72,11 @@ def read_calibration(said: Said, rotor: Rotor, problems: Problems) -> Calibratio
             tuple(one["name"] for one in parameters),
             np.array([one["value"] for one in parameters]),
             np.reshape(R, (n, n)) * np.outer(std, std),
-            {one["name"]: one["angle_deg"] for one in said["reading"]},
             np.array(speeds),
             tuple(one["sensor"] for one in compared),
             np.array([one["lack_of_fit"] for one in compared]).T,
             said["needs_trial_run"],
+            {one["file"]: one["sha256"] for one in said["data"]},
         )
     except ValueError as error:
         said.section.refuse(f"a possible calibration: {error}")
@@ -96,8 +93,8 @@ def calibration_table(found: Calibration) -> dict[str, Any]:
         table["speeds_rad_s"] = found.speeds.tolist()
     for key, keys, columns in (
         ("parameter", PARAMETER, (found.names, found.values.tolist(), found.std.tolist(), R.tolist())),
-        ("reading", READING, (found.readings.keys(), found.readings.values())),
         ("compared", COMPARED, (found.sensors, found.lack_of_fit.T.tolist())),
+        ("data", DATA, (found.data.keys(), found.data.values())),
     ):
         names = [one.name for one in keys]
         if rows := [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]:

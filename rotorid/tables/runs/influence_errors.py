@@ -10,7 +10,9 @@ What sensors and speeds have in common stands in pairs of columns `common_run_1_
 `common_speed_1_re`, …: an error moves every coefficient by its column, as a complex share of the root mean
 square of the two standard deviations, times an independent complex number with parts of variance 1: one
 number for the column, or one for each speed. Without the rows of `(baseline)` a later run has errors of its
-own only; without the columns `common_…` sensors and speeds count as independent.
+own only; without the columns `common_…` sensors and speeds count as independent. Errors of a model's
+parameters (`Influence.parameters`) are kept in these covariances; what sensors and speeds have in common of
+them is not.
 """
 
 from __future__ import annotations

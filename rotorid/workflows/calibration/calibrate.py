@@ -41,7 +41,7 @@ class CalibrateOptions:
     unbalance_at : LIST
         Nodes where the rotor's own unbalance may stand: the readings of the bare rotor count, too.
     bow : N
-        Shapes of an unknown bow, the lowest modes; with --unbalance-at.
+        Shapes of an unknown bow, modes of the free shaft; with --unbalance-at.
     starts : N
         Searches from different starting values.
     design : N
@@ -161,8 +161,16 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
         return Calibrated(found=design(model, numbers, wished, runs, options.design), provenance=told)
     if options.speeds is not None:
         raise ValueError("--speeds are candidates for --design: the data have their own")
+    paths = {number.path for number in numbers}
+    beside = unknowns(model, probes, options.estimate, "", "", exact=False) if options.exact else []
+    held = [number for number in beside if number.path not in paths]
     with phase("calibration"):
-        found = calibration.calibrate(model, numbers, readings, frequencies, starts=options.starts)
+        found = calibration.calibrate(model, numbers, readings, frequencies, held=held, starts=options.starts)
+    of_rotor = {one["sha256"] for one in told["inputs"][: len(files)]}  # which jobs name, too
+    made_from = [one for one in told["inputs"] if one["sha256"] not in of_rotor]
+    hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
+    known = replace(found.rotor.calibration, data=hashes)  # type: ignore[type-var]
+    found = replace(found, rotor=replace(found.rotor, calibration=known))
     return Calibrated(found=found, assumed=tuple(assumed), provenance=told)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from balancing.coefficients.coefficients_from_model import DERIVATIVES
 from rotorid.base.text import counted
 from rotorid.calibration import MeasuredFrequencies, RunReadings
-from rotorid.workflows.coefficients import model_places
+from rotorid.workflows.calibration.model_places import model_places
 
 if TYPE_CHECKING:
     from fem import Rotor

@@ -10,39 +10,65 @@ it will read.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
+from balancing.coefficients.run_errors import runs_of
 from balancing.data.trials import ReadingErrors, Trials
 from fem.model.rotor_parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
+from rotorid.calibration.run_readings import run_errors
+from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from balancing import Influence
+    from balancing.data.conventions import Labels
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.tables import Job
-    from rotorid.workflows.coefficients import ModelPlaces
+    from rotorid.workflows.calibration.model_places import ModelPlaces
 
-NEEDS_TRIAL = (
-    "the calibrated model does not explain the data it was calibrated with: it needs a trial run here"
-)
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
+"""Why its coefficients alone are not enough."""
 
 
-def calibrated(influence: Influence, rotor: Rotor, places: ModelPlaces, key_phasor: float) -> Influence:
-    """Computed coefficients as those of a calibrated rotor: at the angles it found, with its errors."""
-    calibration = rotor.calibration
+def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
+    """Computed coefficients as those of a job's calibrated rotor: at the angles it found, with its errors.
+
+    What changes between runs is as the job states it, else assumed.
+    """
+    assert job.rotor is not None
+    calibration = job.rotor.calibration
     assert calibration is not None
-    W, dW = _derivatives(_runs(influence, places, key_phasor), rotor)
+    W, dW = _derivatives(_runs(influence, places, job.key_phasor), job.rotor)
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = calibration.lack_at(influence.speeds, influence.sensors)
-    found = with_parameters(replace(influence, W=W), columns, lack)
-    return replace(found, warnings=(*found.warnings, NEEDS_TRIAL)) if calibration.needs_trial_run else found
+    runs, nothing = job.trials, np.zeros(len(job.trials.runs))
+    by_plane = dict(zip(runs.planes, runs.weights.T, strict=True))
+    mounted = np.column_stack([by_plane.get(plane, nothing) for plane in influence.planes])
+    between = run_errors(runs, runs_of(runs.mean, mounted, W))
+    found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
+    said = f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(found, warnings=(*found.warnings, said)) if calibration.needs_trial_run else found
+
+
+def counted_before(job: Job) -> bool:
+    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
+    known = None if job.rotor is None else job.rotor.calibration
+    own = job.files[:2]  # the job, then its runs
+    return known is not None and any(hash_of(file) in known.data.values() for file in own)
+
+
+def needs_trial_run(job: Job, influence: Influence) -> bool:
+    """Whether these coefficients are those of a model alone that contradicts its own data."""
+    known = None if job.rotor is None else job.rotor.calibration
+    alone = influence.parameters is not None and not job.trials.weights.any()
+    return known is not None and known.needs_trial_run and alone
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
@@ -93,6 +119,27 @@ class NextTrial:
     weight: complex
     before: float
     after: float
+    labels: Labels
+
+    @property
+    def words(self) -> str:
+        """A clause."""
+        before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
+        return (
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow "
+            f"what the model leaves open most: expected ± from {before} to {after}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units."""
+        scale = self.labels.vibration_scale
+        weight = self.labels.weight_entry(self.weight)
+        return {
+            "plane": self.plane,
+            **weight,
+            "error_now": self.before * scale,
+            "error_after": self.after * scale,
+        }
 
 
 def next_trial(
@@ -109,10 +156,12 @@ def next_trial(
     weights, planes
         The correction.
     """
-    from rotorid.workflows.coefficients import model_places
+    from rotorid.workflows.calibration.model_places import model_places
 
     rotor = job.rotor
-    if rotor is None or rotor.calibration is None or not rotor.calibration.names or not weights.any():
+    if rotor is None or rotor.calibration is None or influence.parameters is None:
+        return None
+    if job.trials.weights.any() or not weights.any():
         return None
     runs = _runs(influence, model_places(job), job.key_phasor)
     W, dW = _derivatives(runs, rotor)
@@ -121,9 +170,8 @@ def next_trial(
     moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
 
     def error(C: FloatArray) -> float:
-        return float(
-            1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1])
-        )
+        square = np.einsum("ni,nm,mi->", moved, C, moved.conj()).real
+        return float(1.96 * np.sqrt(square / (2 * moved.shape[1])))
 
     C = np.asarray(rotor.calibration.covariance)
     bare = job.trials.mean[0]
@@ -145,5 +193,7 @@ def next_trial(
         K = rows.jacobian(W, dW)
         CK = C @ K.T
         after = C - CK @ np.linalg.solve(np.eye(len(K)) + K @ CK, CK.T)
-        found.append(NextTrial(influence.planes[p], complex(one[p]), error(C), error(after)))
+        found.append(
+            NextTrial(influence.planes[p], complex(one[p]), error(C), error(after), job.trials.labels)
+        )
     return min(found, key=lambda trial: trial.after)

@@ -8,9 +8,9 @@ from fem_rotors import machines, rotor23
 from hypothesis import given
 
 import fem
+from fem.model.calibration import is_reading
 from fem.model.rotor_parameters import (
     expand,
-    is_reading,
     parameter_value,
     typical_size,
     with_changes,

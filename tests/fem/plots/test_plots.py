@@ -169,6 +169,7 @@ def whirl(criticals=()):
         direction=np.stack([-1 + 0 * speeds, 1 + 0 * speeds, np.where(speeds < 600, 0.0, 1.0)], axis=1),
         criticals=criticals,
         windows=(),
+        std=None,
     )
 
 

@@ -40,16 +40,17 @@ def read(tmp_path):
 def drawn(rng, rotor):
     """A calibration as a fit of full correlation gives it, in units of very different size."""
     names = ("bearing[1].kxx.scale", "bearing[2].cyy.slope", "material.youngs_modulus")
-    A = rng.normal(size=(3, 3)) * [[1e-2], [1e-3], [3e9]]
+    names += ("probe[DE, x].angle", "key_phasor.angle")
+    A = rng.normal(size=(5, 5)) * [[1e-2], [1e-3], [3e9], [2.0], [0.5]]
     return fem.Calibration(
         names,
-        rng.normal(size=3),
+        rng.normal(size=5),
         A @ A.T,
-        {"probe[DE, x].angle": rng.normal(), "key_phasor.angle": -90.0},
         np.sort(rng.uniform(10, 1e3, 4)),
         ("DE, x", "NDE"),
         rng.uniform(0, 0.2, (4, 2)),
         needs_trial_run=True,
+        data={"job.toml": "12ab", "runs.csv": "34cd"},
     )
 
 
@@ -64,6 +65,7 @@ def test_it_comes_back_with_all_digits(tmp_path, seed):
     again = back.calibration
     assert (again.names, again.sensors, again.readings) == (found.names, found.sensors, found.readings)
     assert again.needs_trial_run
+    assert again.data == found.data
     for name in ("values", "speeds", "lack_of_fit"):
         np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
     np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-14)
@@ -73,7 +75,7 @@ def test_without_errors_and_with_nothing_but_angles(tmp_path):
     rotor = fem.Rotor([0.3], 0.1, supports=[fem.Support(1, 1e7), fem.Support(2, 1e7)])
     for found in (
         fem.Calibration(("bearing[1].kxx",), [1e7], [[0.0]]),
-        fem.Calibration((), [], np.zeros((0, 0)), {"key_phasor.angle": 3.0}),
+        fem.Calibration(("key_phasor.angle",), [3.0], [[0.0]]),
     ):
         write_rotor(tmp_path / "r.toml", replace(rotor, calibration=found))
         again = read_rotor(tmp_path / "r.toml").calibration
@@ -117,11 +119,7 @@ COMPARED = '[calibration]\nspeeds_rad_s = [100, 200]\n[[calibration.compared]]\n
         (PLAIN.replace("[-0.5, 1]", "[0.5, 1]"), "calibration", "must be symmetric"),
         (PLAIN.replace("material.density.scale", "bearing[DE].kxx"), "calibration", "names comes twice"),
         (PLAIN + "[calibration]\nstds = 3", "calibration.stds", "a known key"),
-        (
-            '[[calibration.reading]]\nname = "A"\nangle_deg = 1',
-            "calibration.reading[1].name",
-            "key_phasor.angle",
-        ),
+        ('[[calibration.data]]\nfile = "A"', "calibration.data[1].sha256", "its hash"),
         (
             COMPARED + "lack_of_fit = [0.1]",
             "calibration.compared[1].lack_of_fit",

@@ -9,7 +9,7 @@ from tables_data import complaints, replaced, the_only, write_csv
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, correct, estimate_influence
-from balancing.coefficients.coefficients_from_model import model_influence
+from balancing.coefficients.coefficients_from_model import model_influence, with_parameters
 from balancing.coefficients.run_errors import marginal
 from balancing.data.trials import RunScatter
 from rotorid.tables import (
@@ -126,6 +126,12 @@ def test_a_model_keeps_its_error(tmp_path):
     again = round_trip(tmp_path / "influence.csv", model)
     np.testing.assert_allclose(again.covariance, model.covariance, rtol=1e-14)
     assert (again.errors, again.error_source, again.labels) == (None, "unknown", model.labels)
+    model = with_parameters(model, 0.2j * model.W[None], 0.1)  # columns are not stored, their variance is
+    again = round_trip(tmp_path / "influence.csv", model)
+    np.testing.assert_allclose(
+        again.covariance, model.covariance, rtol=1e-12, atol=1e-14 * model.covariance.max()
+    )
+    assert again.parameters is None
 
 
 @pytest.mark.parametrize("phase", ["lead", "lag"])

@@ -1,0 +1,440 @@
+"""Does a calibrated rotor balance in one shot, do its intervals hold, is a misfit seen? Drawn machines.
+
+Run `python examples/coverage_calibrate.py [seed] [machines]`, machines of each case (1 and 510: three hours).
+
+A machine is the compressor of `sample_data`, its rotor23 on unlike bearings, or an overhung fan of drawn
+sizes on soft pedestals. Its bearings differ by 20 % from what is believed, each coefficient on its own,
+modulus and discs by 1 %, pedestals by 10 %, the angles of its four probes by 2°. Unbalances stand at five
+stations. One trial run, a weight in each of two planes at once, is read at four speeds, or at one; errors are
+1 % and 1° of a reading and 2 % between runs: a third of that variance of each reading, common at a speed,
+common to the run. Another day the unbalances are others, and one run is all there is: the calibrated rotor
+gives the weights.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+import fem
+from balancing import Labels, ReadingErrors, Trials, UndeterminedError, compare_check
+from balancing.data.trials import RunScatter
+from fem.matrices.banded_matrices import assemble, multiply
+from fem.model.rotor_parameters import with_parameters
+from fem.solvers.receptance_derivatives import receptance_with_derivatives
+from rotorid import read_rotor
+from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
+from rotorid.regression import stretch
+from rotorid.tables import Conventions, Job
+from rotorid.workflows import Balance, balance
+from rotorid.workflows.calibration.unknown_options import unknowns
+
+ComplexArray = NDArray[np.complex128]
+FloatArray = NDArray[np.float64]
+Random = np.random.Generator
+
+RPM = np.pi / 30
+PROBES = ("DE x", "DE y", "NDE x", "NDE y")
+READING, RUN = ReadingErrors(0.01, np.radians(1.0)), RunScatter(0.02)
+UNBALANCE = 3e-4
+"""kg·m, of each station in each direction."""
+TRIAL = UNBALANCE * np.sqrt(10.0) * np.array([[0, 0], [1, 1j]])
+"""The bare rotor, and a weight in each plane as large as all unbalances together."""
+BOW = 2e-5
+"""m, in each direction."""
+GOOD, NEAR = 0.1, 1.3
+"""Of the vibration, and of what the exact model leaves."""
+NORMAL = 1.96
+
+
+class Machine(NamedTuple):
+    """As it is believed to be: nodes of unbalances, planes and the two ends' probes, speeds, rad/s."""
+
+    rotor: fem.Rotor
+    stations: tuple[int, ...]
+    planes: tuple[int, int]
+    probes: tuple[int, int]
+    speeds: FloatArray
+
+    @property
+    def sensors(self) -> tuple[fem.Sensor, ...]:
+        """Two probes at each end."""
+        return tuple(fem.Sensor(node, angle) for node in self.probes for angle in (45.0, 135.0))
+
+    def unknowns(self, *, exact: bool = False) -> list[Unknown]:
+        """What `rotorid calibrate --estimate "bearing[*].*" --prior "…=20%"` takes as unknown."""
+        prior = "bearing[*].k*=20%, bearing[*].c*=20%"
+        return unknowns(self.rotor, PROBES, "bearing[*].*", prior, "", exact=exact)
+
+
+class Truth(NamedTuple):
+    """What the machine really is: numbers by path, what unbalances at all stations and in the planes do."""
+
+    numbers: dict[str, float]
+    speeds: FloatArray
+    W_stations: ComplexArray
+    W: ComplexArray
+    bow: ComplexArray
+
+
+class Outcome(NamedTuple):
+    """Of one machine: what is left, true, relative to the vibration; errors beside their covariance.
+
+    `left_exact` is what the exact model would leave from the same reading, `left_believed` the uncalibrated
+    one. Of the numbers: errors over deviations (NaN at a bound), those that the data tell more of than was
+    known before, and dᵀ C⁻¹ d of all; of the weights dᵀ C⁻¹ d; of a check run: whether each reading is within
+    its region, and whether all are, jointly. `chance` is that of a larger χ², `told` that a trial run is
+    needed.
+    """
+
+    left: float
+    left_exact: float
+    left_believed: float
+    numbers: FloatArray
+    seen: NDArray[np.bool_]
+    joint: float
+    weights: float
+    readings: NDArray[np.bool_]
+    check: bool
+    chance: float
+    told: bool
+    words: tuple[str, ...]
+
+    @property
+    def good(self) -> bool:
+        """Whether the shot is as good as wanted."""
+        return self.left <= max(GOOD, NEAR * self.left_exact)
+
+    @property
+    def inside(self) -> bool:
+        """Whether the joint region of the weights holds the true ones."""
+        return self.weights < chdtri(4, 0.05)
+
+
+def compressor(_: Random) -> Machine:
+    """Of the samples."""
+    rotor = read_rotor(SAMPLES / "compressor" / "rotor.toml")
+    return Machine(rotor, (8, 10, 12, 14, 16), (8, 16), (3, 23), np.array([2500, 3500, 4300, 6000]) * RPM)
+
+
+def rotor23(_: Random) -> Machine:
+    """Twelve discs on bearings that are unlike in x and y and couple both."""
+    plain = read_rotor(SAMPLES / "rotor23.csv")
+    discs = [replace(d, polar_inertia=0.02 * d.mass, diametral_inertia=0.011 * d.mass) for d in plain.discs]
+    stiffness, damping = ((1e8, 8e6), (-6e6, 6e7)), ((2e5, 0.0), (0.0, 1.5e5))
+    bearings = [fem.Support(node, stiffness, damping) for node in (2, 22)]
+    rotor = replace(plain, discs=discs, supports=bearings, model=fem.Model(True, True, True))
+    return Machine(rotor, (7, 9, 11, 13, 15), (7, 15), (3, 21), np.array([1000, 1500, 3000, 4500]) * RPM)
+
+
+def overhung(random: Random) -> Machine:
+    """A fan whose wheel, shaft, bearings and soft pedestals are drawn."""
+
+    def between(low: float, high: float) -> float:
+        return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+    mass, size = between(60, 200), between(0.7, 1.2)
+    wheel = fem.Disc(17, mass, mass * size**2 / 10, mass * size**2 / 17)
+    hub = fem.Disc(1, between(8, 25), 0.1, 0.06)
+
+    def bearing(node: int) -> fem.Support:
+        k, c = between(8e7, 3e8), between(5e4, 2e5)
+        stiffness = ((k, 0.05 * k), (-0.03 * k, k * between(0.5, 1)))
+        stand = (between(3e7, 1e8), between(3e7, 1e8))
+        pedestal = fem.Pedestal(between(80, 300), stand, between(5e3, 3e4))
+        return fem.Support(node, stiffness, ((c, 0.0), (0.0, c * between(0.7, 1.4))), pedestal=pedestal)
+
+    bearings = [bearing(4), bearing(13)]
+    rotor = fem.Rotor(
+        [0.1] * 16,
+        between(0.09, 0.13),
+        discs=[hub, wheel],
+        supports=bearings,
+        model=fem.Model(True, True, True),
+    )
+    critical = float(fem.critical_speeds(rotor, n=1).frequencies[0])
+    return Machine(rotor, (1, 6, 9, 16, 17), (1, 17), (4, 13), critical * np.array([0.7, 0.9, 1.1, 1.4]))
+
+
+SAMPLES = Path(__file__).parents[1] / "sample_data"
+MACHINES: dict[str, Callable[[Random], Machine]] = {
+    "compressor": compressor,
+    "rotor23": rotor23,
+    "overhung": overhung,
+}
+
+CASES: dict[str, dict[str, Any]] = {
+    "four speeds": {},
+    "one speed": {"one_speed": True},
+    "exact, four speeds": {"exact": True},
+    "exact, one speed": {"exact": True, "one_speed": True},
+    "third bearing": {"third": True},
+    "bow, differences": {"bow": BOW},
+    "unbalance": {"modelled": 0},
+    "unbalance, a bow besides": {"modelled": 0, "bow": BOW},
+    "unbalance and bow": {"modelled": 2, "bow": BOW},
+}
+
+WHOLE = ("four speeds", "one speed", "bow, differences", "unbalance", "unbalance and bow")
+"""Cases in which the model lacks nothing, or what it lacks cancels."""
+
+
+def normal(random: Random, *shape: int) -> ComplexArray:
+    """Complex, of variance 1 in each direction."""
+    return np.asarray(random.standard_normal(shape) + 1j * random.standard_normal(shape))
+
+
+def third_bearing(random: Random, rotor: fem.Rotor) -> fem.Rotor:
+    """A further bearing somewhere between the two, a tenth as stiff to as stiff as these."""
+    first, last = (support.node for support in rotor.supports[:2])
+    k = float(rotor.supports[0].at(200.0)[0][0, 0]) * 10 ** random.uniform(-1.0, 0.0)
+    further = fem.Support(int(random.integers(first + 2, last - 1)), k, 1e-3 * k, kind="seal")
+    return replace(rotor, supports=(*rotor.supports, further))
+
+
+def bent(rotor: fem.Rotor, sensors: Sequence[fem.Sensor], speeds: FloatArray) -> ComplexArray:
+    """What the probes read of a rotor bent like a parabola by 1 m between its ends, (S, C)."""
+    A = assemble(rotor)
+    x = np.append(0.0, np.cumsum(rotor.length)) / np.sum(rotor.length)
+    v = np.zeros((A.size, 1))
+    at = np.array([A.deflection(node) for node in range(1, rotor.n_nodes + 1)])
+    v[at, 0], v[at + 1, 0] = 4 * x * (1 - x), 4 * (1 - 2 * x) / np.sum(rotor.length)
+    rows = np.array([A.deflection(rotor.node(sensor.node)) for sensor in sensors])
+    angles = np.radians([sensor.angle for sensor in sensors])
+    return receptance_with_derivatives(rotor, multiply(A.shaft, v), rows, angles, speeds, ()).H[..., 0]
+
+
+def draw(
+    random: Random, machine: Machine, *, one_speed: bool, third: bool = False, bow: float = 0.0
+) -> Truth:
+    """A machine of this kind as it really is."""
+    numbers = {u.path: random.normal(*u.prior) for u in machine.unknowns() if u.prior}
+    rotor = with_parameters(machine.rotor, numbers)
+    rotor = third_bearing(random, rotor) if third else rotor
+    speeds = machine.speeds[[random.integers(4)]] if one_speed else machine.speeds
+    turned = [numbers[f"probe[{probe}].angle"] for probe in PROBES]
+    sensors = [fem.Sensor(s.node, s.angle + a) for s, a in zip(machine.sensors, turned, strict=True)]
+    W_stations, W = (
+        fem.influence(rotor, list(nodes), sensors, speeds).W for nodes in (machine.stations, machine.planes)
+    )
+    of_bow = bow * normal(random, 1) * bent(rotor, sensors, speeds) if bow else np.zeros(W.shape[:2])
+    return Truth(numbers, speeds, W_stations, W, of_bow)
+
+
+def read(random: Random, Y: ComplexArray) -> ComplexArray:
+    """Runs (R, S, C) as they are read."""
+    R, S, C = Y.shape
+    kinds = normal(random, R, 1, 1) + normal(random, R, S, 1) + normal(random, R, S, C)
+    a, b = random.standard_normal((2, R, S, C))
+    run = Y * (1 + RUN.relative / np.sqrt(3) * kinds)
+    return run * (1 + READING.amplitude * a) * np.exp(1j * READING.phase * b)
+
+
+def trials(machine: Machine, speeds: FloatArray, readings: ComplexArray, weights: ComplexArray) -> Trials:
+    """Runs of this machine."""
+    names = tuple(f"run {k + 1}" for k in range(len(readings)))
+    planes = tuple(f"plane {node}" for node in machine.planes)
+    labels = Labels(vibration_unit="m", weight_unit="kg_m")
+    return Trials(names, speeds, PROBES, planes, readings, weights, READING, labels, run_errors=RUN)
+
+
+def one_machine(
+    random: Random,
+    name: str,
+    *,
+    one_speed: bool = False,
+    exact: bool = False,
+    third: bool = False,
+    bow: float = 0.0,
+    modelled: int | None = None,
+) -> Outcome:
+    """Draw a machine, calibrate it, balance it another day, see.
+
+    `exact`: only the bearings are unknown. `modelled`: the bare rotor's readings count by unknown unbalances
+    at the stations and so many shapes of a bow.
+    """
+    machine = MACHINES[name](random)
+    truth = draw(random, machine, one_speed=one_speed, third=third, bow=bow)
+    bare = truth.W_stations @ (UNBALANCE * normal(random, 5)) + truth.bow
+    measured = read(random, np.stack([bare + truth.W @ T for T in TRIAL]))
+    data = RunReadings(
+        trials(machine, truth.speeds, measured, TRIAL),
+        machine.planes,
+        np.ones(2),
+        machine.sensors,
+        unbalance=machine.stations if modelled is not None else (),
+        bow=modelled or 0,
+    )
+    numbers = machine.unknowns(exact=exact)
+    held = [one for one in machine.unknowns() if exact and one.beside]
+    found = calibrate(machine.rotor, numbers, [data], held=held, starts=1)
+    if not found.explained:  # else more starts, as the program makes them, end where one does
+        found = calibrate(machine.rotor, numbers, [data], held=held)
+    try:
+        return shot(random, machine, truth, found)
+    except UndeterminedError as error:  # which leaves the machine as it is
+        nothing, words = np.zeros(0), (*found.warnings, str(error))
+        return Outcome(
+            1.0,
+            np.nan,
+            np.nan,
+            nothing,
+            nothing > 0,
+            np.inf,
+            np.inf,
+            nothing > 0,
+            False,
+            found.chance,
+            True,
+            words,
+        )
+
+
+def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor) -> Outcome:
+    """Balance another day, and a third with unbalance in the planes alone: true weights are known then."""
+    vibration = truth.W_stations @ (UNBALANCE * normal(random, 5)) + truth.bow
+    measured = read(random, vibration[None])
+    made = corrected(machine, found.rotor, truth.speeds, measured)
+    after = vibration + truth.W @ made.result.weights
+    run = trials(machine, truth.speeds, read(random, after[None]), made.result.weights[None])
+    check = compare_check(made.result, run, made.influence, made.job.trials)
+    U = UNBALANCE * np.sqrt(2.5) * normal(random, 2)
+    other = corrected(machine, found.rotor, truth.speeds, read(random, (truth.W @ U)[None])).result
+    true = np.array([truth.numbers[unknown.path] for unknown in found.unknowns])
+    d = found.found.estimate.solution - true
+    free = found.std > 0
+
+    def left(W: ComplexArray) -> float:
+        return left_by(-np.linalg.lstsq(W.reshape(-1, 2), measured.ravel(), rcond=None)[0])
+
+    def left_by(D: ComplexArray) -> float:
+        return float(np.linalg.norm(vibration + truth.W @ D) / np.linalg.norm(vibration))
+
+    believed = fem.influence(machine.rotor, list(machine.planes), list(machine.sensors), truth.speeds)
+    return Outcome(
+        left_by(made.result.weights),
+        left(truth.W),
+        left(believed.W),
+        d / np.where(free, found.std, np.nan),
+        found.to_frame()["data_share"].to_numpy() > 0.5,
+        distance(d[free], found.covariance[np.ix_(free, free)]),
+        distance(stretch(other.weights + U), other.covariance),
+        check.distance.ravel() ** 2 < chdtri(2, 0.05),
+        bool(check.explained),
+        found.chance,
+        not found.explained,
+        found.warnings,
+    )
+
+
+def distance(d: FloatArray, covariance: FloatArray) -> float:
+    """Square of an error by its covariance."""
+    return float(d @ np.linalg.solve(covariance, d)) if d.size else np.inf
+
+
+def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: ComplexArray) -> Balance:
+    """Weights by this calibrated rotor, as `rotorid balance` finds them."""
+    runs = trials(machine, speeds, readings, np.zeros((1, 2)))
+    nodes = dict(zip(runs.planes, machine.planes, strict=True))
+    places = dict(zip(PROBES, machine.sensors, strict=True))
+    conventions = Conventions()
+    return balance(
+        Job(runs, None, conventions, (), runs.planes, rotor=rotor, plane_nodes=nodes, sensor_places=places)
+    )
+
+
+def simulate(machines: int, seed: int, name: str, case: str) -> list[Outcome]:
+    """So many machines of a kind."""
+    key = [seed, list(MACHINES).index(name), list(CASES).index(case)]
+    return [one_machine(np.random.default_rng([*key, k]), name, **CASES[case]) for k in range(machines)]
+
+
+def shots(name: str, found: Sequence[Outcome]) -> str:
+    """How many shots are good, and what they leave."""
+    parts = [[one.good for one in found if bool(one.words) == said] for said in (False, True)]
+    left = np.nanmedian([(one.left_believed, one.left, one.left_exact) for one in found], axis=0)
+    counts = "".join(f"{percent(part):>7} of {len(part):4d}" for part in parts)
+    return f"{name:<28}{counts}" + "".join(f"{value:9.3f}" for value in left)
+
+
+def intervals(name: str, found: Sequence[Outcome]) -> str:
+    """How many intervals hold the truth."""
+    z, seen = (np.concatenate([one[k] for one in found]) if found else np.zeros(0) for k in (3, 4))
+    known = ~np.isnan(z)
+    columns: list[Sequence[Any]] = [
+        np.abs(z[known]) < NORMAL,
+        np.abs(z[known & (seen > 0)]) < NORMAL,
+        [one.joint < chdtri(np.sum(~np.isnan(one.numbers)), 0.05) for one in found],
+        [one.inside for one in found],
+        [inside for one in found for inside in one.readings],
+        [one.check for one in found],
+    ]
+    return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>9}" for column in columns)
+
+
+def lacks(name: str, found: Sequence[Outcome]) -> str:
+    """How many are recognised, and what the others' answers are worth."""
+    columns: list[Sequence[Any]] = [
+        [one.told for one in found],
+        [one.told or one.inside for one in found],
+        [one.told or one.check for one in found],
+        [one.told or one.good for one in found],
+        [one.good for one in found],
+    ]
+    return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>10}" for column in columns)
+
+
+def percent(values: Sequence[Any]) -> str:
+    """Share of what is true."""
+    return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if len(values) else "–"
+
+
+def main(seed: int = 1, machines: int = 510) -> None:
+    """Print the tables."""
+    report(lambda name, case: simulate(-(-machines // len(MACHINES)), seed, name, case))
+
+
+def report(outcomes: Callable[[str, str], list[Outcome]]) -> None:
+    """The tables of outcomes by machine and case."""
+    cells = {(name, case): outcomes(name, case) for case in CASES for name in MACHINES}
+    of = {case: [one for name in MACHINES for one in cells[name, case]] for case in CASES}
+
+    print(
+        "a. One shot: leaves at most 0.1 of the vibration, or 1.3 times what the exact model leaves, per cent"
+    )
+    print(f"{'':<28}{'silent':>15}{'warned':>15}{'  left: believed, calibrated, exact':>26}")
+    for case in CASES:
+        if case in ("four speeds", "one speed", "bow, differences"):
+            for name in MACHINES:
+                print(shots(f"{name}: {case}", cells[name, case]))
+
+    print("\nb. 95 % intervals that hold the truth, per cent")
+    print(f"{'':<41}  numbers     seen  jointly  weights readings    check")
+    for case in WHOLE:
+        for said, word in ((False, "silent"), (True, "warned")):
+            print(intervals(f"{case}, {word}", [one for one in of[case] if bool(one.words) == said]))
+
+    print("\nc. What the model lacks, per cent: recognised, or else the shot's answer holds")
+    print(f"{'':<41}      told or weights  or check   or good      good")
+    for case in CASES:
+        if case not in WHOLE:
+            for name in MACHINES:
+                print(lacks(f"{name}: {case}", cells[name, case]))
+
+    print("\nd. Complete models: machines with a χ² that chance would exceed in so many per cent, per cent")
+    print(f"{'':<41}        1         5        20        50")
+    for case in WHOLE:
+        chance = np.array([one.chance for one in of[case]])
+        shares = "".join(f"{percent(chance < level):>10}" for level in (0.01, 0.05, 0.2, 0.5))
+        print(f"{case:<36}{len(chance):5d}{shares}")
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:]))

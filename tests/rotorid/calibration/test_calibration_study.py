@@ -1,0 +1,112 @@
+"""Drawn machines, calibrated, balanced in one shot: how well, how honest the intervals, what is recognised.
+
+The example with few machines; bounds are those of what it prints for many (docs/coverage_calibrate.md), by
+the binomial distribution of so few.
+"""
+
+import importlib.util
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from repetitions import DEVIATIONS, FULL, highest_share, lowest_share
+
+PATH = Path(__file__).parents[3] / "examples" / "coverage_calibrate.py"
+EACH = 60 if FULL else 3
+"""Machines of each kind."""
+SEED = 2
+
+
+@pytest.fixture(scope="module")
+def example():
+    spec = importlib.util.spec_from_file_location("coverage_calibrate", PATH)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[spec.name]
+
+
+def simulated(example, case, each=EACH):
+    return [one for name in example.MACHINES for one in example.simulate(each, SEED, name, case)]
+
+
+@pytest.fixture(scope="module")
+def four(example):
+    return simulated(example, "four speeds")
+
+
+@pytest.fixture(scope="module")
+def single(example):
+    return simulated(example, "one speed")
+
+
+@pytest.fixture(scope="module")
+def exact(example):
+    return simulated(example, "exact, four speeds", max(EACH // 2, 2))
+
+
+def test_one_shot_at_four_speeds(example, four):
+    good = [one.good for one in four]
+    assert np.mean(good) >= lowest_share(len(good), 0.95)
+    believed = [one.left_believed <= max(example.GOOD, example.NEAR * one.left_exact) for one in four]
+    assert np.mean(believed) < lowest_share(len(good), 0.95)  # the bound refuses a rotor not calibrated
+
+
+def test_one_shot_at_one_speed(single):
+    good = [one.good for one in single]
+    assert np.mean(good) >= lowest_share(len(good), 0.85)
+
+
+def test_errors_of_the_numbers_are_as_stated(four, single):
+    """Squares of errors by their covariance: deviations 15 % too small or too large would be seen."""
+    found = [one for one in (*four, *single) if not one.told]
+    n = sum(len(one.numbers) for one in found)
+    assert sum(one.joint for one in found) / n == pytest.approx(1.0, abs=DEVIATIONS * np.sqrt(2 / n))
+
+
+def test_regions_of_weights_and_check_runs(four, single):
+    found = [one for one in (*four, *single) if not one.told]
+    for inside in ([one.inside for one in found], [one.check for one in found]):
+        assert np.mean(inside) >= lowest_share(len(inside), 0.93)
+
+
+def test_good_models_are_seldom_said_to_lack_something(four, single):
+    told = [one.told for one in (*four, *single)]
+    assert np.mean(told) <= highest_share(len(told), 0.01)
+
+
+def test_numbers_wrongly_taken_as_exact(exact):
+    assert np.mean([one.told or one.check for one in exact]) >= lowest_share(len(exact), 0.95)
+    soft = exact[-(len(exact) // 3) :]  # on pedestals that matter
+    assert np.mean([one.told for one in soft]) >= lowest_share(len(soft), 0.95)
+
+
+def test_a_third_bearing_is_recognised(example):
+    found = simulated(example, "third bearing", max(EACH // 3, 1))
+    assert np.mean([one.told for one in found]) >= lowest_share(len(found), 0.95)
+
+
+def test_errors_between_runs_that_nobody_states_are_noticed(example, monkeypatch):
+    whole = example.trials
+    monkeypatch.setattr(example, "trials", lambda *given: replace(whole(*given), run_errors=None))
+    found = simulated(example, "one speed", max(EACH // 3, 1))
+    n = sum(len(one.numbers) for one in found)
+    off = sum(one.joint for one in found) / n > 1 + DEVIATIONS * np.sqrt(2 / n)
+    assert off or np.mean([one.told for one in found]) > highest_share(len(found), 0.01)
+
+
+def test_the_tables_are_those_of_the_page(example, four, capsys):
+    example.report(lambda name, case: four)
+    text = capsys.readouterr().out
+    page = (PATH.parents[1] / "docs" / "coverage_calibrate.md").read_text(encoding="utf-8")
+    shown = [line for block in page.split("```text\n")[1:] for line in block.split("```")[0].splitlines()]
+    assert [name(line) for line in shown if line] == [name(line) for line in text.splitlines() if line]
+
+
+def name(line):
+    """What a line of a table is about, without its numbers at the end."""
+    return re.split(r"  +[\d–]", line)[0].rstrip()

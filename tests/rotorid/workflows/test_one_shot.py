@@ -1,0 +1,160 @@
+"""Balancing with a calibrated rotor: what it leaves on the true machine, its errors, the next trial run."""
+
+import importlib.util
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem
+from fem.model.rotor_parameters import with_parameters
+from rotorid import read_job, read_rotor
+from rotorid.samples import sample_data
+from rotorid.workflows import BalanceOptions, balance
+from rotorid.workflows.calibration.one_shot import counted_before
+from rotorid.workflows.coefficients import choose
+
+FOLDER = sample_data() / "calibration"
+
+
+@pytest.fixture(scope="module")
+def machine():
+    """What made the runs of the sample: the true coefficients of its planes, (S, C, P)."""
+    spec = importlib.util.spec_from_file_location("make_calibration_data", FOLDER / "make_data.py")
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    rotor = with_parameters(read_rotor(FOLDER.parent / "compressor" / "rotor.toml"), made.MACHINE)
+    sensors = [fem.Sensor(node, angle + made.TURNED[name]) for name, (node, angle) in made.SENSORS.items()]
+    return fem.influence(rotor, made.PLANES, sensors, made.SPEEDS * np.pi / 30).W
+
+
+@pytest.fixture(scope="module")
+def shot():
+    return balance(FOLDER / "later.toml")
+
+
+def edited(tmp_path, job="later.toml", **changes):
+    """The job in a folder of its own, with other text in its files."""
+    shutil.copytree(FOLDER, tmp_path / "calibration")
+    shutil.copytree(FOLDER.parent / "compressor", tmp_path / "compressor")
+    for name, (old, new) in changes.items():
+        file = tmp_path / "calibration" / name.replace("__", ".")
+        text = file.read_text(encoding="utf-8")
+        assert old in text
+        file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return tmp_path / "calibration" / job
+
+
+def test_one_run_balances_the_true_machine_as_well_as_its_exact_coefficients(machine, shot):
+    Y = read_job(FOLDER / "later.toml").trials.mean[0]
+    exact = -np.linalg.lstsq(machine.reshape(-1, 2), Y.ravel(), rcond=None)[0]
+    left = [np.sqrt(np.mean(np.abs(Y + machine @ D) ** 2)) for D in (shot.result.weights, exact)]
+    before = np.sqrt(np.mean(np.abs(Y) ** 2))
+    assert left[0] < 0.1 * before
+    assert left[0] < 1.3 * left[1]
+    # and the prediction of each reading holds what the machine then shows, within three of its deviations
+    covariance = shot.result.after_covariance
+    error = (shot.result.after - (Y + machine @ shot.result.weights)).ravel()
+    z = np.stack((error.real, error.imag), axis=-1)
+    squares = np.einsum("ni,nij,nj->n", z, np.linalg.inv(covariance.reshape(-1, 2, 2)), z)
+    assert squares.max() < 18.0  # of 2 degrees of freedom: 1.2e-4
+    assert shot.answer.judgement.startswith("Mount these weights")
+
+
+def test_errors_of_the_parameters_are_those_of_drawn_rotors(shot):
+    """Columns against coefficients of 300 rotors drawn from the covariance that the file states."""
+    job = read_job(FOLDER / "later.toml")
+    known, influence = job.rotor.calibration, shot.influence
+    random = np.random.default_rng(1)
+    drawn = []
+    values = np.array([fem_value(job.rotor, name) for name in known.names])
+    for _ in range(300):
+        theta = dict(zip(known.names, random.multivariate_normal(values, known.covariance), strict=True))
+        angles = {n: theta[n] for n in theta if n.startswith("probe")}
+        places = [
+            replace(place, angle=place.angle + angles[f"probe[{name}].angle"])
+            for name, place in job.sensor_places.items()
+        ]
+        rotor = with_parameters(job.rotor, theta)
+        drawn.append(fem.influence(rotor, list(job.planes), places, job.trials.speeds).W)
+    spread = np.std(drawn, axis=0)
+    stated = np.sqrt(np.sum(np.abs(influence.parameters[..., 1:]) ** 2, axis=0))
+    np.testing.assert_allclose(stated, spread, rtol=0.2)
+
+
+def fem_value(rotor, name):
+    from fem.model.rotor_parameters import parameter_value
+
+    return rotor.calibration.readings.get(name) or parameter_value(rotor, name)
+
+
+def test_the_next_trial_run_tells_what_a_linear_update_by_differences_tells(shot):
+    trial, job = shot.next_trial, read_job(FOLDER / "later.toml")
+    known, W = job.rotor.calibration, shot.influence.W
+    p = shot.result.planes.index(trial.plane)
+    C, slopes = known.covariance, []
+    for k, name in enumerate(known.names):  # derivatives by the rotor itself
+        step = 1e-3 * np.sqrt(C[k, k])
+        at = fem_value(job.rotor, name)
+        ends = []
+        for sign in (1, -1):
+            moved = {name: at + sign * step}
+            places = [
+                replace(q, angle=q.angle + {**known.readings, **moved}[f"probe[{s}].angle"])
+                for s, q in job.sensor_places.items()
+            ]
+            rotor = with_parameters(job.rotor, moved)
+            ends.append(fem.influence(rotor, list(job.planes), places, job.trials.speeds).W)
+        slopes.append((ends[0] - ends[1]) / (2 * step))
+    slopes = np.array(slopes)
+    moved = np.einsum("nscp,p->nsc", slopes, shot.result.weights).reshape(len(slopes), -1)
+    now = 1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1])
+    assert trial.before == pytest.approx(now, rel=1e-3)
+    # less than with exact readings, more than without the trial
+    one = slopes[..., p].reshape(len(slopes), -1) * trial.weight
+    K = np.concatenate((one.real, one.imag), axis=1).T
+    size = np.abs(one).mean()
+    best = C - C @ K.T @ np.linalg.solve(K @ C @ K.T + (1e-4 * size) ** 2 * np.eye(len(K)), K @ C)
+    least = 1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, best, moved.conj()).real / 2 / moved.shape[1])
+    assert least < trial.after < trial.before
+    assert np.abs(W[..., p]).any()
+    entry = shot.to_dict()["next_trial"]
+    assert entry["plane"] == trial.plane
+    assert entry["error_after"] == pytest.approx(trial.after * 2e6)
+    assert "a trial run with" in shot.answer.whole()
+
+
+def test_runs_that_made_the_calibration_do_not_count_twice(tmp_path):
+    rotor = ('rotor = "../compressor/rotor.toml"', 'rotor = "calibrated.toml"')
+    job = edited(tmp_path, "trial.toml", trial__toml=rotor, weights__csv=("trial,impeller 5,2000,90", ""))
+    same = read_job(job)
+    assert counted_before(same)
+    assert choose(same)[0].trials is None  # the model's own
+    text = (job.parent / "trial.csv").read_text(encoding="utf-8")
+    (job.parent / "trial.csv").write_text(text.replace("base,", "first,"), encoding="utf-8")
+    other = read_job(job)
+    assert not counted_before(other)
+    combined, bare = choose(other)
+    assert combined.trials is not None
+    assert bare is None
+    alone = choose(other, "computed")[0]
+    k = combined.planes.index("impeller 1")
+    own = np.s_[..., 2 + 2 * k, 2 + 2 * k]
+    assert (combined.covariance[own] < alone.covariance[own]).all()
+
+
+def test_a_later_trial_in_all_planes_at_once_leaves_the_model_alone(tmp_path):
+    rotor = ('rotor = "../compressor/rotor.toml"', 'rotor = "calibrated.toml"')
+    job = edited(tmp_path, "trial.toml", trial__toml=rotor, trial__csv=("base,", "base ,"))
+    found = read_job(job)
+    assert choose(found)[0].trials is None
+
+
+def test_a_model_that_contradicts_its_data_asks_for_a_trial_run(tmp_path):
+    flag = ("needs_trial_run = false", "needs_trial_run = true")
+    found = balance(edited(tmp_path, calibrated__toml=flag))
+    assert found.answer.judgement.startswith("Make a trial run first: the calibrated model does not explain")
+    assert any("make a trial run" in warning for warning in found.result.warnings)
+    stated = balance(FOLDER / "later.toml", BalanceOptions(coefficients="computed"))
+    assert not any("trial run, which" in warning for warning in stated.result.warnings)
