@@ -206,7 +206,7 @@ def test_two_stiffnesses_from_three_rounded_critical_speeds():
     """Both lie in their 95 % intervals as often as that says, over drawn pairs; or two pairs are told."""
     unknowns = [Unknown(f"bearing[{i}].stiffness", start=1e8) for i in (1, 2)]
     rng, inside = np.random.default_rng(3), []
-    for truth in [(7e7, 1.4e8), *(10 ** rng.uniform(7.6, 8.4, (9, 2)))]:
+    for truth in [(7e7, 1.4e8), *(10 ** rng.uniform(7.6, 8.4, (7, 2)))]:
         found = calibrate(rotor23(), unknowns, frequencies=[rounded(on_stiffnesses(*truth))])
         assert found.found.converged
         assert found.explained
@@ -217,7 +217,7 @@ def test_two_stiffnesses_from_three_rounded_critical_speeds():
             assert z.max() < 4
             inside.append(z[0] < 1.96)
     assert inside[0].all()
-    assert len(inside) >= 7
+    assert len(inside) >= 5
     assert np.mean(inside) > 0.8  # 95 % to three deviations of such a count
 
 
@@ -259,21 +259,21 @@ def test_natural_frequencies_and_shapes_at_rest():
     assert found.dof == 3 + 3 * 5 - 3 - 2
     rng, chi = np.random.default_rng(2), []
     size = 0.02 * abs(shapes).max(axis=0)
-    for _ in range(25):
+    for _ in range(16):
         read = replace(
             data,
             frequencies=data.frequencies + data.std * rng.standard_normal(3),
             shapes=shapes + size * rng.standard_normal(shapes.shape),
         )
         chi.append(calibrate(truth, unknowns, frequencies=[read], starts=1).chi_square)
-    assert np.mean(chi) == pytest.approx(found.dof, abs=4 * np.sqrt(2 * found.dof / 25))
+    assert np.mean(chi) == pytest.approx(found.dof, abs=4 * np.sqrt(2 * found.dof / 16))
 
 
 def test_chi_square_and_errors_of_simulated_readings():
     """Noise as stated: χ² has its mean and quantile, and the numbers scatter as their deviations say."""
     values = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy": 2.2e4, "disc[1].mass": 25.0}
     truth = with_parameters(machine(), values)
-    runs, rng, draws = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(8), 40
+    runs, rng, draws = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(8), 30
     exact = runs.readings(truth)
     unknowns = [Unknown(path, start=value) for path, value in values.items()]
     found = []
@@ -456,7 +456,7 @@ def test_critical_speeds_over_bearing_tables():
     ]
     rotor = replace(rotor23(), supports=tables)
     values = {"bearing[1].stiffness.scale": 1.2, "bearing[2].stiffness.scale": 0.85}
-    speeds = fem.critical_speeds(with_parameters(rotor, values), 3).frequencies
-    data = MeasuredFrequencies(np.arange(1, 4), speeds, 1e-4 * speeds)
+    speeds = fem.critical_speeds(with_parameters(rotor, values), 2).frequencies
+    data = MeasuredFrequencies(np.arange(1, 3), speeds, 1e-4 * speeds)
     found = calibrate(rotor, [Unknown(path) for path in values], frequencies=[data], starts=1)
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
