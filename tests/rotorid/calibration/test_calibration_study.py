@@ -93,7 +93,7 @@ def test_a_third_bearing_is_recognised(example):
 def test_errors_between_runs_that_nobody_states_are_noticed(example, monkeypatch):
     whole = example.trials
     monkeypatch.setattr(example, "trials", lambda *given: replace(whole(*given), run_errors=None))
-    found = simulated(example, "one speed", max(EACH // 3, 1))
+    found = simulated(example, "four speeds")
     n = sum(len(one.numbers) for one in found)
     off = sum(one.joint for one in found) / n > 1 + DEVIATIONS * np.sqrt(2 / n)
     assert off or np.mean([one.told for one in found]) > highest_share(len(found), 0.01)
