@@ -434,9 +434,9 @@ SIGNS = {
     ),
     "supports, whirl": ("fem.matrices.lateral_planes.Quadratic.at", "+ (c.reshape", "- (c.reshape"),
     "supports, response": (
-        "fem.matrices.support_dynamic_stiffness.supported",
-        "k + 1j * speeds",
-        "k - 1j * speeds",
+        "fem.matrices.support_dynamic_stiffness.on_whirl",
+        "support.stiffness + 1j * speeds",
+        "support.stiffness - 1j * speeds",
     ),
     "material": ("fem.matrices.lateral_planes.project", "planes(along, B,", "planes(along, -B,"),
     "material, turning": ("fem.matrices.lateral_planes.project", "planes(across, B,", "planes(across, -B,"),
