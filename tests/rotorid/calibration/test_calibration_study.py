@@ -15,7 +15,7 @@ import pytest
 from repetitions import DEVIATIONS, FULL, highest_share, lowest_share
 
 PATH = Path(__file__).parents[3] / "examples" / "coverage_calibrate.py"
-EACH = 60 if FULL else 2
+EACH = 60 if FULL else 3
 """Machines of each kind."""
 SEED = 2
 
