@@ -1,5 +1,7 @@
 """Files of waveforms as the libraries of each format write them."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
@@ -64,7 +66,10 @@ def write_uff(path, channels, rate=RATE, binary=1, **more):
         )
         for name, samples in channels.items()
     ]
-    pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
+    path.unlink(missing_ok=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves files open
+        pyuff.UFF(str(path)).write_sets(sets, mode="add")  # binary sets are not whole in mode "overwrite"
     return path
 
 

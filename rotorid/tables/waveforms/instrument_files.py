@@ -47,6 +47,8 @@ def read_uff(path: Path) -> Sampled:
     with library(path, "UFF58"):
         import pyuff
 
+        if not path.read_bytes().rstrip().endswith(b"    -1"):
+            raise refusal(path, "a whole UFF58 file; its end is missing")
         file = pyuff.UFF(str(path))
         places = np.flatnonzero(np.asarray(file.get_set_types()) == 58)
         read = (file.read_sets(int(place)) for place in places)

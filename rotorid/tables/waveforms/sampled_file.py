@@ -98,8 +98,9 @@ def time_unit(name: str) -> Unit | None:
 
 
 def _rate(path: Path, name: str, times: AnyArray, unit: Unit, first_row: int | None) -> float:
-    step = (float(times[-1]) - float(times[0])) / (len(times) - 1)
-    wrong = ~(np.abs(times - times[0] - step * np.arange(len(times))) <= LARGEST_SHIFT * step)
+    number = np.arange(len(times)) - (len(times) - 1) / 2
+    step = float(number @ times / (number @ number))
+    wrong = ~(np.abs(times - np.mean(times) - step * number) <= LARGEST_SHIFT * step)
     if step > 0 and not wrong.any():
         return 1.0 / unit.to_si(step)
     jumps = np.diff(times, prepend=times[0])

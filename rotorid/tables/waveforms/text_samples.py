@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -35,6 +35,7 @@ class _Form(NamedTuple):
     separator: str
     comma: bool
     columns: dict[str, int]
+    width: int
     above: int
 
 
@@ -78,7 +79,7 @@ def _form(path: Path, text: str, encoding: str) -> _Form:
     for i, name in enumerate(names):
         if not name or name in names[:i]:
             raise refusal(path, "a name for each column of numbers, each once", above, None, name)
-    return _Form(encoding, separator, comma, dict(zip(names, places, strict=True)), above)
+    return _Form(encoding, separator, comma, dict(zip(names, places, strict=True)), len(own), above)
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -104,7 +105,7 @@ def _numbers(path: Path, form: _Form) -> FloatArray:
     with path.open("rb") as stream:
         ends = [(piece.count(b"\n"), piece.count(b"\r")) for piece in iter(lambda: stream.read(2**20), b"")]
     numbers = np.empty((len(form.columns), int(np.max(np.sum(ends, axis=0))) + 1 - form.above))
-    done = 0
+    done, places = 0, list(form.columns.values())
     with _open(path, form) as text:
         for _ in range(form.above):
             text.readline()
@@ -114,13 +115,12 @@ def _numbers(path: Path, form: _Form) -> FloatArray:
                 sep=form.separator,
                 decimal="," if form.comma else ".",
                 header=None,
-                usecols=list(form.columns.values()),
-                dtype=np.float64,
+                dtype=defaultdict(lambda: str, dict.fromkeys(places, np.float64)),
                 chunksize=PIECE,
                 skip_blank_lines=False,
             )
             for piece in pieces:
-                numbers[:, done : done + len(piece)] = piece.to_numpy().T
+                numbers[:, done : done + len(piece)] = piece[places].to_numpy().T
                 done += len(piece)
         except ValueError as error:  # a ParserError too
             _explain(path, form, form.above + done)
@@ -141,5 +141,5 @@ def _explain(path: Path, form: _Form, skipped: int) -> None:
                     parse_number(cell or "0", comma=form.comma)
                 except NotANumber as error:
                     raise refusal(path, str(error), number, name, cell) from None
-            if len(cells) > max(form.columns.values()) + 1 and any(cells[max(form.columns.values()) + 1 :]):
-                raise refusal(path, "a row as long as the others", number)
+            if len(cells) > form.width:
+                raise refusal(path, f"a row of {form.width} cells like the others", number)
