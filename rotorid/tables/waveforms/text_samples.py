@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -115,7 +115,7 @@ def _numbers(path: Path, form: _Form) -> FloatArray:
                 sep=form.separator,
                 decimal="," if form.comma else ".",
                 header=None,
-                dtype=defaultdict(lambda: str, dict.fromkeys(places, np.float64)),
+                dtype={i: np.float64 if i in places else str for i in range(form.width)},
                 chunksize=PIECE,
                 skip_blank_lines=False,
             )

@@ -97,7 +97,9 @@ def test_a_bad_cell_is_named_with_its_row(kind, tmp_path):
 
 def test_a_bad_cell_in_a_later_piece_is_named_with_its_row(tmp_path, monkeypatch):
     monkeypatch.setattr("rotorid.tables.waveforms.text_samples.PIECE", 100)
-    refused(csv(tmp_path, "\n".join(["t_s,KEY,B", *ROWS[:555], "5.55,?,3", *ROWS[556:]])), "row 557, column KEY")
+    refused(
+        csv(tmp_path, "\n".join(["t_s,KEY,B", *ROWS[:555], "5.55,?,3", *ROWS[556:]])), "row 557, column KEY"
+    )
 
 
 def test_a_sample_that_is_missing_is_found_and_rounded_times_are_even(tmp_path):
@@ -191,7 +193,10 @@ WRONG_ARRAYS = {
     "nothing": ({"fs": 100.0}, "it has fs ()"),
     "matrix and vector": ({"x": MATRIX, "y": np.arange(6), "fs": 1}, "it has x (6, 2), y (6,) and fs ()"),
     "no rate at all": ({"a": MATRIX[:, 0], "fs": -5.0}, "a rate above 0, not -5"),
-    "a jump": ({"a": np.arange(5), "t": np.array([0, 1, 2, 4, 5])}, "row 4, column t: found '4', expected times"),
+    "a jump": (
+        {"a": np.arange(5), "t": np.array([0, 1, 2, 4, 5])},
+        "row 4, column t: found '4', expected times",
+    ),
 }
 
 
@@ -244,7 +249,9 @@ def test_channels_of_tdms_groups(tmp_path):
     assert read_samples(write_tdms(tmp_path / "c.tdms", channels, {})).rate is None
     nptdms = pytest.importorskip("nptdms")
     other = [
-        nptdms.ChannelObject(group, "x", channels["B1X"], properties={"wf_increment": dt, "wf_start_offset": at})
+        nptdms.ChannelObject(
+            group, "x", channels["B1X"], properties={"wf_increment": dt, "wf_start_offset": at}
+        )
         for group, dt, at in (("a", 0.01, 0.0), ("b", 0.01, 0.0), ("c", 0.01, 0.02), ("d", 0.02, 0.0))
     ]
 
