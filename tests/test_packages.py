@@ -12,7 +12,7 @@ import fem
 import rotorid
 from rotorid.samples import sample_data
 
-HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize", "numba")
+HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize", "numba", "pyuff", "nptdms")
 
 
 def run_python(code):

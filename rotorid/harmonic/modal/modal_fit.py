@@ -79,7 +79,7 @@ def fit_modes(
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
     limits = [*((low / 2, 2 * high) for low, high in ends), *[(-1.0, 1.0)] * len(ends)]
     bounds = dict(zip(names, limits, strict=True))
-    kinds = [experiments.errors] if experiments.errors else [*UNSTATED.values()]
+    kinds = [experiments.errors] if experiments.stated else [*UNSTATED.values()]
     found = [
         _search(replace(experiments, errors=errors), points, excitation, q, bounds, experiments.stated)
         for errors in kinds
@@ -87,7 +87,7 @@ def fit_modes(
     best = found[0] if found[-1][0] < found[0][0] + CLEARLY else found[-1]
     _, fit, readings, left = best
     trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
-    same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
+    same = "" if experiments.stated else list(UNSTATED)[found.index(best)]
     i, p = divmod(int(np.abs(left).argmax()), len(points))
     worst = points[p], float(omega[i]), float(np.abs(left[i, p]))
     return FittedModes(tuple(points), fit, ends, float(trend), worst, same, experiments, readings)
