@@ -12,7 +12,8 @@ import fem
 import rotorid
 from rotorid.samples import sample_data
 
-HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize", "numba", "pyuff", "nptdms")
+HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize", "numba")
+HEAVY += ("pyuff", "nptdms", "scipy.io")
 
 
 def run_python(code):

@@ -1,4 +1,4 @@
-"""A waveforms file or options: runs, channels with units and scales, conventions, and what is refused in words."""
+"""A waveforms file or options: runs, channels with units and scales, conventions, refusals."""
 
 import hashlib
 import math
@@ -151,8 +151,8 @@ def complaint(files, wishes=None):
 OPTIONS = {
     "no tacho": (
         WaveformWishes(),
-        "expected a tacho channel, without which there is no phase: --tacho NAME, or tacho in a waveforms file; "
-        "the channels are KEY, B1X and B1Y",
+        "expected a tacho channel, without which there is no phase: --tacho NAME, "
+        "or tacho in a waveforms file; the channels are KEY, B1X and B1Y",
     ),
     "another tacho": (
         WaveformWishes(tacho="KEI"),
@@ -160,7 +160,7 @@ OPTIONS = {
     ),
     "another sensor": (
         WaveformWishes(tacho="KEY", sensors=("B1YY",)),
-        "column B1YY: expected a channel of this name (did you mean 'B1Y'?); the channels are KEY, B1X and B1Y",
+        "B1YY: expected a channel of this name (did you mean 'B1Y'?); the channels are KEY, B1X and B1Y",
     ),
     "another rate": (
         WaveformWishes(tacho="KEY", rate=5200.0),
@@ -197,10 +197,10 @@ def test_options_that_cannot_be_are_explained(kind, folder):
 FILES = {
     'tacho = "KEY"\n': "key records: expected a file for each run",
     'tacho = "KEY"\nrecords = []\n': "key records: expected files by the names of their runs",
-    'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of the runs, "
-    'not base.npz and base.csv; or [records] with RUN = "FILE"',
+    'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of "
+    'the runs, not base.npz and base.csv; or [records] with RUN = "FILE"',
     'tacho = "KEY"\nrecords = { A = 2 }\n': "key records",
-    'tacho = "KEY"\nrecords = ["bas.npz"]\n': "bas.npz: expected a file that exists (did you mean 'base.npz'?)",
+    'tacho = "KEY"\nrecords = ["bas.npz"]\n': "bas.npz: expected a file that exists (did you mean",
     FILE + 'uni = "um"\n': "key channels.B1Y.uni: found 'um', expected a known key (did you mean 'unit'?)",
     FILE.replace("falling", "fallling"): "key edge: found 'fallling', expected 'leading', 'trailing'",
     FILE.replace("mm/s", "mm_s_pk"): "key channels.B1Y.unit",
