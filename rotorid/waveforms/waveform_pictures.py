@@ -71,9 +71,13 @@ def figure_orbit(
     Raises
     ------
     ValueError
-        For sensors that look along one line, and where the tacho has not so many turns.
+        For sensors of two quantities or along one line, and where the tacho has not so many turns.
     """
     channels = [next(c for c in record.sensors if c.name == name) for name in pair]
+    if channels[0].derivative != channels[1].derivative:
+        raise ValueError(
+            f"sensors {pair[0]!r} and {pair[1]!r} measure different quantities: there is no orbit"
+        )
     looking = np.exp(1j * np.radians((0.0, 90.0) if angles is None else angles))
     if abs((looking[1] / looking[0]).imag) < A_LINE:
         raise ValueError(f"sensors {pair[0]!r} and {pair[1]!r} look along one line: there is no orbit")
@@ -169,7 +173,7 @@ def _whirl(forward: ComplexArray, backward: ComplexArray) -> str:
 def figure_waterfall(
     record: WaveformRecord, sensor: str, tacho: Tacho, *, orders: Sequence[float] = (1, 2)
 ) -> Figure:
-    """Draw spectra of a sensor above each other: over speed, or over time where that hardly changes.
+    """Draw spectra of a sensor above each other: over speed, or time where that is steady or turns back.
 
     Parameters
     ----------
@@ -182,14 +186,14 @@ def figure_waterfall(
     """
     channel = next(c for c in record.sensors if c.name == sensor)
     (unit, scale), (speed, times, n) = UNITS[channel.derivative], _instants(tacho, record.rate)
-    run_up, rate = bool(np.ptp(speed) > RUN_UP * speed.max()), record.rate
+    run_up, rate = abs(speed[-1] - speed[0]) > max(0.9 * np.ptp(speed), RUN_UP * speed.max()), record.rate
     place = 60 * speed if run_up else times
     order = np.argsort(place)
     speed, place = speed[order], place[order]
     frequencies, amplitudes = spectra(channel, rate, times[order], n)
-    largest = scale * amplitudes.max()
+    largest = scale * float(amplitudes.max()) or 1.0
     tall, seen = TALLEST * np.ptp(place) / largest, scale * amplitudes.max(axis=0) > SEEN * largest
-    highest = min(max(1.15 * frequencies[seen].max(), (max(orders) + 0.5) * speed.max()), rate / 2)
+    highest = min(max(1.15 * frequencies[seen].max(initial=0.0), (max(orders) + 0.5) * speed.max()), rate / 2)
     x, lines = frequencies[frequencies <= highest], scale * tall * amplitudes[:, frequencies <= highest]
     figure = new_figure(5.4)
     ax = figure.add_subplot()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -126,6 +126,28 @@ def test_a_waterfall_at_a_steady_speed_is_over_time(steady):
     assert f"{64 / 25:.2g} s" in ax.get_title()  # so many turns
 
 
+class UpAndDown(Pulses):
+    """From f0 to 3 f0 and back."""
+
+    def turn_at(self, t):
+        period = self.seconds
+        return 2 * self.f0 * t - self.f0 * period / (2 * np.pi) * np.sin(2 * np.pi * t / period)
+
+
+def test_up_and_down_is_over_time():
+    there = UpAndDown(20.0, 0.0, 20.0)
+    ax = figure_waterfall(record(there, {"X": {1: 3.0}}), "X", there).axes[0]
+    assert ax.get_ylabel() == "time, s"
+    once = ax.lines[LINES]
+    expected = 40 - 20 * np.cos(2 * np.pi * once.get_ydata() / 20)
+    np.testing.assert_allclose(once.get_xdata(), expected, rtol=1e-3)
+
+
+def test_a_dead_sensor_has_flat_lines(steady):
+    ax = figure_waterfall(record(steady, {"X": {1: 0.0}}), "X", steady).axes[0]
+    assert all(np.ptp(line.get_ydata()) == 0 for line in ax.lines[:LINES])
+
+
 def circle(radius, orders=(1,)):
     return {"X": dict.fromkeys(orders, radius), "Y": dict.fromkeys(orders, -1j * radius)}
 
@@ -193,6 +215,9 @@ def test_orbits_that_cannot_be_drawn(steady):
     made = record(steady, circle(1.0))
     with pytest.raises(ValueError, match="'X' and 'Y' look along one line"):
         figure_orbit(made, ("X", "Y"), steady, 1.0, angles=(10.0, 190.0))
+    other = replace(made, sensors=(made.sensors[0], replace(made.sensors[1], derivative=1)))
+    with pytest.raises(ValueError, match="'X' and 'Y' measure different quantities"):
+        figure_orbit(other, ("X", "Y"), steady, 1.0)
     with pytest.raises(ValueError, match=r"not 4 whole turns after 19.95 s: its pulses end at 19.96 s"):
         figure_orbit(made, ("X", "Y"), steady, 19.95)
 
