@@ -10,9 +10,10 @@ import numpy as np
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, read_table
+from rotorid.tables.reader.columns import Column, Source, Table, make_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
+from rotorid.tables.runs.instrument_export import read_runs_grid
 from rotorid.tables.runs.speed_merging import merge_speeds, same_speed, show_speed
 from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
@@ -46,7 +47,8 @@ def read_runs(
     problems
         Collects the complaints.
     """
-    table = read_table(source, "runs", COLUMNS, problems)
+    grid = read_runs_grid(source, conventions, problems)
+    table = None if grid is None else make_table(grid, COLUMNS, problems)
     if table is None:
         return None, None
     speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))
