@@ -1,8 +1,9 @@
 """Vectors of orders along a record: a Vold–Kalman filter over turns.
 
-x = Σ_k Re(A_k(u) e^{2πiku}), u turns: the mean of the waveform (k = 0), 1×, 2× and so on, all together, so that no
-order leaks into another. Each A_k is a penalised spline (rotorid.waveforms.penalised_spline): where nothing moves
-its stiffness makes of it a mean over all turns, with a slope; where the speed passes a resonance it follows.
+x = Σ_k Re(A_k(u) e^{2πiku}), u turns: the mean of the waveform (k = 0), 1×, 2× and so on, all together, so
+that no order leaks into another. Each A_k is a penalised spline (rotorid.waveforms.penalised_spline): where
+nothing moves its stiffness makes of it a mean over all turns, with a slope; where the speed passes a
+resonance it follows.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.waveforms.penalised_spline import (
     SOFTEST,
     Moments,
@@ -69,11 +70,11 @@ class Orders:
 
     def at(self, turns: FloatArray) -> ComplexArray:
         """Amplitudes at turns (P,), (P, K + 1, C)."""
-        return along(weights, self.coefficients, *self._around(turns))
+        return np.asarray(along(weights, self.coefficients, *self._around(turns)), dtype=complex)
 
     def slope(self, turns: FloatArray) -> ComplexArray:
         """Their change in a turn, (P, K + 1, C)."""
-        return along(slopes, self.coefficients, *self._around(turns)) / self.knot
+        return np.asarray(along(slopes, self.coefficients, *self._around(turns)) / self.knot, dtype=complex)
 
     def deviation(self, turns: FloatArray, order: int) -> FloatArray:
         """Standard deviation of the real part, and of the imaginary one, (P, C), of one order."""
@@ -91,8 +92,10 @@ class Orders:
         return np.tensordot(row, self.coefficients, 1), np.transpose(deviations)
 
     def width(self, order: int = 1) -> FloatArray:
-        """Turns that count at each knot interval, (n,): as many, evenly weighed, would leave the same error."""
-        middle = self.first + self.knot * (np.arange(len(self.density)) + 0.5)
+        """Turns that count at each knot interval, (n,): as many, evenly weighed, would leave the same
+        error.
+        """
+        middle = np.asarray(self.first + self.knot * (np.arange(len(self.density)) + 0.5))
         noise = np.array([2 * own[order].variance for own in self.smoothings])
         return np.asarray(np.median(noise / self.deviation(middle, order) ** 2, axis=1) / self.density)
 
@@ -122,9 +125,9 @@ def track_orders(parts: Parts, first: float, last: float, highest: int) -> Order
     loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
     M = 2 * highest + 1
     start = _solved(band, [loose] * M, right)
-    coefficients, smoothings = [], []
+    coefficients, smoothings = [], list[tuple[Smoothing, ...]]()
     for sensor in range(right.shape[2]):
-        c, b, own = start[:, :, sensor], right[:, :, sensor], []
+        c, b, own = start[:, :, sensor], right[:, :, sensor], list[Smoothing]()
         for _ in range(PASSES):
             left, own = b - times(band, c.reshape(-1)).reshape(c.shape), []
             for k in range(highest + 1):

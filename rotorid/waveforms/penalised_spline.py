@@ -3,15 +3,17 @@
 Samples x_i ≈ Σ_m E_im c_m(s_i), where each c_m is a cubic spline with knots at the whole numbers of s and E
 holds known columns: ones for a curve, cosines and sines of the shaft's angle for orders. Then this is the
 Vold–Kalman filter of second generation (Feldbauer, Höldrich 2000) with splines in place of sample values. The
-penalty λ Σ w |Δ³c|² is chosen by restricted maximum likelihood, where the noise is that of the neighbourhood of
-each order: as its residual tells, with its colour. w follows how fast the curve moves: near a resonance the
-filter is wider. The errors are those of the Bayesian curve (Wahba 1983), which hold on the average along it.
+penalty λ Σ w |Δ³c|² is chosen by restricted maximum likelihood, where the noise is that of the
+neighbourhood of each order: as its residual tells, with its colour. w follows how fast the curve moves:
+near a resonance the filter is wider. The errors are those of the Bayesian curve (Wahba 1983), which hold on
+the average along it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
@@ -20,8 +22,8 @@ from scipy.optimize import minimize_scalar
 from rotorid.base.arrays import AnyArray, FloatArray, IntArray
 
 TRACE, SOFTEST, STIFFEST = -22.0, -10.0, 30.0
-"""log λ, relative to the samples between two knots: what keeps knots solvable between which there are none, and the
-ends of what is chosen."""
+"""log λ, relative to the samples between two knots: what keeps knots solvable between which there are none,
+and the ends of what is chosen."""
 ROUNDS, NEIGHBOURS = 3, 12
 """The weights of the penalty are found again so often, each from so many knots on either side."""
 EVENING = 0.1
@@ -93,7 +95,7 @@ def moments(parts: Iterable[tuple[FloatArray, FloatArray, FloatArray]], n: int) 
         design = (weights(s - j)[:, :, None] * columns[:, None, :]).reshape(L, 4 * M)
         first, last = int(j[0]), int(j[-1])
         ends = np.searchsorted(j, np.arange(first, last + 2))
-        for at, (low, high) in enumerate(zip(ends[:-1], ends[1:], strict=True), start=first):
+        for at, (low, high) in enumerate(pairwise(ends), start=first):
             own = design[low:high]
             gram[at] += own.T @ own
             right[at] += own.T @ samples[low:high]

@@ -1,10 +1,10 @@
 """What filters, integrators and delays did to a vector, taken off again.
 
-A channel reads y = H(d/dt) x with H(s) = s^m · (its high-pass)(s) · e^{−sτ}: m more derivatives than are wanted (an
-accelerometer whose displacement is asked for: 2). With x = X(t) e^{iκ(t)}, κ' = w, the vectors follow
-Y = H(iw + d/dt) X, of which the steady term H X and those of first order are kept:
-Y = H X + H' X' + ½ H'' (i w') X, derivatives of H by s at iw. While the speed passes a resonance, H' X' is half a
-per cent of an integrated vector and more.
+A channel reads y = H(d/dt) x with H(s) = s^m · (its high-pass)(s) · e^{−sτ}: m more derivatives than are
+wanted (an accelerometer whose displacement is asked for: 2). With x = X(t) e^{iκ(t)}, κ' = w, the vectors
+follow Y = H(iw + d/dt) X, of which the steady term H X and those of first order are kept: Y = H X + H' X' +
+½ H'' (i w') X, derivatives of H by s at iw. While the speed passes a resonance, H' X' is half a per cent of
+an integrated vector and more.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import butter
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.waveforms.record import SignalPath
 
 STEP = 1e-4
 """Of s, for the differences that are derivatives of H."""
 
 
-def response(path: SignalPath, derivatives: int) -> Callable[[ComplexArray], ComplexArray]:
+def response(path: SignalPath, derivatives: int) -> Callable[[AnyArray], AnyArray]:
     """H(s) of a channel that reads so many derivatives more than are wanted (negative: fewer)."""
     zeros, poles = [], []
     if path.high_pass_rad_s is not None:
@@ -29,7 +29,7 @@ def response(path: SignalPath, derivatives: int) -> Callable[[ComplexArray], Com
             path.high_pass_order, path.high_pass_rad_s, "high", analog=True, output="zpk"
         )
 
-    def H(s: ComplexArray) -> ComplexArray:
+    def H(s: AnyArray) -> AnyArray:
         out = s**derivatives * np.exp(-s * path.delay_s)
         for zero, pole in zip(zeros, poles, strict=True):
             out = out * (s - zero) / (s - pole)
@@ -39,7 +39,7 @@ def response(path: SignalPath, derivatives: int) -> Callable[[ComplexArray], Com
 
 
 def before_path(
-    H: Callable[[ComplexArray], ComplexArray],
+    H: Callable[[AnyArray], AnyArray],
     y: ComplexArray,
     slope: ComplexArray,
     w: FloatArray,
@@ -56,8 +56,8 @@ def before_path(
     w, rate
         Frequency of the order, rad/s, and its change per s, (P,).
     """
-    s = 1j * w
-    d = STEP * np.abs(s)
+    s = np.asarray(1j * w)
+    d = np.asarray(STEP * w + 0j)
     here, above, below = H(s), H(s + d), H(s - d)
     first, second = (above - below) / (2 * d), (above - 2 * here + below) / d**2
     x = y / here

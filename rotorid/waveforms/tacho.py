@@ -1,9 +1,9 @@
 """The tacho: edges of its marks, turns counted over missing and double pulses, the shaft's angle over time.
 
 Edges are where the signal leaves a band of hysteresis, between two samples by straight lines. The angle is a
-penalised spline through them: a sampled mark is off by up to half a sample, a worn one by more, and the spline
-takes the mean over as many turns as the speed stays smooth. Where a turn has several pulses, or a mark two usable
-edges, each has an offset of its own, which is estimated: marks need not be even.
+penalised spline through them: a sampled mark is off by up to half a sample, a worn one by more, and the
+spline takes the mean over as many turns as the speed stays smooth. Where a turn has several pulses, or a
+mark two usable edges, each has an offset of its own, which is estimated: marks need not be even.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ LEAST_PULSES = 8
 WINDOW = 25
 """The median of so many intervals between pulses is the usual one there."""
 SKIPPED, OFF = 4, 0.25
-"""At most so many pulses in a row are too many; an interval that is off a whole number of usual ones by so much
-is as bad as a pulse too many or a missing one."""
+"""At most so many pulses in a row are too many; an interval that is off a whole number of usual ones by so
+much is as bad as a pulse too many or a missing one."""
 UNCOUNTED, SILENT = 0.3, 12.5
-"""Where pulses are missing an interval is a whole number of usual ones, but for this; and not more than so many."""
+"""Where pulses are missing an interval is a whole number of usual ones, but for this; and not more than so
+many."""
 LONGEST_MARK = (0.45, 0.55)
 """Between these shares of a turn the mark may be either level."""
 KNOT = 2.0
@@ -141,8 +142,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     rising, falling = (found / rate for found in _edges(channel.samples, level, band))
     if min(len(rising), len(falling)) < LEAST_PULSES:
         raise ValueError(
-            f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: at least "
-            f"{LEAST_PULSES} are needed (is this the tacho's channel, and the level right?)"
+            f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: "
+            f"at least {LEAST_PULSES} are needed (is this the tacho's channel, and the level right?)"
         )
     begin, end, words = _marks(rising, falling, settings.edge)
     kept, index = _counted(begin, settings.pulses, channel.name)
@@ -158,7 +159,9 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
             f"the tacho's {settings.pulses} pulses a turn are alike: phases are known but for multiples of "
             f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared",
         )
-    return Tacho(begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, words, angle, indexed)
+    return Tacho(
+        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, words, angle, indexed
+    )
 
 
 def _levels(channel: Channel, level: float | None) -> tuple[float, float]:
@@ -198,18 +201,17 @@ def _marks(
     unclear = LONGEST_MARK[0] < share < LONGEST_MARK[1]
     high = unclear or share < LONGEST_MARK[0]
     words: tuple[str, ...] = ()
-    name = {"leading": "rising" if high else "falling", "trailing": "falling" if high else "rising"}.get(
-        edge, edge
-    )
+    begins, ends = ("rising", "falling") if high else ("falling", "rising")
+    name = {"leading": begins, "trailing": ends}.get(edge, edge)
     if edge in ("leading", "trailing", "centre") and unclear:
         words = (
-            f"the tacho is high for {100 * share:.0f} % of the time, so that either level may be the mark: high is "
-            "taken (say edge = rising or falling)",
+            f"the tacho is high for {100 * share:.0f} % of the time, so that either level may be the mark: "
+            "high is taken (say edge = rising or falling)",
         )
     elif not unclear and edge in ("rising", "falling") and (edge == "rising") != high:
         words = (
-            f"the tacho's marks are {'high' if high else 'low'} ({100 * min(share, 1 - share):.0f} % of a turn), "
-            f"and edge = {edge} is where they end: {360 * min(share, 1 - share):.0f}° after they begin",
+            f"the tacho's marks are {'high' if high else 'low'} ({100 * min(share, 1 - share):.0f} % of the "
+            f"time), and edge = {edge} is where they end",
         )
     if edge == "centre":
         first, second = _paired(*((rising, falling) if high else (falling, rising)))
@@ -232,7 +234,8 @@ def _usual(begin: FloatArray, pulses: int) -> FloatArray:
 def _counted(begin: FloatArray, pulses: int, name: str) -> tuple[IntArray, IntArray]:
     """Which pulses count, and the number of each.
 
-    The chain of pulses whose intervals are best made of whole usual ones, with the fewest left out and missing.
+    The chain of pulses whose intervals are best made of whole usual ones, with the fewest left out and
+    missing.
     """
     back = np.arange(1, SKIPPED + 2)
     usual = np.concatenate((_usual(begin, pulses), [np.inf]))
@@ -260,8 +263,8 @@ def _counted(begin: FloatArray, pulses: int, name: str) -> tuple[IntArray, IntAr
         i = int(unclear.argmax())
         raise ValueError(
             f"the tacho {name!r} is silent from {begin[kept[i]]:.4g} to {begin[kept[i + 1]]:.4g} s, about "
-            f"{interval[i]:.1f} pulses: turns cannot be counted over this, so that phases before and after do "
-            "not belong together; cut the record there"
+            f"{interval[i]:.1f} pulses: turns cannot be counted over this, so that phases before and after "
+            "do not belong together; cut the record there"
         )
     return kept, np.concatenate(([0], np.cumsum(count))).astype(np.int64)
 
@@ -271,7 +274,8 @@ def _from_first_of_turn(
 ) -> tuple[IntArray, bool, FloatArray]:
     """Numbers from a pulse on that tells itself from the others of a turn, whether there is one, the missing.
 
-    It is the one after a tooth that the wheel lacks (which then is not missing), or else after the longest gap.
+    It is the one after a tooth that the wheel lacks (which then is not missing), or else after the longest
+    gap.
     """
     kind = index % pulses
     present = np.bincount(kind, minlength=pulses)
@@ -293,7 +297,9 @@ def _from_first_of_turn(
 def _angle(
     begin: FloatArray, end: FloatArray, index: IntArray, settings: TachoSettings
 ) -> tuple[FloatArray, Angle, float]:
-    """Turn of each pulse, the angle, and the error of a pulse in turns; by both edges of the marks, where these keep their distance."""
+    """Turn of each pulse, the angle, and the error of a pulse in turns; by both edges of the marks, where
+    these keep their distance.
+    """
     kind, nominal = index % settings.pulses, index / settings.pulses
     if settings.edge == "centre" or not _keeps_distance(begin, end, nominal):
         times, base, kinds = begin, nominal, kind
@@ -341,7 +347,9 @@ def _fitted(times: FloatArray, turns: FloatArray, variance: FloatArray) -> Angle
 
 
 def _variance(left: FloatArray, rate: FloatArray) -> FloatArray:
-    """Of pulses in turns², from what is left of them: errors of the marks, and of the time they were seen at."""
+    """Of pulses in turns², from what is left of them: errors of the marks, and of the time they were seen
+    at.
+    """
     columns = np.stack((np.ones_like(rate), rate**2), axis=1)
     size = np.median(left**2) + np.finfo(float).tiny
     found = nnls(columns / columns.mean(axis=0), np.minimum(left**2 / size, OUTLYING))[0]

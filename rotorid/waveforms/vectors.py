@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
-from rotorid.base.rpm import RPM
 from rotorid.base.text import listing
 from rotorid.waveforms.order_tracking import Orders, track_orders
 from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
@@ -54,6 +53,8 @@ class Vectors:
         Whether the beginning or the end of the record is nearer than half those turns, (P,).
     steady
         Whether there is one vector for the record.
+    range
+        Lowest and highest speed of the record, rad/s, (2,).
     tacho
         See there.
     warnings
@@ -73,6 +74,7 @@ class Vectors:
     gap: FloatArray
     end: BoolArray
     steady: bool
+    range: FloatArray
     tacho: Tacho
     warnings: tuple[str, ...]
 
@@ -128,8 +130,8 @@ def _found(
     own = tacho.angle.speed(np.linspace(*tacho.span, 2 + len(tacho.times)))
     if max(orders) * own.max() > HIGHEST * record.rate:
         raise ValueError(
-            f"{max(orders)}× is {max(orders) * own.max():.4g} Hz at the highest speed, beyond {HIGHEST:g} of the "
-            f"{record.rate:.6g} samples a second"
+            f"{max(orders)}× is {max(orders) * own.max():.4g} Hz at the highest speed, beyond "
+            f"{HIGHEST:g} of the {record.rate:.6g} samples a second"
         )
 
     def parts() -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -176,6 +178,7 @@ def _found(
         gap=np.where(same, gap, np.nan),
         end=edge,
         steady=steady,
+        range=2 * np.pi * np.array([own.min(), own.max()]),
         tacho=tacho,
         warnings=tuple(words),
     )
@@ -207,7 +210,7 @@ def _independent(tacho: Tacho, tracked: Orders, width: FloatArray) -> FloatArray
     places = (np.arange(number) + 0.5) * counted[-1] / number
     turns = np.interp(places, counted, tracked.first + tracked.knot * np.arange(len(counted)))
     dense = np.linspace(*tacho.span, 4 * len(counted))
-    return np.interp(turns, tacho.turn_at(dense), dense)
+    return np.asarray(np.interp(turns, tacho.turn_at(dense), dense))
 
 
 def _before_paths(
@@ -226,8 +229,9 @@ def _before_paths(
     deviation = np.stack([tracked.deviation(turns, k) for k in range(max(orders) + 1)], axis=1)
     if steady:
         means, deviations = tracked.mean()
-        read, change, deviation = (np.repeat(a[None], len(times), 0) for a in (means, 0 * means, deviations))
-        rate = 0 * rate
+        read = np.repeat(means[None], len(times), 0)
+        deviation = np.repeat(deviations[None], len(times), 0)
+        change, rate = 0 * read, 0 * rate
     vectors = np.empty((len(times), len(record.sensors), len(orders)), dtype=complex)
     errors, gap = np.empty(vectors.shape), read[:, 0].real.copy()
     for c, sensor in enumerate(record.sensors):
@@ -246,11 +250,8 @@ def _overall(record: WaveformRecord, time: float, around: float) -> FloatArray:
     """Half the range, and √2 times the root mean square, of each sensor so many s around a time, (C, 2)."""
     first = max(0, int((time - around / 2) * record.rate))
     part = slice(first, max(first + 2, int((time + around / 2) * record.rate)))
-    out = []
-    for sensor in record.sensors:
-        x = sensor.samples[part] * sensor.factor
-        out.append((np.ptp(x) / 2, np.sqrt(2.0) * x.std()))
-    return np.array(out)
+    samples = [sensor.samples[part] * sensor.factor for sensor in record.sensors]
+    return np.array([(np.ptp(x) / 2, np.sqrt(2.0) * x.std()) for x in samples])
 
 
 def _checked(sensor: Channel) -> Iterator[str]:
@@ -269,8 +270,8 @@ def _checked(sensor: Channel) -> Iterator[str]:
         at = int(np.count_nonzero(close == end))
         if at > PILED * len(close) and at > 10 and len(np.unique(close)) > 2:
             yield (
-                f"sensor {sensor.name!r} is clipped at {float(end) * sensor.factor:.4g}, {at} samples: its vectors "
-                "are too small there; choose a wider range"
+                f"sensor {sensor.name!r} is clipped at {float(end) * sensor.factor:.4g}, {at} samples: "
+                "its vectors are too small there; choose a wider range"
             )
 
 
@@ -288,6 +289,6 @@ def _said(
         for c, sensor in enumerate(record.sensors):
             if sensor.name not in lost and course[:, c].max() > MOVES:
                 yield (
-                    f"1× of {sensor.name!r} moves by up to {100 * course[:, c].max():.0f} % while the speed is steady: "
-                    "the mean is given; has the machine settled?"
+                    f"1× of {sensor.name!r} moves by up to {100 * course[:, c].max():.0f} % while the speed "
+                    "is steady: the mean is given; has the machine settled?"
                 )

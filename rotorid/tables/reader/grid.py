@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from rotorid.base.text import counted
@@ -12,6 +12,9 @@ from rotorid.tables.reader.problems import Problems
 
 LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
+
+MOST_ABOVE = 60
+"""So many rows may stand above a header that is known by its columns."""
 
 MOST_CELLS = 5_000_000
 """Of a file."""
@@ -49,6 +52,8 @@ class CommentLine(str):
 
 Cell = str | int | float | BadCell
 Row = tuple[int, tuple[Cell, ...]]
+HeaderTest = Callable[[Sequence[str]], bool]
+"""Whether cells are surely the header of a table."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,10 @@ class Grid:
         False where a line could not be split into cells, so that nothing can be said about missing rows.
     first_rows
         The first rows as they stood, the header among them, to find a header that is not the first row.
+    named
+        Names as the file has them, where the columns are not those of the file.
+    taken
+        Which of these columns each cell of each row is from.
     """
 
     source: str
@@ -83,6 +92,8 @@ class Grid:
     comments: tuple[str, ...] = ()
     complete: bool = True
     first_rows: tuple[Row, ...] = ()
+    named: tuple[str, ...] = ()
+    taken: tuple[tuple[int, ...], ...] = ()
 
 
 def clean(text: str) -> str:
@@ -170,6 +181,15 @@ def make_grid(
     _complain_about_nameless(source, header_row, header, body, problems)
     top = tuple(filled[:LOOKED_AT])
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete, top)
+
+
+def from_header(rows: Sequence[Row], is_header: HeaderTest) -> list[Row]:
+    """Rows of a sheet; those above one that is surely the header become comments."""
+    out = list(rows)
+    for above, (_, cells) in enumerate(rows[:MOST_ABOVE]):
+        if is_header([show(cell) for cell in cells]):
+            return [(n, (f"# {_comment(row, '')}",)) for n, row in rows[:above]] + out[above:]
+    return out
 
 
 def _comment(cells: tuple[Cell, ...], separator: str) -> str:

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import csv
 import re
 import warnings
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.grid import MOST_CELLS, CommentLine, Grid, Row, begins_comment, clean, make_grid
+from rotorid.tables.reader.grid import (
+    MOST_ABOVE,
+    MOST_CELLS,
+    CommentLine,
+    Grid,
+    HeaderTest,
+    Row,
+    begins_comment,
+    clean,
+    make_grid,
+)
 from rotorid.tables.reader.input_file import file_content
 from rotorid.tables.reader.problems import Problems, TableWarning
 
@@ -137,6 +148,22 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
             below_header = below_header or any(cells)
         rows.append((number, cells))
     return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
+
+
+def text_from_header(text: str, is_header: HeaderTest) -> str:
+    """A text table; lines above one that is surely the header become comments."""
+    lines = re.split(r"(\r\n|\n|\r)", text, maxsplit=MOST_ABOVE)
+    for at, line in enumerate(lines[: 2 * MOST_ABOVE]):
+        with contextlib.suppress(csv.Error):
+            if not begins_comment(clean(line)) and is_header(_cells(line, _separator([line]))):
+                lines[:at] = [f"# {one}" if _stands_for_something(one) else one for one in lines[:at]]
+                return "".join(lines)
+    return text
+
+
+def _stands_for_something(line: str) -> bool:
+    """Whether a line is neither blank nor a comment nor an instruction for spreadsheets."""
+    return bool(line.strip(';,\t" \xa0\ufeff\r\n')) and not clean(line).lstrip('"').startswith(("#", "sep="))
 
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:
