@@ -21,6 +21,11 @@ from rotorid.waveforms.record import Channel, Edge, TachoSettings
 
 HYSTERESIS = 0.15
 """Half of the band, over the height of the pulses."""
+SHARP = 0.9
+"""Edges from one sample to the next are higher than this share of the pulses."""
+AVERAGED = 1.3
+"""Such edges scatter by half a sample, uniformly; what scatters so much less, squared, is an offset of all
+of them."""
 LEAST_PULSES = 8
 WINDOW = 25
 """The median of so many intervals between pulses is the usual one there."""
@@ -92,6 +97,9 @@ class Tacho:
         In the numbers of the record: edges are at the level, and count beyond the band around it.
     jitter_deg
         Standard deviation of a pulse, degrees of a turn (median over the record).
+    offset_s
+        Standard deviation of all pulses together: sharp edges are somewhere between two samples, and at a
+        speed that goes with the sampling rate no pulse tells more than another.
     warnings
         What the user should know.
     angle
@@ -107,6 +115,7 @@ class Tacho:
     level: float
     hysteresis: float
     jitter_deg: float
+    offset_s: float
     warnings: tuple[str, ...]
     angle: Angle
     indexed: bool = True
@@ -139,7 +148,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
         For a signal without pulses, with too few, and with gaps over which turns cannot be counted.
     """
     level, band = _levels(channel, settings.level)
-    rising, falling = (found / rate for found in _edges(channel.samples, level, band))
+    rising, falling, sharp = _edges(channel.samples, level, band)
+    rising, falling = rising / rate, falling / rate
     if min(len(rising), len(falling)) < LEAST_PULSES:
         raise ValueError(
             f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: "
@@ -153,6 +163,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     if settings.pulses > 1:
         index, indexed, lost = _from_first_of_turn(begin, index, lost, settings.pulses)
     turns, angle, jitter = _angle(begin, end, index, settings)
+    seen = jitter / float(np.median(angle.speed(begin)))
+    offset = float(np.sqrt(max(0.0, 1 / (12 * rate**2) - AVERAGED * seen**2))) if sharp else 0.0
     words += _damage(len(lost), len(double), len(index))
     if not indexed:
         words += (
@@ -160,7 +172,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
             f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared",
         )
     return Tacho(
-        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, words, angle, indexed
+        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, offset, words, angle, indexed
     )
 
 
@@ -179,8 +191,11 @@ def _levels(channel: Channel, level: float | None) -> tuple[float, float]:
     return float(at), float(HYSTERESIS * (high - low))
 
 
-def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, FloatArray]:
-    """Places (in samples, with fractions) where the signal rises and falls through the level, for good."""
+def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, FloatArray, bool]:
+    """Places (in samples, with fractions) where the signal rises and falls through the level, for good.
+
+    And whether the edges are so sharp that the samples do not say where between two of them they are.
+    """
     beyond = np.flatnonzero(np.abs(samples - level) > band)
     high = samples[beyond] > level
     turn = np.flatnonzero(high[1:] != high[:-1]) + 1
@@ -189,7 +204,8 @@ def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, Fl
     before = inside[np.searchsorted(inside, place) - 1]
     x, y = (samples[before + k].astype(np.float64) for k in (0, 1))
     at = before + (level - x) / (y - x)
-    return at[up], at[~up]
+    sharp = np.median(np.abs(y - x)) > SHARP * band / HYSTERESIS if len(at) else False
+    return at[up], at[~up], bool(sharp)
 
 
 def _marks(

@@ -14,8 +14,8 @@ from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
 from rotorid.waveforms.signal_path import before_path, response
 from rotorid.waveforms.tacho import Tacho, read_tacho
 
-STEADY = 0.015
-"""A record whose speed stays within this share of it has one vector."""
+STEADY, WINDOWS = 0.01, 20
+"""A record whose speed, in so many windows, stays within this share of it has one vector."""
 PART = 1 << 18
 HIGHEST = 0.45
 """Of the sampling rate: beyond, an order is not what the samples hold."""
@@ -142,7 +142,10 @@ def _found(
 
     first, last = tacho.turn_at(np.array([begin, end - 1]) / record.rate)
     tracked = track_orders(parts, float(first), float(last), max(orders))
-    steady = bool(np.ptp(own) < STEADY * own.mean())
+    step = max(1, len(tacho.times) // WINDOWS)
+    course = np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step])
+    steady = bool(np.ptp(course) < STEADY * course.mean())
+    own = np.clip(own, course.min(), course.max()) if steady else own
     width = tracked.width()
     if speeds is not None:
         times = _passed(tacho, own, speeds)
@@ -159,7 +162,8 @@ def _found(
         rate = np.full(len(times), (last - first) * record.rate / (end - 1 - begin))
     nearby = np.stack((times, np.maximum(wide / rate, 2 / record.rate)), axis=1)
     vectors, deviation, gap = _before_paths(record, tracked, tacho, orders, derivative, times, steady)
-    angle = np.zeros(len(times)) if steady else 2 * np.pi * tacho.angle.deviation(times)
+    drawn = np.zeros(len(times)) if steady else tacho.angle.deviation(times)
+    angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * rate)
     across = np.hypot(deviation, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None, :])
     words += _said(record, vectors, deviation, tracked, steady)
     same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from balancing.data.conventions import Labels
+from balancing.data.conventions import Labels, Phase
 from rotorid.base import result
 from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.result import Column
 from rotorid.base.rpm import RPM
 from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.units import VIBRATION
-from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms
+from rotorid.tables.runs.stated_conventions import as_phase
+from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, read_waveforms
 from rotorid.waveforms.vectors import Vectors, find_vectors
 
 DIGITS = 6
@@ -116,14 +120,31 @@ def _note(end: np.bool_) -> str:
     return "end of the record" if end else ""
 
 
-def vectors_grid(source: str, columns: Sequence[Column]) -> Grid:
-    """The table as the cells of a file, for whoever reads runs tables."""
-    rows = result.rows(columns)
-    cells = (tuple("" if value is None else value for value in row.values()) for row in rows)
-    return Grid(
-        source=source,
-        header_row=1,
-        header=tuple(column.name for column in columns),
-        rows=tuple(enumerate(cells, start=2)),
-        separator="",
-    )
+def read_vectors_grid(
+    path: Path, phase: str | None, problems: Problems
+) -> tuple[Grid, Phase, tuple[Path, ...]] | None:
+    """The vectors of a waveforms file as the cells of a runs table, their phase convention, files that were
+    read.
+
+    Parameters
+    ----------
+    path
+        Of the waveforms file.
+    phase
+        Convention in which phases are wanted; None: that of the file.
+    problems
+        Collects the complaints; then there is nothing.
+    """
+    try:
+        waveforms = read_waveforms([path])
+        labels = waveforms.labels if phase is None else replace(waveforms.labels, phase=as_phase(phase))
+        columns = vectors_columns(find_each(waveforms), labels)
+    except InputError as error:
+        problems.extend(error.problems)
+        return None
+    except ValueError as error:
+        problems.add(str(path), None, None, None, f"records with vectors: {error}")
+        return None
+    cells = (tuple("" if value is None else value for value in row.values()) for row in result.rows(columns))
+    header = tuple(column.name for column in columns)
+    return Grid(str(path), 1, header, tuple(enumerate(cells, start=2))), labels.phase, waveforms.files
