@@ -72,9 +72,10 @@ def _of_arrays(path: Path, arrays: Mapping[str, AnyArray]) -> Sampled:
 def _columns(path: Path, matrix: AnyArray, arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
     listed = next((arrays[name] for name in NAMES if name in arrays), np.arange(1, matrix.shape[1] + 1))
     names = [str(name).strip() for name in np.atleast_1d(listed)]
-    if len(set(names)) != matrix.shape[1] or len(names) != matrix.shape[1]:
-        shape = f"{matrix.shape[0]} × {matrix.shape[1]}"
-        raise refusal(path, f"a name for each column of the matrix, {shape}, not {listing(names, 'and')}")
+    samples, columns = matrix.shape
+    if len(set(names)) != columns or len(names) != columns or columns > samples:
+        expected = "a matrix with a row a sample, a column a channel and a name for each"
+        raise refusal(path, f"{expected}; it is {samples} × {columns} with the names {listing(names, 'and')}")
     return dict(zip(names, matrix.T, strict=True))
 
 

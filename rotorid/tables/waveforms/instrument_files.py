@@ -15,9 +15,6 @@ from rotorid.base.text import listing
 from rotorid.tables.waveforms.sampled_file import Sampled, library, refusal, sampled, time_unit
 
 _DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z"}
-_TIME_RESPONSE = (0, 1)
-"""Types of functions in UFF58: unknown, time response; all others are no waveforms."""
-SAME = 1e-6
 
 
 def read_wav(path: Path) -> Sampled:
@@ -52,7 +49,7 @@ def read_uff(path: Path) -> Sampled:
         file = pyuff.UFF(str(path))
         places = np.flatnonzero(np.asarray(file.get_set_types()) == 58)
         read = (file.read_sets(int(place)) for place in places)
-        sets: list[dict[str, Any]] = [one for one in read if one["func_type"] in _TIME_RESPONSE]
+        sets: list[dict[str, Any]] = [one for one in read if one["func_type"] in (0, 1)]  # 0: not stated
         for one in sets:
             if one["abscissa_spacing"] != 1:
                 raise refusal(path, "time responses in even steps (abscissa spacing 1)")
@@ -111,7 +108,7 @@ def _common_rate(path: Path, clocks: list[tuple[float, float]]) -> float | None:
     steps = {step for _, step in clocks}
     if not any(steps):
         return None
-    if not np.allclose([*steps], max(steps), rtol=SAME):
+    if not np.allclose([*steps], max(steps), rtol=1e-6):
         shown = listing((f"{step:.6g} s" for step in sorted(steps)), "and")
         raise refusal(path, f"channels of one rate; the steps are {shown}")
     if np.ptp([start for start, _ in clocks]) > 0.5 * max(steps):

@@ -19,13 +19,13 @@ from rotorid.tables.reader.input_file import first_bytes
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import decode
 from rotorid.tables.reader.units import spelt
+from rotorid.tables.reader.value_kinds import plain_number
 from rotorid.tables.waveforms.sampled_file import Sampled, refusal, sampled
 
 HEAD = 65_536
 """Bytes in which the form of a file shows."""
 PIECE = 200_000
 """Rows that are read at a time."""
-_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 class _Form(NamedTuple):
@@ -45,7 +45,7 @@ def read_text(path: Path) -> Sampled:
     A preamble may stand above the header, a row of units below it, and columns of other things beside.
     """
     head = first_bytes(path, HEAD)
-    wide = head.startswith(_UTF16)
+    wide = head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     if len(head) == HEAD and not wide:
         head = head[: head.rfind(b"\n") + 1] or head
     problems = Problems()
@@ -61,7 +61,7 @@ def _form(path: Path, text: str, encoding: str) -> _Form:
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in later))
     rows = [[cell.strip() for cell in _cells(line, separator)] for line in lines]
     comma = decimal_comma((cell for row in rows[len(lines) // 2 :] for cell in row if "," in cell), separator)
-    kinds = [tuple(_is_number(cell, comma=comma) for cell in row) for row in rows]
+    kinds = [tuple(plain_number(cell, comma=comma) is not None for cell in row) for row in rows]
     usual = Counter(kind for kind in kinds if any(kind)).most_common(1)
     if not usual:
         raise refusal(path, "a table: a column a channel, a row a sample, and names above the numbers")
@@ -74,8 +74,7 @@ def _form(path: Path, text: str, encoding: str) -> _Form:
     names = [headers[-1][i].lstrip("# ") for i in places]
     units = [spelt(cell.strip("[]() ")) for cell in names]
     if len(headers) > 1 and units[0] in TIME:
-        names = [f"{headers[-2][i].lstrip('# ')}_{unit}" for i, unit in zip(places, units, strict=True)]
-        names = [name.rstrip("_") for name in names]
+        names = [f"{headers[-2][i]}_{unit}".strip("#_ ") for i, unit in zip(places, units, strict=True)]
     for i, name in enumerate(names):
         if not name or name in names[:i]:
             raise refusal(path, "a name for each column of numbers, each once", above, None, name)
@@ -84,14 +83,6 @@ def _form(path: Path, text: str, encoding: str) -> _Form:
 
 def _cells(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator), [])
-
-
-def _is_number(cell: str, *, comma: bool) -> bool:
-    try:
-        parse_number(cell, comma=comma)
-    except NotANumber:
-        return False
-    return True
 
 
 def _open(path: Path, form: _Form) -> TextIO:

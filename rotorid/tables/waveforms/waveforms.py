@@ -200,16 +200,17 @@ def _record(run: str, path: Path, said: Said) -> tuple[WaveformRecord, list[Unit
     if found.rate is not None and abs(rate / found.rate - 1.0) > SAME_RATE:
         raise refusal(path, f"the rate that the file has, {found.rate:.6g} Hz, not {rate:.6g} Hz")
     if said["tacho"] is None:
-        names = listing(found.channels, "and")
-        expected = (
-            "a tacho channel, without which there is no phase: --tacho NAME, or tacho in a waveforms file"
-        )
-        raise refusal(path, f"{expected}; the channels are {names}")
+        expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file); "
+        raise refusal(path, f"{expected}the channels are {listing(found.channels, 'and')}")
     key, _ = _find(path, found, said["tacho"])
     pulses = _samples(path, found, key)
     tacho = Channel(key, pulses if found.scale == 1.0 else pulses * np.float32(found.scale))
     plain = {each.names[0]: each.default for each in CHANNEL}
-    others = {_parted(name)[0]: {**plain, "channel": name} for name in found.channels if name != key}
+    others: dict[str, dict[str, Any]] = {}
+    for name in found.channels if not said["channels"] else ():
+        stem = _parted(name)[0]
+        if name != key:
+            others[name if stem in others else stem] = {**plain, "channel": name}
     sensors, units = [], []
     for name, own in (said["channels"] or others).items():
         column, named = _find(path, found, own["channel"] or name)

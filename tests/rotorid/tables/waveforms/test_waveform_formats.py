@@ -12,7 +12,7 @@ from rotorid.tables.reader.problems import InputError
 from rotorid.tables.waveforms.waveforms import read_samples
 
 
-@each_of("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_channels_and_rate_come_back(suffix, tmp_path):
     channels = drawn()
     found = read_samples(write(tmp_path / f"a{suffix}", channels))
@@ -189,7 +189,8 @@ def test_arrays_as_people_save_them(kind, suffix, tmp_path):
 WRONG_ARRAYS = {
     "two rates": ({"a": MATRIX[:, 0], "fs": 100.0, "dt": 0.02}, "one rate, not 100 Hz and 50 Hz"),
     "lengths": ({"a": np.arange(5), "b": np.arange(6), "fs": 1}, "the numbers of samples: a 5 and b 6"),
-    "names": ({"x": MATRIX, "names": ["a", "b", "c"]}, "each column of the matrix, 6 × 2, not a, b and c"),
+    "names": ({"x": MATRIX, "names": ["a", "b", "c"]}, "it is 6 × 2 with the names a, b and c"),
+    "turned": ({"x": MATRIX.T, "fs": 1.0}, "a matrix with a row a sample, a column a channel"),
     "nothing": ({"fs": 100.0}, "it has fs ()"),
     "matrix and vector": ({"x": MATRIX, "y": np.arange(6), "fs": 1}, "it has x (6, 2), y (6,) and fs ()"),
     "no rate at all": ({"a": MATRIX[:, 0], "fs": -5.0}, "a rate above 0, not -5"),
@@ -297,7 +298,7 @@ def damaged(data, rng):
     return bad
 
 
-@each_of("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.filterwarnings("ignore:.*not UTF-8")
 def test_a_damaged_file_is_one_message_or_read(suffix, tmp_path, capfd):
     data = write(tmp_path / f"good{suffix}").read_bytes()

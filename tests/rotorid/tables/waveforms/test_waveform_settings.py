@@ -88,8 +88,13 @@ def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_n
     assert (found.orders, found.speeds, found.unstated) == ((1.0,), None, True)
     del named["T_degC"], named["B1Y [mm/s]"]
     named["B2 (µm)"] = channels["B1Y"]
+    named["B2_mil"] = channels["B1X"]
     (record,) = read_waveforms([write(tmp_path / "base.npz", named)], WaveformWishes(tacho="KEY")).records
-    assert [(s.name, s.factor) for s in record.sensors] == [("B1X", 1e-6), ("B2", 1e-6)]
+    assert [(s.name, s.factor) for s in record.sensors] == [
+        ("B1X", 1e-6),
+        ("B2", 1e-6),
+        ("B2_mil", 25.4e-6),
+    ]
 
 
 def test_numbers_without_a_unit_or_with_a_label_stay_numbers(tmp_path):
@@ -151,8 +156,8 @@ def complaint(files, wishes=None):
 OPTIONS = {
     "no tacho": (
         WaveformWishes(),
-        "expected a tacho channel, without which there is no phase: --tacho NAME, "
-        "or tacho in a waveforms file; the channels are KEY, B1X and B1Y",
+        "expected a tacho channel, without which there is no phase: --tacho NAME "
+        "(tacho in a file); the channels are KEY, B1X and B1Y",
     ),
     "another tacho": (
         WaveformWishes(tacho="KEI"),
