@@ -115,7 +115,7 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
             continue
         source, rows = sheet_source(path, title), sheets[title]
         if name in READINGS:
-            rows = from_header(rows, partial(looks_like_header, named={}))
+            rows = from_header(list(rows), partial(looks_like_header, named={}))
         if name == "runs" and _is_a_form(rows):
             expected = "readings below the header, one row per run, speed and sensor: none are filled in yet"
             problems.add(source, None, None, None, expected)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import SupportsIndex
@@ -23,16 +23,7 @@ from rotorid.tables.reader.decimal_numbers import (
 )
 from rotorid.tables.reader.digits import written_steps
 from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.tables.reader.grid import (
-    BadCell,
-    Cell,
-    Grid,
-    HeaderTest,
-    from_header,
-    is_spreadsheet_error,
-    make_grid,
-    show,
-)
+from rotorid.tables.reader.grid import BadCell, Cell, Grid, from_header, is_spreadsheet_error, make_grid, show
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import decode, parse_text, read_bytes, text_from_header
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader
@@ -253,7 +244,7 @@ def read_grid(
     *,
     first: bool = False,
     may_be_empty: bool = False,
-    is_header: HeaderTest | None = None,
+    is_header: Callable[[Sequence[str]], bool] | None = None,
 ) -> Grid | None:
     """The cells of a text file or of a sheet; with `is_header` whatever stands above it is a comment."""
     if isinstance(source, Grid):
@@ -441,8 +432,8 @@ def _field(
                     _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
                 )
             except NotANumber as error:
-                named = names[place] if names else name
-                problems.add(grid.source, grid.rows[place][0], named, show(cell), str(error))
+                own = names[place] if names else name
+                problems.add(grid.source, grid.rows[place][0], own, show(cell), str(error))
                 continue
         value = known[cell]
         if isinstance(value, str):

@@ -14,7 +14,7 @@ LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
 
 MOST_ABOVE = 60
-"""So many rows may stand above a header that is known by its columns."""
+"""A header that is known by its columns stands among so many."""
 
 MOST_CELLS = 5_000_000
 """Of a file."""
@@ -52,8 +52,6 @@ class CommentLine(str):
 
 Cell = str | int | float | BadCell
 Row = tuple[int, tuple[Cell, ...]]
-HeaderTest = Callable[[Sequence[str]], bool]
-"""Whether cells are surely the header of a table."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +76,9 @@ class Grid:
         False where a line could not be split into cells, so that nothing can be said about missing rows.
     first_rows
         The first rows as they stood, the header among them, to find a header that is not the first row.
-    named
-        Names as the file has them, where the columns are not those of the file.
-    taken
-        Which of these columns each cell of each row is from.
+    named, taken
+        Where the columns are not those of the file: their names there, and which of them each cell of each
+        row is from.
     """
 
     source: str
@@ -183,13 +180,12 @@ def make_grid(
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete, top)
 
 
-def from_header(rows: Sequence[Row], is_header: HeaderTest) -> list[Row]:
+def from_header(rows: list[Row], is_header: Callable[[Sequence[str]], bool]) -> list[Row]:
     """Rows of a sheet; those above one that is surely the header become comments."""
-    out = list(rows)
     for above, (_, cells) in enumerate(rows[:MOST_ABOVE]):
         if is_header([show(cell) for cell in cells]):
-            return [(n, (f"# {_comment(row, '')}",)) for n, row in rows[:above]] + out[above:]
-    return out
+            return [(n, (f"# {_comment(row, '')}",)) for n, row in rows[:above]] + rows[above:]
+    return rows
 
 
 def _comment(cells: tuple[Cell, ...], separator: str) -> str:

@@ -90,7 +90,7 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     direction, plain = "", text.strip()
     if stem == "phase":
         direction = " and ".join(sorted({word.casefold() for word in _DIRECTION.findall(plain)}))
-        plain = _DIRECTION.sub("", plain).strip()
+        plain = _DIRECTION.sub("", plain).strip(" ,;/")
     swing = _SWING.search(plain) if stem == "amplitude" else None
     base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_")
     base = _SPELLINGS.get(base.casefold(), base if stem == "amplitude" else base.casefold())
@@ -101,7 +101,7 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     if f"{base}_pp" not in units.VIBRATION:
         units.vibration(units.spelt(plain))
         raise UnitError(
-            f"a unit of vibration, such as um pp or mm/s rms, not {plain!r} (as a label: amplitude_{plain})"
+            f"a unit of vibration, such as um pp or mm/s rms, not {plain!r} (a label: amplitude_div)"
         )
     return (f"{base}_{swing.lastgroup}" if swing and swing.lastgroup != "peak" else base), ""
 

@@ -15,12 +15,10 @@ from typing import NamedTuple
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Source, read_grid
 from rotorid.tables.reader.grid import Cell, Grid, Row, show
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Quantity
-from rotorid.tables.reader.units import UnitError
+from rotorid.tables.reader.units import UnitError, spelt
 from rotorid.tables.runs.column_headings import (
     MEASURED,
     READING,
@@ -34,30 +32,24 @@ from rotorid.tables.runs.stated_conventions import Conventions
 
 _NUMBER = r"[+-]?(?:[0-9][0-9.,]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(_NUMBER)
-_DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]+)?")
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\s0-9].*)")
-_VECTOR = re.compile(rf"({_NUMBER})\s*([^@<∠]*?)\s*([@<∠/])\s*({_NUMBER})\s*(.*)")
+_VECTOR = re.compile(rf"({_NUMBER}[^@<∠]*?)\s*([@<∠/])\s*({_NUMBER}[^@<∠/]*)")
+_DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
+_WEIGHT = re.compile("weight|mass|correct", re.IGNORECASE)
 _BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)
 
 
 class _Unclear(ValueError):
     """What has no reading, or several: the message says what is expected."""
 
-    def __init__(self, expected: str, heading: Heading, at: tuple[int, Cell] | None = None) -> None:
+    def __init__(self, expected: str, heading: Heading, row: int | None = None, cell: Cell = "") -> None:
         super().__init__(expected)
-        self.column, self.at = heading.name, at
-
-
-class _Part(NamedTuple):
-    """A number as it is written, what follows it, and whether a vector can be nothing else."""
-
-    number: Cell
-    rest: str = ""
-    sure: bool = True
+        self.column, self.row = heading.name, row
+        self.value = heading.name if row is None else show(cell)
 
 
 class _Column(NamedTuple):
-    """A column of a runs table, with the heading that its cells stood below in the file."""
+    """A column of a runs table, with the heading of its cells in the file; `unit` may be as written there."""
 
     heading: Heading
     stem: str
@@ -78,20 +70,16 @@ def read_runs_grid(source: Source, conventions: Conventions, problems: Problems)
         Collects the complaints.
     """
     said = {} if conventions.columns is None else conventions.columns
-    named = {v.value if isinstance(v, Quantity) else v: _key(k, v) for k, v in said.items() if v is not None}
+    pairs = [(v, k) if isinstance(v, str) else (v.value, v.key) for k, v in said.items() if v is not None]
+    named: dict[str, str] = dict(pairs)
     grid = read_grid(source, "runs", problems, is_header=partial(looks_like_header, named=named))
     if grid is None or not _are_there(named, grid, conventions):
         return None
     try:
-        return _as_runs_table(grid, read_headings(grid.header, named), named, conventions.labels.phase)
+        return _as_runs_table(grid, named, conventions.labels.phase)
     except _Unclear as found:
-        row, cell = found.at or (grid.header_row, found.column)
-        problems.add(grid.source, row, found.column, show(cell), str(found))
+        problems.add(grid.source, found.row or grid.header_row, found.column, found.value, str(found))
         return None
-
-
-def _key(key: str, value: object) -> str:
-    return value.key if isinstance(value, Quantity) else key
 
 
 def _are_there(named: Mapping[str, str], grid: Grid, conventions: Conventions) -> bool:
@@ -106,208 +94,161 @@ def _are_there(named: Mapping[str, str], grid: Grid, conventions: Conventions) -
     return not section.refused
 
 
-def _as_runs_table(grid: Grid, headings: list[Heading], named: Mapping[str, str], phase: str) -> Grid:
-    own = [heading.stem for heading in headings if heading.tidy and heading.name not in named]
-    if len(set(own)) < len(own):
+def _as_runs_table(grid: Grid, named: Mapping[str, str], phase: str) -> Grid:
+    headings = read_headings(grid.header, named)
+    own = [heading for heading in headings if heading.tidy and heading.name not in named]
+    if len({heading.stem for heading in own}) < len(own):
         return grid  # a column of a runs table stands there twice
     for heading in headings:
         if heading.stem.endswith("X"):
-            expected = (
-                "readings at the running speed (1X) alone: delete the column, or let its name begin with "
-                f"note (a probe of this name: P{heading.stem})"
-            )
-            raise _Unclear(expected, heading)
+            other = "delete the column, or begin its name with note (if it is a probe: with P)"
+            raise _Unclear(f"readings at the running speed (1X) alone: {other}", heading)
     below = _units_row(grid, headings)
     rows = grid.rows[1:] if below else grid.rows
-    columns = [
-        column
-        for heading in headings
-        for column in _columns(heading, headings, rows, below.get(heading.index, ""), phase)
-    ]
-    if not below and all(
-        (own or column.stem in ("", "note")) and column.cells == _cells(column.heading, rows)
+    columns = [_Column(h, h.stem, h.unit, [cells[h.index] for _, cells in rows]) for h in headings]
+    found = [
+        _numbers(part, below.get(part.heading.index), rows, phase) if part.stem in MEASURED else part
         for column in columns
-        for own in [column.heading.tidy and column.heading.name not in named]
-    ):
+        for part in _halves(column, headings, rows)
+    ]
+    if found == columns and not below and all(h in own or h.stem in ("", "note") for h in headings):
         return grid
-    return _assembled(replace(grid, rows=rows), columns)
+    return _assembled(replace(grid, rows=rows), found)
 
 
-def _cells(heading: Heading, rows: Sequence[Row]) -> list[Cell]:
-    return [cells[heading.index] for _, cells in rows]
-
-
-def _units_row(grid: Grid, headings: Sequence[Heading]) -> dict[int, str]:
+def _units_row(grid: Grid, headings: Sequence[Heading]) -> dict[int, tuple[int, str]]:
     """Units in the row below the header, by place; empty where that row holds something else."""
-    found: dict[int, str] = {}
-    sure = False
-    for heading, cell in zip(headings, grid.rows[0][1] if grid.rows else (), strict=False):
-        text = show(cell).strip("()[] ")
-        if text in ("", "-") or heading.stem == "note":
+    found: dict[int, tuple[int, str]] = {}
+    sure, (row, cells) = False, grid.rows[0] if len(grid.rows) > 1 else (0, ())
+    for heading, cell in zip(headings, cells, strict=False):
+        text, stem = show(cell).strip("()[] "), heading.stem
+        if text in ("", "-") or stem == "note":
             continue
-        stem = heading.stem if heading.stem in MEASURED else "amplitude"
-        own = heading.stem in MEASURED or readable(stem, text)
-        if not own or heading.stem in ("run", "sensor", "repeat") or _PLAIN.fullmatch(text):
+        quantity = "amplitude" if stem in ("", "vector") else stem
+        known = quantity in MEASURED and readable(quantity, text)
+        if _PLAIN.fullmatch(text) or not (known or stem in MEASURED):
             return {}
-        found[heading.index] = text
-        sure = sure or readable(stem, text)
+        found[heading.index] = (row, text)
+        sure = sure or known
     return found if sure else {}
 
 
-def _unit(stem: str, text: str, heading: Heading, row: int | None, phase: str) -> str:
-    """The unit that a heading, a row of units or a cell states; the direction must be that of the job."""
-    try:
-        unit, direction = read_unit(stem, text)
-    except UnitError as error:
-        raise _Unclear(str(error), heading, None if row is None else (row, text)) from None
-    if direction not in ("", phase):
-        expected = (
-            f"phases that {phase}, as the job says or, where it says nothing, is assumed: state phase = "
-            '"lag" or "lead" in the job as the instrument shows it, and leave the word out here'
-        )
-        raise _Unclear(expected, heading, None if row is None else (row, text))
-    return unit
-
-
-def _columns(
-    heading: Heading, headings: Sequence[Heading], rows: Sequence[Row], below: str, phase: str
-) -> list[_Column]:
-    """The columns of a runs table in one of the file: amplitude and phase, where it holds vectors."""
-    cells = _cells(heading, rows)
-    units_row = (below, rows[0][0] - 1)
-    if not _holds_vectors(heading, headings, cells):
-        if heading.stem not in MEASURED:
-            return [_Column(heading, heading.stem, "", cells)]
-        stated = [(heading.unit, None), units_row]
-        return [
-            _numbers(heading, heading.stem, stated, [_number(heading.stem, c) for c in cells], rows, phase)
-        ]
-    ordered = heading.stem == "vector" and "vector" not in heading.name.casefold()
-    parts: tuple[list[_Part | None], list[_Part | None]] = ([], [])
+def _halves(column: _Column, headings: Sequence[Heading], rows: Sequence[Row]) -> list[_Column]:
+    """A column of vectors as one of amplitudes and one of phases; any other as it is."""
+    heading, stem, unit, cells = column
+    if stem not in ("", "amplitude", "vector") or not _holds_vectors(heading, headings, cells):
+        return [column]
+    ordered = stem == "vector" and "vector" not in heading.name.casefold()
+    halves: list[tuple[str, str]] = []
     for (row, _), cell in zip(rows, cells, strict=True):
         found = _vector(cell)
-        if found is None or not (found[1].sure or ordered):
-            raise _Unclear(
-                "an amplitude and a phase that can be nothing else, such as 6.93 @ 98°", heading, (row, cell)
-            )
-        parts[0].append(found[0])
-        parts[1].append(found[1])
-    both = _BOTH_UNITS.fullmatch(heading.unit)
-    of_amplitude, of_phase = both.groups() if both else (heading.unit, "")
-    amplitude = _numbers(heading, "amplitude", [(of_amplitude, None), units_row], parts[0], rows, phase)
-    angle = _numbers(heading, "phase", [(of_phase, None)], parts[1], rows, phase)
-    if not angle.unit:
-        angle = angle._replace(unit=_degrees(angle))
-    return [amplitude, angle]
-
-
-def _degrees(column: _Column) -> str:
-    """Degrees, where phases without a sign are too large for radians."""
-    plain = [show(cell).replace(",", ".") for cell in column.cells]
-    if not any(abs(float(text)) > math.tau for text in plain if _DECIMAL.fullmatch(text)):
-        expected = "the sign of degrees, as in 6.93 @ 98°: phases that are all so small may be radians"
-        raise _Unclear(expected, column.heading)
-    return "deg"
+        if cell != "" and (found is None or not (found[2] or ordered)):
+            raise _Unclear("amplitude and phase, unmistakable as 6.93 @ 98°", heading, row, cell)
+        halves.append(("", "") if found is None else found[:2])
+    both = _BOTH_UNITS.fullmatch(unit)
+    units = both.groups() if both else (unit, "")
+    return [_Column(heading, READING[k], units[k], [half[k] for half in halves]) for k in (0, 1)]
 
 
 def _holds_vectors(heading: Heading, headings: Sequence[Heading], cells: Sequence[Cell]) -> bool:
     """Whether a column holds amplitude and phase in one cell."""
-    if heading.stem not in ("", "amplitude"):
-        return heading.stem == "vector"
     others = [one for one in headings if one.stem in READING and one is not heading]
+    if _WEIGHT.search(heading.name):
+        return False
     if heading.stem and any(one.stem == "phase" and one.sensor == heading.sensor for one in others):
         return False
-    found = [pair for cell in cells if cell != "" and (pair := _vector(cell)) is not None]
-    return any(phase.sure for _, phase in found) or (bool(found) and not others)
+    found = [vector for cell in cells if (vector := _vector(cell)) is not None]
+    return heading.stem == "vector" or any(sure for *_, sure in found) or (bool(found) and not others)
 
 
-def _vector(cell: Cell) -> tuple[_Part, _Part] | None:
-    """Amplitude and phase of a cell such as `6.93 um @ 98°`; None for anything else."""
-    if cell == "":
-        return _Part(""), _Part("")
+def _vector(cell: Cell) -> tuple[str, str, bool] | None:
+    """Amplitude and phase of a cell such as `6.93 um @ 98°`, and whether it can be nothing else."""
     found = _VECTOR.fullmatch(cell) if isinstance(cell, str) else None
-    if found is None or not readable("amplitude", found[2]) or not readable("phase", found[5]):
+    if found is None:
         return None
-    sure = found[3] != "/" or bool(read_unit("phase", found[5])[0])
-    return _Part(found[1], found[2]), _Part(found[4], found[5], sure)
+    return found[1], found[3], found[2] != "/" or _PLAIN.fullmatch(found[3]) is None
 
 
-def _number(stem: str, cell: Cell) -> _Part | None:
-    """A number, perhaps with its unit; None for anything else."""
-    if not isinstance(cell, str) or not cell or _PLAIN.fullmatch(cell):
-        return _Part(cell)
-    found = _WITH_UNIT.fullmatch(cell)
-    return _Part(found[1], found[2]) if found and readable(stem, found[2]) else None
+def _unit(column: _Column, text: str, phase: str, row: int | None = None, cell: Cell = "") -> str:
+    """The unit that a text means; a direction in it must be that of the job."""
+    try:
+        unit, direction = read_unit(column.stem, text)
+    except UnitError as error:
+        raise _Unclear(str(error), column.heading, row, cell) from None
+    if direction not in ("", phase):
+        remedy = 'state phase = "lag" or "lead" in the job, as the instrument shows it, without words here'
+        raise _Unclear(
+            f"phases that {phase}, as the job says or is assumed: {remedy}", column.heading, row, cell
+        )
+    return unit
 
 
-def _numbers(
-    heading: Heading,
-    stem: str,
-    stated: Sequence[tuple[str, int | None]],
-    parts: Sequence[_Part | None],
-    rows: Sequence[Row],
-    phase: str,
-) -> _Column:
-    """A column of numbers in one unit, which the heading states, the row below it, or every cell."""
-    unit = ""
-    for text, row in stated:
-        own = units.spelt(text) if heading.tidy and row is None else _unit(stem, text, heading, row, phase)
-        if own and unit not in ("", own):
-            raise _Unclear(f"{unit}, as in the heading, or nothing", heading, (row or 0, text))
-        unit = unit or own
+def _numbers(column: _Column, below: tuple[int, str] | None, rows: Sequence[Row], phase: str) -> _Column:
+    """Numbers without their unit, which the heading states, the row below it, or every cell."""
+    heading, stem, unit, cells = column
+    if not heading.tidy:
+        unit = _unit(column, unit, phase)
+    if below is not None and (stem != "phase" or heading.stem == "phase"):
+        under = _unit(column, below[1], phase, *below)
+        if unit and under not in ("", spelt(unit)):
+            raise _Unclear(f"{unit}, as in the heading, or nothing", heading, *below)
+        unit = unit or under
     out: list[Cell] = []
     first: dict[str, tuple[int, Cell]] = {}
-    for (row, cells), part in zip(rows, parts, strict=True):
-        cell = cells[heading.index]
-        own = _unit(stem, part.rest, heading, row, phase) if part and part.rest else ""
-        if own and unit not in ("", own) and not heading.tidy:
-            raise _Unclear(f"an {stem} in {unit}, as the heading says", heading, (row, cell))
-        kept = part is None or (unit and own not in ("", unit))  # what it should be is said by the table
-        out.append(cell if part is None or kept else part.number)
-        if not kept and cell != "":
-            first.setdefault(own, (row, cell))
-    if not unit and len(first) > 1:
-        (row, cell), at = list(first.values())[:2]
+    for (row, _), cell in zip(rows, cells, strict=True):
+        found = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)
+        own = _unit(column, found[2], phase, row, cell) if found and readable(stem, found[2]) else None
+        fits = own is not None and not (unit and own and own != spelt(unit))
+        if own and not fits and not heading.tidy:
+            raise _Unclear(f"a number in {unit}, as the heading of the column says", heading, row, cell)
+        out.append(found[1] if found and fits else cell)  # what is left as it is, the table explains
+        if cell != "" and not unit:
+            first.setdefault(own or "", (row, cell))
+    if len(first) > 1:
+        (row, cell), (at, other) = list(first.values())[:2]
         expected = f"the same unit in all cells of the column (row {row} has {show(cell)}), or in its heading"
-        raise _Unclear(expected, heading, at)
-    return _Column(heading, stem, unit or next(iter(first), ""), out)
+        raise _Unclear(expected, heading, at, other)
+    unit = unit or next(iter(first), "")
+    if stem == "phase" and heading.stem != "phase" and not unit:
+        plain = [text for cell in out if _DECIMAL.fullmatch(text := show(cell).replace(",", "."))]
+        if not any(abs(float(text)) > math.tau for text in plain):
+            raise _Unclear("the sign of degrees, as in 6.93 @ 98°: phases so small may be radians", heading)
+        unit = "deg"
+    return _Column(heading, stem, unit, out)
 
 
 def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
     """Amplitude and phase of each sensor; the name is empty where a column has the names."""
-    found: dict[str, dict[str, _Column]] = {}
-    others: dict[str, _Column] = {}
+    found: dict[str, dict[str, _Column]] = {"": {}}
     listed = any(column.stem == "sensor" for column in columns)
     for column in columns:
         heading, stem = column.heading, column.stem
         if stem in ("", "note"):
             continue
-        sensor = "" if listed and heading.stem in ("", "vector") else heading.sensor
-        place = found.setdefault(sensor, {}) if stem in READING else others
-        if place.setdefault(stem, column) is not column:
-            other = place[stem].heading.name
-            expected = (
-                f"one column of the {stem}, and {other!r} could be it too: begin the name of one with note"
-            )
-            raise _Unclear(expected, heading)
-    for sensor, own in found.items():
-        heading = next(iter(own.values())).heading
+        sensor = heading.sensor if stem in READING and not (listed and heading.stem in ("", "vector")) else ""
         if sensor and listed:
             raise _Unclear("either a column of the sensors' names, or columns for each sensor", heading)
-        if not sensor and len(found) > 1:
-            raise _Unclear("a name with that of its sensor, as the other columns have", heading)
-        if sensor and len(own) < len(READING):
+        other = found.setdefault(sensor, {}).setdefault(stem, column)
+        if other is not column:
+            words = f"and {other.heading.name!r} could be it too: begin the name of one with note"
+            raise _Unclear(f"one column of the {stem}, {words}", heading)
+    common = found.pop("")
+    if not found:
+        return {"": common}
+    if loose := [common[stem] for stem in READING if stem in common]:
+        raise _Unclear("a name with that of its sensor, as the other columns have", loose[0].heading)
+    for sensor, own in found.items():
+        if len(own) < len(READING):
             [lacking] = set(READING) - set(own)
-            raise _Unclear(
-                f"the {lacking} of this sensor too, in a column such as '{sensor} {lacking}'", heading
-            )
-    return found or {"": {}}
+            words = f"the {lacking} of this sensor too, in a column such as '{sensor} {lacking}'"
+            raise _Unclear(words, next(iter(own.values())).heading)
+    return found
 
 
 def _name(column: _Column) -> str:
     """The name that a column has in a runs table."""
     if column.stem not in MEASURED:
-        return column.heading.name if column.stem in ("", "note") else column.stem
+        return column.stem if column.stem not in ("", "note") else column.heading.name
     if not column.unit and column.stem != "amplitude" and not column.heading.tidy:
         usual = "rpm" if column.stem == "speed" else "deg"
         raise _Unclear(f"its unit too, such as '{column.heading.name} ({usual})'", column.heading)
@@ -316,29 +257,24 @@ def _name(column: _Column) -> str:
 
 def _assembled(grid: Grid, columns: Sequence[_Column]) -> Grid:
     """A runs table of these columns: one row for each row of the file and sensor with columns of its own."""
-    sensors = _by_sensor(columns)
     common = [column for column in columns if column.stem not in READING]
-    readings = {name: [own[stem] for stem in READING if stem in own] for name, own in sensors.items()}
-    first = next(iter(readings.values()))
-    for own in readings.values():
-        for column, one in zip(own, first, strict=True):
-            if column.unit != one.unit:
-                units = (
-                    f"{one.unit or 'no unit'}, as {one.heading.name!r} has, not {column.unit or 'no unit'}"
-                )
-                raise _Unclear(f"one unit for all sensors: {units}", column.heading)
-    wide = [] if "" in readings else ["sensor"]
-    header = (*map(_name, common), *wide, *map(_name, first))
-    rows: list[Row] = []
-    taken: list[tuple[int, ...]] = []
-    for own in readings.values():
-        of = (*common, *(own[:1] if wide else ()), *own)
-        taken.append(tuple(column.heading.index for column in of))
-    for k, (number, _) in enumerate(grid.rows):
-        for sensor, own in readings.items():
-            cells = [column.cells[k] for column in (*common, *own)]
-            cells[len(common) : len(common)] = [sensor] if wide else []
-            rows.append((number, tuple(cells)))
+    sensors = {
+        name: [own[stem] for stem in READING if stem in own] for name, own in _by_sensor(columns).items()
+    }
+    wide, first = "" not in sensors, next(iter(sensors.values()))
+    names = [*map(_name, first)]
+    for own in sensors.values():
+        if [*map(_name, own)] != names:
+            raise _Unclear(f"the units of all sensors, {listing(names, 'and')}", own[0].heading)
+    rows = [
+        (number, (*(c.cells[k] for c in common), *((name,) if wide else ()), *(c.cells[k] for c in own)))
+        for k, (number, _) in enumerate(grid.rows)
+        for name, own in sensors.items()
+    ]
+    taken = [
+        tuple(column.heading.index for column in (*common, *own[:wide], *own)) for own in sensors.values()
+    ]
+    header = (*map(_name, common), *(("sensor",) if wide else ()), *names)
     return replace(
-        grid, header=header, rows=tuple(rows), named=grid.header, taken=tuple(taken) * len(grid.rows)
+        grid, header=header, rows=tuple(rows), named=grid.header, taken=tuple(taken * len(grid.rows))
     )
