@@ -85,7 +85,7 @@ class Readings:
         return self._last[key]
 
     def point(self, p: int, q: FloatArray) -> tuple[AnyArray, ...]:
-        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariances."""
+        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariance, (k, 2, k, 2)."""
         from scipy.linalg import lapack
 
         seen = ~np.isnan(self.Z[:, p])
@@ -105,7 +105,7 @@ class Readings:
 
         own, inverse = turned(y)[:, 0], np.linalg.inv(np.triu(triangle[:size]))
         c = (inverse @ own[:size]).reshape(-1, 2) @ (1, 1j)
-        spread = np.einsum("iaib->iab", (inverse @ inverse.T).reshape(len(c), 2, -1, 2))
+        spread = (inverse @ inverse.T).reshape(len(c), 2, -1, 2)
         return own[size:], -turned(real(slopes * np.tile(c[: len(q) // 2], 2)))[size:], c, spread
 
     def without(self, omega: float, least: int) -> Readings:
