@@ -91,13 +91,11 @@ class Orders:
         ]
         return np.tensordot(row, self.coefficients, 1), np.transpose(deviations)
 
-    def width(self, order: int = 1) -> FloatArray:
-        """Turns that count at each knot interval, (n,): as many, evenly weighed, would leave the same
-        error.
-        """
-        middle = np.asarray(self.first + self.knot * (np.arange(len(self.density)) + 0.5))
+    def width(self, turns: FloatArray, order: int = 1) -> FloatArray:
+        """Turns that count around these, (P,): as many, evenly weighed, would leave the same error."""
         noise = np.array([2 * own[order].variance for own in self.smoothings])
-        return np.asarray(np.median(noise / self.deviation(middle, order) ** 2, axis=1) / self.density)
+        samples = np.median(noise / self.deviation(turns, order) ** 2, axis=1)
+        return np.asarray(samples / self.density[self._around(turns)[0]])
 
 
 def track_orders(parts: Parts, first: float, last: float, highest: int) -> Orders:

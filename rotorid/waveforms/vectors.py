@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
@@ -16,7 +18,8 @@ from rotorid.waveforms.tacho import Tacho, read_tacho
 
 STEADY, WINDOWS = 0.01, 20
 """A record whose speed, in so many windows, stays within this share of it has one vector."""
-PART = 1 << 18
+PART, MOST_PLACES = 1 << 18, 500
+"""Samples at a time; places at which the turns that count are found."""
 HIGHEST = 0.45
 """Of the sampling rate: beyond, an order is not what the samples hold."""
 NEAR_TOP, PILED = 0.01, 0.65
@@ -24,6 +27,7 @@ NEAR_TOP, PILED = 0.01, 0.65
 MOVES = 0.1
 """A vector that moves by more, of its size, at a steady speed is worth a word."""
 TOLD = 3.0
+log = logging.getLogger("rotorid.progress")
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +141,7 @@ def _found(
     def parts() -> Iterator[tuple[FloatArray, FloatArray]]:
         for start in range(begin, end, PART):
             stop = min(end, start + PART)
+            log.info("%s at %.0f %%", record.run, 100 * (start - begin) / (end - begin))
             turns = tacho.turn_at(np.arange(start, stop) / record.rate)
             yield turns, np.stack([c.samples[start:stop] * c.factor for c in record.sensors], axis=1)
 
@@ -146,15 +151,16 @@ def _found(
     course = np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step])
     steady = bool(np.ptp(course) < STEADY * course.mean())
     own = np.clip(own, course.min(), course.max()) if steady else own
-    width = tracked.width()
+    places = np.linspace(tracked.first, tracked.last, min(len(tracked.density), MOST_PLACES) + 1)
+    width = tracked.width(places)
     if speeds is not None:
         times = _passed(tacho, own, speeds)
     elif steady:
         times = np.array([np.mean(tacho.span)])
     else:
-        times = _independent(tacho, tracked, width)
+        times = _independent(tacho, places, width)
     turns = tacho.turn_at(times)
-    wide = np.interp(turns, tracked.first + tracked.knot * (np.arange(len(width)) + 0.5), width)
+    wide = np.interp(turns, places, width)
     edge = np.minimum(turns - tracked.first, tracked.last - turns) < wide / 2 * (1 - 1e-9)
     rate = tacho.angle.speed(times)
     if steady:
@@ -207,13 +213,12 @@ def _passed(tacho: Tacho, own: FloatArray, speeds: FloatArray) -> FloatArray:
     return np.array(times)
 
 
-def _independent(tacho: Tacho, tracked: Orders, width: FloatArray) -> FloatArray:
+def _independent(tacho: Tacho, places: FloatArray, width: FloatArray) -> FloatArray:
     """Times of vectors that share no turns, the first and the last half their turns from the ends."""
-    counted = np.concatenate(([0.0], np.cumsum(tracked.knot / width)))
+    counted = cumulative_trapezoid(1 / width, places, initial=0.0)
     number = max(2, int(counted[-1]))
-    places = (np.arange(number) + 0.5) * counted[-1] / number
-    turns = np.interp(places, counted, tracked.first + tracked.knot * np.arange(len(counted)))
-    dense = np.linspace(*tacho.span, 4 * len(counted))
+    turns = np.interp((np.arange(number) + 0.5) * counted[-1] / number, counted, places)
+    dense = np.linspace(*tacho.span, 4 * len(places))
     return np.asarray(np.interp(turns, tacho.turn_at(dense), dense))
 
 
@@ -230,11 +235,11 @@ def _before_paths(
     turns, speed = tacho.turn_at(times), tacho.angle.speed(times)
     rate = np.gradient(speed, times) if len(times) > 1 else np.zeros(1)
     read, change = tracked.at(turns), tracked.slope(turns) * speed[:, None, None]
-    deviation = np.stack([tracked.deviation(turns, k) for k in range(max(orders) + 1)], axis=1)
+    deviation = np.stack([tracked.deviation(turns, k) for k in orders], axis=2)
     if steady:
         means, deviations = tracked.mean()
         read = np.repeat(means[None], len(times), 0)
-        deviation = np.repeat(deviations[None], len(times), 0)
+        deviation = np.repeat(deviations[None, list(orders)].swapaxes(1, 2), len(times), 0)
         change, rate = 0 * read, 0 * rate
     vectors = np.empty((len(times), len(record.sensors), len(orders)), dtype=complex)
     errors, gap = np.empty(vectors.shape), read[:, 0].real.copy()
@@ -246,7 +251,7 @@ def _before_paths(
         for place, k in enumerate(orders):
             w, dw = 2 * np.pi * k * speed, 2 * np.pi * k * rate
             vectors[:, c, place], scale = before_path(H, read[:, k, c], change[:, k, c], w, dw)
-            errors[:, c, place] = deviation[:, k, c] * scale
+            errors[:, c, place] = deviation[:, c, place] * scale
     return vectors, errors, gap
 
 

@@ -75,7 +75,9 @@ class SweepVectors:
             self.speeds,
             dict(zip(self.sensors, self.vectors.T, strict=True)),
             np.zeros(len(self.speeds), dtype=bool),
-            covariances={} if stated is None else dict(zip(self.sensors, np.swapaxes(stated, 0, 1), strict=True)),
+            covariances={}
+            if stated is None
+            else dict(zip(self.sensors, np.swapaxes(stated, 0, 1), strict=True)),
             axis=speed_axis("speed", labels.speed_unit),
             units=dict.fromkeys(self.sensors, Shown(labels.vibration_in, labels.vibration_scale)),
         )
@@ -131,15 +133,15 @@ def fit_sweep(
     return SweepModes(fit, fit_modes(sweep.experiments, sweep.sensors, held, bands, fit.ends))
 
 
-def _fit(
-    sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, float]] | None
-) -> FittedModes:
+def _fit(sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, float]] | None) -> FittedModes:
     """Modes around the peaks, but for those that are no more than noise."""
     around = None
     if bands is None:
         order = np.argsort(sweep.speeds, kind="stable")
         square = np.abs(answers.excitation[order])[:, None]
-        around = peak_bands(sweep.speeds[order], sweep.vectors[order] / square, NOISE * sweep.noise[order] / square)
+        around = peak_bands(
+            sweep.speeds[order], sweep.vectors[order] / square, NOISE * sweep.noise[order] / square
+        )
     while True:
         fit = fit_modes(sweep.experiments, sweep.sensors, answers, bands, around)
         if not around or len(around) == 1 or fit.by_noise.max() <= RARE:
@@ -183,7 +185,9 @@ def slow_vectors(sweep: SweepVectors, speed: float) -> tuple[ComplexArray, Float
     return mean, np.einsum("nci,ncj->cij", parts, parts) / free[:, None, None]
 
 
-def vectors_at(sweep: SweepVectors, fit: FittedModes | None, speeds: FloatArray) -> tuple[ComplexArray, FloatArray]:
+def vectors_at(
+    sweep: SweepVectors, fit: FittedModes | None, speeds: FloatArray
+) -> tuple[ComplexArray, FloatArray]:
     """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
 
     Of the fit, if there is one; else of a parabola through the nearest vectors.

@@ -131,8 +131,16 @@ class SweptAnswers:
 
         h, (steps, rest, last) = self.speed.step, self._rests
         start = np.array([self.speed.first])
-        (f,), (speed,), (rate,) = self.speed.growth(start), self.speed.omega(start), self.speed.omega.derivative()(start)
-        p, df, dp = 1j * speed - s, 2 * speed * rate, 1j * rate  # z = f/p − (f/p)'/p to the first order of the rate
+        (f,), (speed,), (rate,) = (
+            self.speed.growth(start),
+            self.speed.omega(start),
+            self.speed.omega.derivative()(start),
+        )
+        p, df, dp = (
+            1j * speed - s,
+            2 * speed * rate,
+            1j * rate,
+        )  # z = f/p − (f/p)'/p to the first order of the rate
         z0, w0 = f / p - df / p**2 + f * dp / p**3, f / p**2 - 2 * df / p**3 + 3 * f * dp / p**4
         left = h * (1 - NODES)
         kernel, decay = h * WEIGHTS * np.exp(s * left), np.exp(s * h)
