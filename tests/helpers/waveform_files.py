@@ -28,6 +28,7 @@ def write(path, channels=None, rate=RATE):
     elif path.suffix == ".wav":
         wavfile.write(path, int(rate), np.column_stack([*channels.values()]).astype(np.float32))
     elif path.suffix == ".mat":
+        # compressed, as MATLAB does: of others with a damaged type of element scipy 1.17 ends the process
         savemat(path, {**channels, "fs": rate}, do_compression=True)
     elif path.suffix == ".npz":
         np.savez(path, **channels, fs=rate)

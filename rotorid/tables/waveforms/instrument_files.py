@@ -29,14 +29,11 @@ def read_wav(path: Path) -> Sampled:
                 raise
             warnings.filterwarnings("error", "Reached EOF prematurely")  # until `library` ends
             rate, data = wavfile.read(path)
+    scale = 1.0 if data.dtype.kind == "f" else 2.0 ** (1 - 8 * data.dtype.itemsize)
     if data.dtype.kind == "u":
         data = data.astype(np.int16) - 128
-        scale = 2.0**-7
-    else:
-        scale = 1.0 if data.dtype.kind == "f" else 2.0 ** (1 - 8 * data.dtype.itemsize)
-    columns = np.atleast_2d(data.T)
-    found = sampled(path, {str(i): column for i, column in enumerate(columns, start=1)}, float(rate))
-    return Sampled(found.rate, found.channels, scale)
+    columns = enumerate(np.atleast_2d(data.T), start=1)
+    return sampled(path, {str(i): column for i, column in columns}, float(rate), scale)
 
 
 def read_uff(path: Path) -> Sampled:

@@ -68,7 +68,11 @@ def library(path: Path, kind: str) -> Iterator[None]:
 
 
 def sampled(
-    path: Path, channels: Mapping[str, AnyArray], rate: float | None = None, first_row: int | None = None
+    path: Path,
+    channels: Mapping[str, AnyArray],
+    rate: float | None = None,
+    scale: float = 1.0,
+    first_row: int | None = None,
 ) -> Sampled:
     """The channels, without that of the times (t_s, time, Time [ms] …), which gives the rate.
 
@@ -87,13 +91,13 @@ def sampled(
         rate = _rate(path, clock, channels[clock], unit, first_row)
     if rate is not None and not 0 < rate < np.inf:
         raise refusal(path, f"a rate above 0, not {rate:g}")
-    return Sampled(rate, {k: v for k, v in channels.items() if k != clock}, first_row=first_row)
+    return Sampled(rate, {k: v for k, v in channels.items() if k != clock}, scale, first_row)
 
 
 def time_unit(name: str) -> Unit | None:
     """The unit of times in a channel of this name, s if it says none; None for another channel."""
-    words = re.findall(r"[^\W_]+", spelt(name).casefold())
-    known = 1 <= len(words) <= 2 and words[0] in ("t", "time")
+    words = re.findall(r"[^\W_]+", spelt(name))
+    known = 1 <= len(words) <= 2 and (words[0] == "t" or words[0].casefold() == "time")
     return TIME.get((*words, "s")[1]) if known else None
 
 

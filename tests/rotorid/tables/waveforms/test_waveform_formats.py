@@ -69,6 +69,25 @@ def test_text_as_loggers_write_it(kind, encoding, tmp_path):
 
 
 ROWS = [f"{i / 100:.2f},{i % 5},{i}.5" for i in range(600)]
+TIME_NAMES = {
+    "t": 1.0,
+    "time": 1.0,
+    "t_ms": 1e3,
+    "Time [µs]": 1e6,
+    "TIME (s)": 1.0,
+    "T": None,
+    "time_h": None,
+}
+
+
+@each_of("name", TIME_NAMES)
+def test_times_are_known_by_their_name(name, tmp_path):
+    step = TIME_NAMES[name] or 1.0
+    found = read_samples(csv(tmp_path, f"{name},KEY\n" + "".join(f"{i * step},{i}\n" for i in range(5))))
+    assert found.rate == (None if TIME_NAMES[name] is None else pytest.approx(1.0))
+    assert list(found.channels) == ([name, "KEY"] if found.rate is None else ["KEY"])
+
+
 BAD_CELLS = {
     "a word": (400, "4.00,x1,3", ["row 402, column KEY: found 'x1', expected a number"]),
     "a unit": (400, "4.00,1,3 V", ["row 402, column B: found '3 V', expected a number alone"]),
@@ -303,11 +322,11 @@ def damaged(data, rng):
 def test_a_damaged_file_is_one_message_or_read(suffix, tmp_path, capfd):
     data = write(tmp_path / f"good{suffix}").read_bytes()
     path, rng, refusals = tmp_path / f"bad{suffix}", np.random.default_rng(23), 0
-    for _ in range(300):
+    for _ in range(200):
         path.write_bytes(damaged(data, rng))
         try:
             read_samples(path)
         except InputError:
             refusals += 1
-    assert refusals > 100
+    assert refusals > 60
     assert capfd.readouterr() == ("", "")
