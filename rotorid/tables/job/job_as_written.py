@@ -10,13 +10,16 @@ from typing import Any
 
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_from_excel import WrittenJob, open_job
-from rotorid.tables.job.job_keys import LARGEST, TABLES
+from rotorid.tables.job.job_keys import LARGEST, READINGS, TABLES
 from rotorid.tables.job.readings import overriding_errors
-from rotorid.tables.reader.columns import read_grid
+from rotorid.tables.reader.columns import Source, read_grid
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Quantity
 from rotorid.tables.reader.text_file import read_bytes
+from rotorid.tables.runs.instrument_export import read_runs_grid
+from rotorid.tables.runs.stated_conventions import Conventions
+from rotorid.tables.waveforms.vectors_table import read_vectors_grid
 
 _SHEET = {"influence": "influence", "weights": "weights", "check_weights": "weights"}
 """Of a workbook that a job names for a table; all others are runs tables."""
@@ -90,9 +93,12 @@ def job_tables(source: JobSource, job: Job) -> JobTables:
         else:
             written = open_job(source.files[0], problems)
             named, rotor = _files(written.settings, written.path)
+            written.settings.pop("columns", None)  # the tables have the names of runs tables
             if not written.tables:
                 written.comments["settings"] = _comments(written.path, problems)
-        tables = {**written.tables, **_grids(named, problems)}
+        if source.overrides.waveforms is not None:
+            named["runs"] = Path(source.overrides.waveforms)
+        tables = _grids({**named, **written.tables}, job.conventions, problems)
     problems.stop()
     _override(written.settings, source, job)
     return JobTables(written, tables, rotor)
@@ -116,11 +122,17 @@ def _files(settings: dict[str, Any], job: Path) -> tuple[dict[str, Path], Path |
     return named, None if rotor is None else job.parent / str(rotor).strip()
 
 
-def _grids(named: Mapping[str, Path], problems: Problems) -> dict[str, Grid]:
+def _grids(sources: Mapping[str, Source], conventions: Conventions, problems: Problems) -> dict[str, Grid]:
     out = {}
-    for key, path in named.items():
+    for key, source in sources.items():
         sheet = _SHEET.get(key, "runs")
-        grid = read_grid(path, sheet, problems, may_be_empty=sheet == "weights")
+        if isinstance(source, Path) and source.suffix.lower() == ".toml":
+            found = read_vectors_grid(source, conventions.labels.phase, problems)
+            grid = None if found is None else found[0]
+        elif key in READINGS:
+            grid = read_runs_grid(source, conventions, problems)
+        else:
+            grid = read_grid(source, sheet, problems, may_be_empty=sheet == "weights")
         if grid is not None:
             out[key] = grid
     return out

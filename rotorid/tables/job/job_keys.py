@@ -24,6 +24,8 @@ from rotorid.tables.runs.stated_conventions import (
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""
+READINGS = ("runs", "check", "slow_roll")
+"""Those that are runs tables."""
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
 MOST_HOLES = 1000
 SAME_DEG = 1e-4
@@ -371,6 +373,14 @@ VECTOR = (
     ),
 )
 _VECTORS = value_kinds.named(VECTOR)
+COLUMNS = (
+    Key("run", TEXT, "name in the file of the column `run`, and so on"),
+    Key("speed_rpm", TEXT, "or another unit of a speed", units.SPEED),
+    Key("sensor", TEXT, "not where each sensor has columns of its own"),
+    Key("amplitude", TEXT, "or, with its unit, `amplitude_um_pp` and the like", units.vibration),
+    Key("phase_deg", TEXT, "or `phase_rad`", units.ANGLE),
+    Key("repeat", TEXT, "of repeated readings"),
+)
 JOB = (
     Key("runs", FILE, "the runs table, relative to the job file"),
     Key("weights", FILE, "the weights table"),
@@ -426,6 +436,7 @@ JOB = (
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
         "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
     ),
+    Key("columns", value_kinds.table(COLUMNS), "other names of the columns of runs tables, see below"),
     Key("planes", value_kinds.named(PLANE), "see below", default={}),
     Key("sensors", value_kinds.named(SENSOR), "see below", default={}),
 )

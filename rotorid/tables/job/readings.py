@@ -88,7 +88,7 @@ def read_readings(
         clock=clock,
     )
     unstated = tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None)
-    conventions = Conventions(labels, said["speed_tolerance_percent"], unstated)
+    conventions = Conventions(labels, said["speed_tolerance_percent"], unstated, said["columns"])
     trials = make_trials(tables["runs"], tables.get("weights"), conventions, errors, own)
     influence = None
     if found is not None and trials is not None:

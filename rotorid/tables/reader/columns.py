@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import SupportsIndex
@@ -23,9 +23,9 @@ from rotorid.tables.reader.decimal_numbers import (
 )
 from rotorid.tables.reader.digits import written_steps
 from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
+from rotorid.tables.reader.grid import BadCell, Cell, Grid, from_header, is_spreadsheet_error, make_grid, show
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.text_file import decode, parse_text, read_bytes
+from rotorid.tables.reader.text_file import decode, parse_text, read_bytes, text_from_header
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
@@ -66,13 +66,17 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable)."""
+    """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable).
+
+    Where its cells stood in several columns of the file, `names` has the one of each.
+    """
 
     name: str
     unit: Unit | None
     cells: tuple[Cell, ...]
     numbers: FloatArray
     texts: tuple[str, ...]
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +149,8 @@ class Table:
     def complain(self, index: SupportsIndex, stem: str, expected: str) -> None:
         """Note a problem with one cell."""
         field = self.fields[stem]
-        self.problems.add(self.source, self.rows[index], field.name, self.shown(stem, index), expected)
+        name = field.names[index] if field.names else field.name
+        self.problems.add(self.source, self.rows[index], name, self.shown(stem, index), expected)
 
     def complain_where(self, wrong: BoolArray, stem: str, expected: str) -> None:
         """Note a problem with each of these cells of a column."""
@@ -233,9 +238,15 @@ def read_table(
 
 
 def read_grid(
-    source: Source, sheet: str, problems: Problems, *, first: bool = False, may_be_empty: bool = False
+    source: Source,
+    sheet: str,
+    problems: Problems,
+    *,
+    first: bool = False,
+    may_be_empty: bool = False,
+    is_header: Callable[[Sequence[str]], bool] | None = None,
 ) -> Grid | None:
-    """The cells of a text file or of a sheet."""
+    """The cells of a text file or of a sheet; with `is_header` whatever stands above it is a comment."""
     if isinstance(source, Grid):
         return source
     path = Path(source)
@@ -245,9 +256,12 @@ def read_grid(
         if chosen is None:
             return None
         title, rows = chosen
+        rows = rows if is_header is None else from_header(rows, is_header)
         return make_grid(sheet_source(path, title), rows, "", problems, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
+    if text is not None and is_header is not None:
+        text = text_from_header(text, is_header)
     return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
 
 
@@ -384,7 +398,7 @@ def _complain_about_missing(
 ) -> None:
     for column in columns:
         if column.required and column.stem not in there:
-            present = listing([name for name in grid.header if name], "and")
+            present = listing([name for name in grid.named or grid.header if name], "and")
             expected = f"a column {listing(column.names)}; the columns are {present}"
             problems.add(grid.source, grid.header_row, column.names[0], None, expected)
 
@@ -393,14 +407,17 @@ def _field(
     grid: Grid, index: int, column: Column, unit: Unit | None, problems: Problems, *, comma: bool
 ) -> Field:
     cells = tuple(row[index] for _, row in grid.rows)
-    name = grid.header[index]
+    names = tuple(grid.named[columns[index]] for columns in grid.taken)
+    name = names[0] if len(set(names)) == 1 else grid.header[index]
     numbers = np.full(len(cells), math.nan)
     texts = [""] * len(cells)
     # most cells of a long table say what another one has said
     known: dict[Cell, str | float] = {"": ""} if column.blank else {}
     doubtful: set[str] = set()
     if unit is not None and not comma and grid.separator in (";", "\t"):
-        doubtful = thousands_or_decimals((cell for cell in cells if isinstance(cell, str)), name)
+        doubtful = thousands_or_decimals(
+            (cell for cell in cells if isinstance(cell, str)), grid.header[index]
+        )
     for place, cell in enumerate(cells):
         if cell not in known:
             try:
@@ -415,14 +432,15 @@ def _field(
                     _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
                 )
             except NotANumber as error:
-                problems.add(grid.source, grid.rows[place][0], name, show(cell), str(error))
+                own = names[place] if names else name
+                problems.add(grid.source, grid.rows[place][0], own, show(cell), str(error))
                 continue
         value = known[cell]
         if isinstance(value, str):
             texts[place] = value
         else:
             numbers[place] = value
-    return Field(name, unit, cells, numbers, tuple(texts))
+    return Field(name, unit, cells, numbers, tuple(texts), names)
 
 
 def _number(cell: str | float, unit: Unit, separator: str, *, comma: bool) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from rotorid.base.text import counted
@@ -12,6 +12,9 @@ from rotorid.tables.reader.problems import Problems
 
 LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
+
+MOST_ABOVE = 60
+"""A header that is known by its columns stands among so many."""
 
 MOST_CELLS = 5_000_000
 """Of a file."""
@@ -73,6 +76,9 @@ class Grid:
         False where a line could not be split into cells, so that nothing can be said about missing rows.
     first_rows
         The first rows as they stood, the header among them, to find a header that is not the first row.
+    named, taken
+        Where the columns are not those of the file: their names there, and which of them each cell of each
+        row is from.
     """
 
     source: str
@@ -83,6 +89,8 @@ class Grid:
     comments: tuple[str, ...] = ()
     complete: bool = True
     first_rows: tuple[Row, ...] = ()
+    named: tuple[str, ...] = ()
+    taken: tuple[tuple[int, ...], ...] = ()
 
 
 def clean(text: str) -> str:
@@ -170,6 +178,14 @@ def make_grid(
     _complain_about_nameless(source, header_row, header, body, problems)
     top = tuple(filled[:LOOKED_AT])
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete, top)
+
+
+def from_header(rows: list[Row], is_header: Callable[[Sequence[str]], bool]) -> list[Row]:
+    """Rows of a sheet; those above one that is surely the header become comments."""
+    for above, (_, cells) in enumerate(rows[:MOST_ABOVE]):
+        if is_header([show(cell) for cell in cells]):
+            return [(n, (f"# {_comment(row, '')}",)) for n, row in rows[:above]] + rows[above:]
+    return rows
 
 
 def _comment(cells: tuple[Cell, ...], separator: str) -> str:

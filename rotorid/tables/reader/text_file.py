@@ -6,14 +6,26 @@ import codecs
 import csv
 import re
 import warnings
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.grid import MOST_CELLS, CommentLine, Grid, Row, begins_comment, clean, make_grid
+from rotorid.tables.reader.grid import (
+    MOST_ABOVE,
+    MOST_CELLS,
+    CommentLine,
+    Grid,
+    Row,
+    begins_comment,
+    clean,
+    make_grid,
+)
 from rotorid.tables.reader.input_file import file_content
 from rotorid.tables.reader.problems import Problems, TableWarning
 
 _SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
+_BLANK = ';,\t" \xa0\ufeff\r\n'
 _WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")
 _NAMES = {";": "semicolon", ",": "comma", "\t": "tab"}
 
@@ -22,14 +34,18 @@ def read_bytes(path: Path, problems: Problems) -> bytes | None:
     """The content of a file, or None and a problem."""
     try:
         return file_content(path)
-    except FileNotFoundError:
-        problems.add(str(path), None, None, None, f"a file that exists{_neighbour(path)}")
-    except IsADirectoryError:
-        problems.add(str(path), None, None, None, "a file, not a folder")
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        problems.add(str(path), None, None, None, f"a file that can be read ({reason})")
+        problems.add(str(path), None, None, None, readable(path, error))
     return None
+
+
+def readable(path: Path, error: OSError | ValueError) -> str:
+    """What is expected of a file that could not be read."""
+    if isinstance(error, FileNotFoundError):
+        return f"a file that exists{_neighbour(path)}"
+    if isinstance(error, IsADirectoryError):
+        return "a file, not a folder"
+    return f"a file that can be read ({getattr(error, 'strerror', None) or error})"
 
 
 def decode(source: str, data: bytes, problems: Problems) -> str | None:
@@ -133,6 +149,21 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
             below_header = below_header or any(cells)
         rows.append((number, cells))
     return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
+
+
+def text_from_header(text: str, is_header: Callable[[tuple[str, ...]], bool]) -> str:
+    """A text table; lines above one that is surely the header become comments."""
+    lines = re.split(r"(\r\n|\n|\r)", text, maxsplit=MOST_ABOVE)
+    above: list[int] = []
+    for at, line in enumerate(lines[: 2 * MOST_ABOVE]):
+        if not line.strip(_BLANK) or line.strip(_BLANK).casefold().startswith(("#", "sep=")):
+            continue
+        with suppress(csv.Error):
+            if is_header(_cells(line, _separator([line]))):
+                lines = [f"# {one}" if k in above else one for k, one in enumerate(lines)]
+                return "".join(lines) if above else text
+        above.append(at)
+    return text
 
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:

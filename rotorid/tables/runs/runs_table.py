@@ -12,9 +12,10 @@ from balancing.data.reading_errors import turned
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
+from rotorid.tables.reader.columns import Column, Source, Table, make_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
+from rotorid.tables.runs.instrument_export import read_runs_grid
 from rotorid.tables.runs.speed_merging import merge_speeds, same_speed, show_speed
 from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
@@ -52,7 +53,7 @@ def read_runs(
     problems
         Collects the complaints.
     """
-    grid = read_grid(source, "runs", problems)
+    grid = read_runs_grid(source, conventions, problems)
     if grid is None:
         return None, None
     grid = replace(grid, header=tuple("" if UNUSED.fullmatch(name) else name for name in grid.header))

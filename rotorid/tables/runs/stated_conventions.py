@@ -16,6 +16,7 @@ from balancing.data.conventions import Phase as Phase
 from balancing.data.trials import ReadingErrors, RunScatter
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.tables.reader.settings_keys import Said
 
 ROTATIONS = ("clockwise", "counter-clockwise")
 STATED_ANGLES = (*ANGLES, *ROTATIONS)
@@ -39,6 +40,8 @@ class Conventions:
         Speeds of different runs that differ by less count as one.
     unstated
         Which of "phase" and "angles" neither the job nor the caller states.
+    columns
+        Names that the columns of the runs tables have in the files, by their own names; None: these.
 
     Raises
     ------
@@ -49,6 +52,7 @@ class Conventions:
     labels: Labels = field(default_factory=Labels)
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
     unstated: tuple[str, ...] = ()
+    columns: Said | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
