@@ -15,19 +15,21 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import BLUE, DARK, QUIET, TEXT, VERMILION, legend_below, new_figure, note, plain
 from rotorid.regression import solution
 from rotorid.waveforms.record import Channel, WaveformRecord
+from rotorid.waveforms.tacho_picture import figure_tacho
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.waveforms.tacho import Tacho
+    from rotorid.waveforms.vectors import Vectors
 
 UNITS = {0: ("µm", 1e6), 1: ("mm/s", 1e3), 2: ("m/s²", 1.0), None: ("", 1.0)}
 """By the derivative that a sensor measures: the unit shown, and how many of it are 1 in SI."""
 LOOKS = {"1×": (VERMILION, 2.4, 8.0, 2), "as measured": (BLUE, 0.8, 4.0, 4)}
 """Colour of a curve, widths of its line and its dots, and how near the front."""
-BLANK, POINTS = 0.06, 200
-"""Of a turn, before its mark; of a curve in a turn."""
+TURNS, BLANK, POINTS = 4, 0.06, 200
+"""Of an orbit; share of a turn before its mark; points of a curve in a turn."""
 A_LINE = 0.02
 """An orbit that is narrower, of its length, has no direction."""
 LINES, TALLEST, SEEN = 48, 0.3, 0.02
@@ -41,13 +43,34 @@ RUN_UP = 0.05
 """Share of the speed by which it must change to be an axis."""
 
 
+def figure_of(picture: str, record: WaveformRecord, found: Vectors) -> Figure:
+    """Draw "tacho", "waterfall" of the first sensor, or "orbit" of the first two where their 1× is largest.
+
+    Raises
+    ------
+    ValueError
+        For an orbit of one sensor, and as `figure_orbit`.
+    """
+    tacho = found.tacho
+    if picture == "tacho":
+        assert record.tacho is not None
+        return figure_tacho(record.tacho, record.rate, tacho)
+    if picture == "waterfall":
+        return figure_waterfall(record, found.sensors[0], tacho, orders=sorted({1, 2, *found.orders}))
+    if len(found.sensors) < 2:
+        raise ValueError(f"{record.source}: an orbit needs two sensors; there is only {found.sensors[0]!r}")
+    largest = found.times[np.argmax(np.linalg.norm(found.vectors[:, :2, 0], axis=1))]
+    latest = np.interp(tacho.turns[-1] - TURNS - 1, tacho.turns, tacho.times)
+    return figure_orbit(record, found.sensors[:2], tacho, min(largest, latest))
+
+
 def figure_orbit(
     record: WaveformRecord,
-    pair: tuple[str, str],
+    pair: Sequence[str],
     tacho: Tacho,
     at: float,
     *,
-    turns: int = 4,
+    turns: int = TURNS,
     angles: tuple[float, float] | None = None,
     clockwise: bool = False,
 ) -> Figure:

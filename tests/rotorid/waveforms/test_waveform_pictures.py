@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rotorid.waveforms.record import Channel, WaveformRecord
 from rotorid.waveforms.tacho_picture import figure_tacho
-from rotorid.waveforms.waveform_pictures import BLANK, LINES, figure_orbit, figure_waterfall, spectra
+from rotorid.waveforms.waveform_pictures import (
+    BLANK,
+    LINES,
+    figure_of,
+    figure_orbit,
+    figure_waterfall,
+    spectra,
+)
 
 RATE = 2560.0
 
@@ -220,6 +228,29 @@ def test_orbits_that_cannot_be_drawn(steady):
         figure_orbit(other, ("X", "Y"), steady, 1.0)
     with pytest.raises(ValueError, match=r"not 4 whole turns after 19.95 s: its pulses end at 19.96 s"):
         figure_orbit(made, ("X", "Y"), steady, 19.95)
+
+
+def test_the_picture_that_is_asked_for(run_up):
+    """The orbit is drawn where 1× is largest, and never beyond the last turn."""
+    signal = tacho_signal(run_up, 10**6)
+    made = replace(record(run_up, circle(5.0)), tacho=signal)
+    times = np.array([10.0, 30.0, 59.99])
+    for sizes, at in (((1, 3, 2), 30.0), ((1, 2, 3), 59.9)):
+        found = SimpleNamespace(
+            tacho=run_up,
+            sensors=("X", "Y"),
+            orders=(1, 3),
+            times=times,
+            vectors=np.array(sizes)[:, None, None] * np.ones((3, 2, 2)),
+        )
+        title = figure_of("orbit", made, found).axes[1].get_title()
+        assert float(title.split("at ")[1].split()[0]) == pytest.approx(at, abs=0.15)
+    texts = [text.get_text() for text in figure_of("waterfall", made, found).axes[0].texts]
+    assert texts[:3] == ["1×", "2×", "3×"]
+    assert figure_of("tacho", made, found).axes[0].get_ylabel() == "tacho, as recorded"
+    found.sensors = ("X",)
+    with pytest.raises(ValueError, match=r"file.wav: an orbit needs two sensors; there is only 'X'"):
+        figure_of("orbit", made, found)
 
 
 def tacho_signal(pulses, most):
