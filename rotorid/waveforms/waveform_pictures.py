@@ -124,12 +124,14 @@ def figure_orbit(
     axes["0"].tick_params(labelbottom=False)
     axes["1"].set_xlabel("turns")
     _draw_plane(axes["orbit"], pair, on_paper(looking), on_paper(weights @ first), clockwise=clockwise)
-    axes["orbit"].set_title(
-        _whirl(weights @ vectors, weights.conj() @ vectors) + unit.replace(",", ""), fontsize=TEXT
-    )
-    along = pair if angles is None else ("along 0°", f"along {270 if clockwise else 90}°")
+    way, size = _whirl(weights @ vectors, weights.conj() @ vectors)
+    along = ("along 0°", f"along {270 if clockwise else 90}°")
+    if angles is None:
+        size = f"if {pair[1]} stands 90° after {pair[0]}; {size}"
+        along = (pair[0], f"{'−' if clockwise else ''}{pair[1]}")
+    axes["orbit"].set_title(f"1×: {way}\n{size}{unit.replace(',', '')}", fontsize=TEXT)
     axes["orbit"].set(xlabel=along[0] + unit, ylabel=along[1] + unit)
-    said = f"angles not known: {pair[1]} is taken to stand 90° after {pair[0]}, with the rotation"
+    said = f"angles not known: drawn as if {pair[1]} stood 90° after {pair[0]}, with the rotation"
     legend_below(figure, [axes["orbit"]], 3, title=said if angles is None else None)
     return figure
 
@@ -185,12 +187,12 @@ def _draw_plane(
     ax.text(0.1, 0.87, "rotation", color=DARK, fontsize=TEXT, ha="center", transform=ax.transAxes)
 
 
-def _whirl(forward: ComplexArray, backward: ComplexArray) -> str:
-    """1× in words, of twice its parts with the rotation and against it, ()."""
+def _whirl(forward: ComplexArray, backward: ComplexArray) -> tuple[str, str]:
+    """Way and size of 1× in words, of twice its parts with the rotation and against it, ()."""
     long, short = (float(np.abs(forward) + sign * np.abs(backward)) / 2 for sign in (1, -1))
     way = "forward whirl, with the rotation" if short > 0 else "backward whirl, against the rotation"
     way = "nearly along a line" if abs(short) < A_LINE * long else way
-    return f"1×: {way}\nsemi-axes {long:.3g} × {abs(short):.3g}"
+    return way, f"semi-axes {long:.3g} × {abs(short):.3g}"
 
 
 def figure_waterfall(
@@ -232,7 +234,9 @@ def figure_waterfall(
     bar = step * max(m for m in (1, 2, 5) if m * step <= largest)
     side, top = ax.get_yaxis_transform(), place[0] + bar * tall
     ax.plot([1.02, 1.02], [place[0], top], color=DARK, linewidth=2, transform=side, clip_on=False)
-    ax.text(1.03, place[0], f"{bar:g} {unit} (peak)", transform=side, rotation=90, fontsize=TEXT)
+    ax.text(
+        1.03, place[0], " ".join(f"{bar:g} {unit} (peak)".split()), transform=side, rotation=90, fontsize=TEXT
+    )
     ax.set(xlim=(0, highest), xlabel="frequency, Hz", ylabel="speed, rpm" if run_up else "time, s")
     words = f"{LINES} spectra of {n / rate:.2g} s, {FLAT_TOP * rate / n:.2g} Hz wide (flat top)"
     ax.set_title(f"{sensor}: {words}", fontsize=TEXT, pad=16)

@@ -130,7 +130,7 @@ def test_a_waterfall_over_a_run_up(run_up):
 def test_a_waterfall_at_a_steady_speed_is_over_time(steady):
     ax = figure_waterfall(record(steady, {"X": {1: 3.0}}, factor=1.0, derivative=None), "X", steady).axes[0]
     assert ax.get_ylabel() == "time, s"
-    assert "2  (peak)" in [text.get_text() for text in ax.texts]
+    assert "2 (peak)" in [text.get_text() for text in ax.texts]
     assert f"{64 / 25:.2g} s" in ax.get_title()  # so many turns
 
 
@@ -191,15 +191,22 @@ def test_only_1x_is_filtered(steady):
 @pytest.mark.parametrize(
     ("x", "y", "words"),
     [
-        (30.0, -20j, "1×: forward whirl, with the rotation\nsemi-axes 30 × 20 µm"),
-        (30.0, 20j, "1×: backward whirl, against the rotation\nsemi-axes 30 × 20 µm"),
-        (30.0, 0.1j, "1×: nearly along a line\nsemi-axes 30 × 0.1 µm"),
+        (30.0, -20j, "1×: forward whirl, with the rotation\nif Y stands 90° after X; semi-axes 30 × 20 µm"),
+        (
+            30.0,
+            20j,
+            "1×: backward whirl, against the rotation\nif Y stands 90° after X; semi-axes 30 × 20 µm",
+        ),
+        (30.0, 0.1j, "1×: nearly along a line\nif Y stands 90° after X; semi-axes 30 × 0.1 µm"),
     ],
 )
 def test_which_way_it_whirls(steady, x, y, words):
     figure = figure_orbit(record(steady, {"X": {1: x}, "Y": {1: y}}), ("X", "Y"), steady, 1.0)
     assert figure.axes[0].get_title() == words
-    assert "Y is taken to stand 90° after X" in figure.legends[0].get_title().get_text()
+    turned = figure_orbit(record(steady, {"X": {1: x}, "Y": {1: y}}), ("X", "Y"), steady, 1.0, clockwise=True)
+    assert turned.axes[0].get_title() == words
+    assert (figure.axes[0].get_ylabel(), turned.axes[0].get_ylabel()) == ("Y, µm", "−Y, µm")
+    assert "drawn as if Y stood 90° after X" in figure.legends[0].get_title().get_text()
 
 
 @pytest.mark.parametrize("angles", [(0.0, 90.0), (45.0, 135.0), (-30.0, 80.0), (135.0, 45.0)])
