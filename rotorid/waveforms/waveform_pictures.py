@@ -262,6 +262,8 @@ def spectra(channel: Channel, rate: float, times: FloatArray, n: int) -> tuple[F
 
 def _instants(tacho: Tacho, rate: float) -> tuple[FloatArray, FloatArray, int]:
     """Speeds, turns a second, evenly, when they are, s, and how many samples a spectrum takes there."""
+    from scipy.fft import next_fast_len
+
     start, stop = tacho.times[0], tacho.times[-1]
     t = np.linspace(start, stop, 10 * LINES)
     speed = np.gradient(tacho.turn_at(t), t)
@@ -270,4 +272,4 @@ def _instants(tacho: Tacho, rate: float) -> tuple[FloatArray, FloatArray, int]:
     inside = (t >= start + T / 2) & (t <= stop - T / 2)
     way = np.cumsum(np.abs(np.gradient(speed[inside])) + 1e-4 * speed.max())
     times = np.interp(np.linspace(way[0], way[-1], LINES), way, t[inside])
-    return np.interp(times, t, speed), times, int(T * rate)
+    return np.interp(times, t, speed), times, next_fast_len(int(T * rate), real=True)
