@@ -146,20 +146,9 @@ class VectorsOfRecords(Outcome):
 
         Orbits are those of its first two sensors, where 1× is largest; spectra those of the first.
         """
-        import numpy as np
+        from rotorid.waveforms.waveform_pictures import figure_of
 
-        from rotorid.waveforms.tacho_picture import figure_tacho
-        from rotorid.waveforms.waveform_pictures import figure_orbit, figure_waterfall
-
-        record, found = self.waveforms.records[0], self.found[0]
-        if self.picture == "tacho" and record.tacho is not None:
-            return figure_tacho(record.tacho, record.rate, found.tacho)
-        if self.picture == "waterfall":
-            return figure_waterfall(record, found.sensors[0], found.tacho, orders=found.orders)
-        if len(found.sensors) < 2:
-            raise ValueError("--picture orbit takes two sensors; the record has one")
-        largest = found.times[np.abs(found.vectors[:, :2, 0]).sum(axis=1).argmax()]
-        return figure_orbit(record, (found.sensors[0], found.sensors[1]), found.tacho, float(largest))
+        return figure_of(self.picture, self.waveforms.records[0], self.found[0])
 
 
 @workflow
