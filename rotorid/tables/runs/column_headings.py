@@ -134,32 +134,32 @@ def _heading(unknown: Heading, name: str, *, probes: bool) -> Heading:
     if name.casefold().startswith(REMARKS):
         return replace(unknown, stem="note")
     order = None if probes else _ORDER.search(name)
-    if order is not None:
-        name = name.replace(order[0], " ")
     if order is not None and order[1] != "1":
         return replace(unknown, stem=f"{order[1]}X")
+    name = name if order is None else name.replace(order[0], " ")
     inside, outside = " ".join(_BRACKETS.findall(name)).strip(), _BRACKETS.sub(" ", name)
-    found = next(((stem, match) for stem, role in _ROLES.items() if (match := role.search(outside))), None)
-    if found is None:
-        if inside and readable("amplitude", inside):
-            return replace(unknown, unit=inside, sensor=_bare(outside))
-        return replace(unknown, sensor=unknown.name)
-    stem, match = found
-    before, after = _bare(outside[: match.start()]), _bare(outside[match.end() :])
-    if match[0].casefold() == "rpm":
-        after = f"rpm {after}".strip()
-    quantity = "amplitude" if stem == "vector" else stem
+    for stem, role in _ROLES.items():
+        if match := role.search(outside):
+            rpm = "rpm" if match[0].casefold() == "rpm" else ""
+            rest = _bare(outside[: match.start()]), f"{rpm} {_bare(outside[match.end() :])}".strip()
+            return _with_rest(replace(unknown, stem=stem), *rest, inside)
+    if inside and readable("amplitude", inside):
+        return replace(unknown, unit=inside, sensor=_bare(outside))
+    return replace(unknown, sensor=unknown.name)
+
+
+def _with_rest(heading: Heading, before: str, after: str, inside: str) -> Heading:
+    """A heading with the unit that stands after its word or in brackets; the rest is the sensor."""
+    quantity = "amplitude" if heading.stem == "vector" else heading.stem
     if quantity not in MEASURED:
         after, inside = f"{after} {inside}", ""
-    elif after and readable(quantity, after):
-        after, inside = "", f"{after} {inside}".strip()
-    words = f"{before} {after}".split()
-    if quantity in READING:
-        sensor = " ".join(word for word in words if word.casefold() not in ("vibration", "vib"))
-        return replace(unknown, stem=stem, unit=inside, sensor=sensor)
-    if any(word.casefold().strip(".#") not in _FILLERS for word in words):
-        return replace(unknown, sensor=unknown.name)
-    return replace(unknown, stem=stem, unit=inside)
+    for unit in (f"{after} {inside}", f"{inside} {after}"):  # um (pp), pp (um)
+        if after.strip() and quantity in MEASURED and readable(quantity, unit):
+            after, inside = "", unit.strip()
+    words = [word for word in f"{before} {after}".split() if word.casefold() not in ("vibration", "vib")]
+    if quantity not in READING and any(word.casefold().strip(".#") not in _FILLERS for word in words):
+        return Heading(heading.index, heading.name, sensor=heading.name)
+    return replace(heading, unit=inside, sensor=" ".join(words) if quantity in READING else "")
 
 
 def _bare(text: str) -> str:

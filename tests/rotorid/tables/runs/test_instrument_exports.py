@@ -78,7 +78,7 @@ trial 2,1000,A,4.0 / 79
 trial 2,1000,B,12.0 / 292
 """
 HEADINGS = """\
-Phase angle [°],1X Ampl [um pp],Channel,Speed rpm,Run
+Phase angle [°],1X Ampl. pk-pk [um],Channel,Speed rpm,Run
 238,7.2,A,1000,initial
 296,13.5,B,1000,initial
 114,4.9,A,1000,trial 1
@@ -306,8 +306,8 @@ EXPLAINED = {
     ),
     "no run": (
         re.sub(r",[^,\n]*\n", "\n", HEADINGS),
-        "runs.csv, row 1, column run: expected a column run; the columns are Phase angle [°], 1X Ampl [um pp], "
-        "Channel and Speed rpm",
+        "runs.csv, row 1, column run: expected a column run; the columns are Phase angle [°], 1X Ampl. "
+        "pk-pk [um], Channel and Speed rpm",
     ),
     "no run beside columns for each sensor": (
         re.sub(r"(?m)^[^,]*,", "", SENSORS_1_2),
@@ -368,15 +368,15 @@ EXPLAINED = {
         "heading of the column says",
     ),
     "no vibration": (
-        HEADINGS.replace("[um pp]", "[G's]"),
-        "runs.csv, row 1, column 1X Ampl [G's]: found \"1X Ampl [G's]\", expected a unit of vibration, such "
-        'as um pp or mm/s rms, not "G\'s" (a label: amplitude_div)',
+        HEADINGS.replace("pk-pk [um]", "[G's]"),
+        "runs.csv, row 1, column 1X Ampl. [G's]: found \"1X Ampl. [G's]\", expected a unit of vibration, "
+        'such as um pp or mm/s rms, not "G\'s" (a label: amplitude_div)',
     ),
     "a vector of a weight": (
         WIDE_VECTORS.replace("B", "Trial weight"),
-        "runs.csv, row 1, column Trial weight: found 'Trial weight', expected a known column: run, speed_rpm, "
-        "speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, phase_deg and repeat; "
-        "remarks go into 'note'",
+        "runs.csv, row 1, column Trial weight: found 'Trial weight', expected a known column: run, "
+        "speed_rpm, speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, phase_deg "
+        "and repeat; remarks go into 'note'",
     ),
     "a blank reading": (
         WIDE_VECTORS.replace("9,2 @ 347°", ""),
@@ -410,6 +410,7 @@ def test_a_phase_that_says_lag_must_be_what_the_job_says(tmp_path):
         assert read(tmp_path, text, phase=phase).conventions.labels.phase == phase
         other = {"lag": "lead", "lead": "lag"}[phase]
         assert f"expected phases that {other}, as the job says" in refused(tmp_path, text, phase=other)
+    (tmp_path / "runs.csv").write_text(DIRECTION, encoding="utf-8")
     with pytest.raises(InputError, match="expected phases that lead, as the job says or is assumed"):
         read_trials(tmp_path / "runs.csv", None)
 
@@ -497,9 +498,9 @@ def test_other_names_in_a_workbook(tmp_path):
         (
             'sensor = "Messstelle"',
             "",
-            "runs.csv, row 2, column Messstelle: found 'Messstelle', expected a known column: run, speed_rpm, "
-            "speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, phase_deg and "
-            "repeat; remarks go into 'note'\n"
+            "runs.csv, row 2, column Messstelle: found 'Messstelle', expected a known column: run, "
+            "speed_rpm, speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, "
+            "phase_deg and repeat; remarks go into 'note'\n"
             "runs.csv, row 2, column sensor: expected a column sensor; the columns are Lauf, Drehzahl, "
             "Messstelle, Ausschlag and Phase",
         ),
@@ -538,8 +539,7 @@ def test_an_edit_of_a_word_or_sign_changes_no_number(tmp_path, name, place, sign
     edited = text[:at] + sign + text[at if insert else at + 1 :]
     try:
         trials = read(tmp_path, edited).trials
-    except InputError as error:
-        assert str(tmp_path) in str(error)
+    except InputError:
         return
     amplitude, phase = trials.labels.vibration(trials.readings)
     if trials.labels.vibration_scale != 1 or name == "labels":
@@ -567,8 +567,7 @@ def test_a_damaged_line_is_refused_or_says_what_it_said(tmp_path, name, place, d
     expected = read(tmp_path, tidy_text(name)).trials
     try:
         found = read(tmp_path, "\n".join(lines) + "\n").trials
-    except InputError as error:
-        assert str(tmp_path) in str(error)
+    except InputError:
         return
     runs = [expected.runs.index(run) for run in found.runs]
     sensors = [expected.sensors.index(sensor) for sensor in found.sensors]
