@@ -93,7 +93,8 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
         plain = _DIRECTION.sub("", plain).strip(" ,;/")
     swing = _SWING.search(plain) if stem == "amplitude" else None
     base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_")
-    base = _SPELLINGS.get(base.casefold(), base if stem == "amplitude" else base.casefold())
+    folded = base.casefold()
+    base = _SPELLINGS.get(folded, base if stem == "amplitude" and not base.isupper() else folded)
     if not plain:
         return "", direction
     if stem != "amplitude":

@@ -227,7 +227,8 @@ def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
             continue
         sensor = heading.sensor if stem in READING and not (listed and heading.stem in ("", "vector")) else ""
         if sensor and listed:
-            raise _Unclear("either a column of the sensors' names, or columns for each sensor", heading)
+            words = f"as another column has the sensors: leave {sensor!r} out, or begin the name with note"
+            raise _Unclear(f"the {stem} alone, {words}", heading)
         other = found.setdefault(sensor, {}).setdefault(stem, column)
         if other is not column:
             words = f"and {other.heading.name!r} could be it too: begin the name of one with note"
@@ -264,8 +265,9 @@ def _assembled(grid: Grid, columns: Sequence[_Column]) -> Grid:
     wide, first = "" not in sensors, next(iter(sensors.values()))
     names = [*map(_name, first)]
     for own in sensors.values():
-        if [*map(_name, own)] != names:
-            raise _Unclear(f"the units of all sensors, {listing(names, 'and')}", own[0].heading)
+        for column, name in zip(own, names, strict=True):
+            if _name(column) != name:
+                raise _Unclear(f"the unit of all sensors, {name}", column.heading)
     rows = [
         (number, (*(c.cells[k] for c in common), *((name,) if wide else ()), *(c.cells[k] for c in own)))
         for k, (number, _) in enumerate(grid.rows)

@@ -45,7 +45,7 @@ CELLS_WITH_UNITS = """\
 Run\tSpeed\tSensor\tAmplitude\tPhase
 initial\t1000 rpm\tA\t7.2 um pp\t238°
 initial\t1000 rpm\tB\t13.5 µm p-p\t296 deg
-trial 1\t1000 rpm\tA\t4.9um_pp\t114°
+trial 1\t1000 rpm\tA\t4.9UM PP\t114°
 trial 1\t1000 rpm\tB\t9.2 um peak to peak\t347 °
 trial 2\t1000 RPM\tA\t4.0 um pp\t79 degrees
 trial 2\t1000 rpm\tB\t12.0 um pp\t292°
@@ -275,15 +275,15 @@ EXPLAINED = {
         "6.93 @ 98°: phases so small may be radians",
     ),
     "amplitude units differ": (
-        CELLS_WITH_UNITS.replace("4.9um_pp", "4.9 mil pp"),
+        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9 mil pp"),
         f"runs.csv, row 4, column Amplitude: found '4.9 mil pp', {ONE_UNIT.format('7.2 um pp')}",
     ),
     "an amplitude without its unit": (
-        CELLS_WITH_UNITS.replace("4.9um_pp", "4.9"),
+        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9"),
         f"runs.csv, row 4, column Amplitude: found '4.9', {ONE_UNIT.format('7.2 um pp')}",
     ),
     "peak or peak to peak": (
-        CELLS_WITH_UNITS.replace("4.9um_pp", "4.9um"),
+        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9um"),
         f"runs.csv, row 4, column Amplitude: found '4.9um', {ONE_UNIT.format('7.2 um pp')}",
     ),
     "a phase without its sign": (
@@ -340,13 +340,13 @@ EXPLAINED = {
     ),
     "sensors in a column and in headings": (
         WIDE.replace("run,", "run,sensor,").replace("\ninitial,", "\ninitial,A,").replace("\ntrial ", "\nt,"),
-        "runs.csv, row 1, column A_amplitude_um_pp: found 'A_amplitude_um_pp', expected either a column of "
-        "the sensors' names, or columns for each sensor",
+        "runs.csv, row 1, column A_amplitude_um_pp: found 'A_amplitude_um_pp', expected the amplitude alone, "
+        "as another column has the sensors: leave 'A' out, or begin the name with note",
     ),
     "a sensor in another unit": (
         WIDE.replace("B_amplitude_um_pp", "B_amplitude_mil_pp"),
-        "runs.csv, row 1, column B_amplitude_mil_pp: found 'B_amplitude_mil_pp', expected the units of all "
-        "sensors, amplitude_um_pp and phase_deg",
+        "runs.csv, row 1, column B_amplitude_mil_pp: found 'B_amplitude_mil_pp', expected the unit of all "
+        "sensors, amplitude_um_pp",
     ),
     "a reading without its sensor": (
         WIDE.replace("B_", ""),
