@@ -152,7 +152,7 @@ def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start
         start = _as_measured(influence, readings)
         last = _mounted_last(influence, trials, mounted)
         return start._replace(labels=trials.labels, mounted=last, warnings=notes)
-    variance = mean_covariance(trials, model.errors)[pick].mean(axis=0) / len(trials.runs)
+    variance = mean_covariance(trials, model)[pick].mean(axis=0) / len(trials.runs)
     start = _with_coefficients(
         influence, readings, trials.mean[pick], variance, mounted, _joined(model, known)
     )

@@ -16,7 +16,7 @@ import numpy as np
 
 from balancing.coefficients.repeatability import tail
 from balancing.data.reading_errors import error_model, mean_covariance, mean_variance
-from balancing.data.trials import ReadingErrors, Trials
+from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
 
@@ -26,7 +26,6 @@ UNLIKELY, FITS = 1e-3, 0.01
 """Probability of χ² below which a reading of the runs is contradicted, and above which it fits."""
 FAR = 10.0
 """Ratio of both χ² from which on the smaller one counts whatever the errors are."""
-_ASSUMED = ReadingErrors(amplitude=0.02, phase=float(np.radians(2.0)))
 _SAME = 1e-6
 
 
@@ -75,8 +74,7 @@ def convention_test(trials: Trials) -> ConventionTest:
         return ConventionTest("no redundant run")
     if np.linalg.matrix_rank(np.hstack((A, A.conj())), _SAME) == rank:
         return ConventionTest("weights in line")
-    errors = error_model(trials).errors or _ASSUMED
-    variance = mean_variance(mean_covariance(trials, errors))
+    variance = mean_variance(mean_covariance(trials, error_model(trials)))
     used = variance.any(axis=0)
     Y, variance = trials.mean[:, used].T, variance[:, used].T
     # a reading near zero would otherwise count infinitely much

@@ -270,12 +270,12 @@ def estimate_influence(trials: Trials) -> Influence:
     A = np.column_stack((np.ones(R), trials.weights)).astype(complex)
     Y = np.moveaxis(trials.mean, 0, -1)  # (S, C, R)
     merged = model.source == "assumed" and R > P + 1  # the runs themselves tell all errors in one
-    reading = mean_covariance(trials, None if merged else model.errors)
+    reading = mean_covariance(trials, None if merged else model)
     theta = np.einsum("scpr,scr->scp", _gain(A, reading, np.zeros(reading.shape[:3])), Y)
     run = _between_runs(trials, A, theta, reading, model)
     if merged:
         model, run = _as_readings(run, trials, model)
-        reading = mean_covariance(trials, model.errors)
+        reading = mean_covariance(trials, model)
     found, runs = _with_errors(trials, A, theta, reading, model, run)
     try:
         told = found.known_covariance if known(model) else found.digits
@@ -304,10 +304,10 @@ def estimate_like(trials: Trials, other: Influence) -> Influence:
         Coefficients in which these runs, or more of them, took part.
     """
     A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
-    reading = mean_covariance(trials, other.errors)
+    model = ErrorModel(other.errors, other.reading_dof, other.error_source)
+    reading = mean_covariance(trials, model)
     G = _gain(A, reading, np.zeros(reading.shape[:3]))
     theta = np.einsum("scpr,scr->scp", G, np.moveaxis(trials.mean, 0, -1))
-    model = ErrorModel(other.errors, other.reading_dof, other.error_source)
     return _with_errors(trials, A, theta, reading, model, other.run_errors)[0]
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.reading_errors import ErrorModel, mean_variance, reading_covariance
+from balancing.data.reading_errors import ErrorModel, covariance_beside_digits, mean_variance
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.regression import stretch
@@ -75,8 +75,7 @@ def _noticeable(trials: Trials, group: list[int], model: ErrorModel, *, largest:
     worst, pair = 0.0, None
     relative, floor = trials.run_errors or (0.0, 0.0)
     variance = (relative * np.abs(Y)) ** 2 + floor**2
-    if model.errors is not None:
-        variance += mean_variance(reading_covariance(Y, model.errors))
+    variance += mean_variance(covariance_beside_digits(trials, model))
     top = np.abs(Y).max() if largest else np.abs(Y[group]).max(axis=(0, 2))[:, None]
     for k, a in enumerate(group):
         for b in group[k + 1 :]:
@@ -102,7 +101,8 @@ def _beyond_errors(trials: Trials, group: list[int], model: ErrorModel) -> Diffe
     """χ² of the readings around their mean, with the mean covariance of the group."""
     assert model.errors is not None
     Y, repeats = trials.mean[group], trials.repeats[group]
-    each = reading_covariance(Y, both_directions(model.errors))
+    every = covariance_beside_digits(trials, replace(model, errors=both_directions(model.errors)))
+    each = every[group] * repeats[..., None, None]
     root = _inverse_root(each.mean(axis=0))  # (S, C, 2, 2), zero where every reading is
     mean = np.sum(Y * repeats, axis=0) / repeats.sum(axis=0)
     squares = _squares(root, Y - mean, repeats)

@@ -19,6 +19,7 @@ in the correction planes explains is found by fitting d = W δ.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +36,7 @@ from balancing.coefficients.run_errors import (
 from balancing.correction.check_run_result import CheckComparison
 from balancing.correction.correction_result import Correction
 from balancing.correction.refine_coefficients import mounted_in
-from balancing.data.reading_errors import error_model, reading_covariance, symmetric
+from balancing.data.reading_errors import covariance_beside_digits, error_model, symmetric
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
@@ -86,16 +87,17 @@ def compare_check(
     predicted = before + np.einsum("scp,rp->rsc", W, T)
     achieved = check.mean
     own = error_model(check)
-    # repeats of the check runs themselves tell most about their errors
-    by_repeats = own.source in ("repeats", "stated, enlarged by repeats")
+    # the check runs themselves tell most about their errors, by repeats or what the instrument measured
+    by_own = own.source in ("measured", "repeats", "stated, enlarged by repeats")
     errors, dof = start.model.errors, start.model.dof
-    warnings = check.warnings + (own.warnings if by_repeats else ())
+    warnings = check.warnings + (own.warnings if by_own else ())
     covariance = distance = chi_square = probability = explained = change = None
     if errors is not None and start.covariance is not None:
-        degrees = [d for d in (dof, own.dof if by_repeats else None) if d is not None]
+        degrees = [d for d in (dof, own.dof if by_own else None) if d is not None]
         dof = min(degrees, default=None)
-        used = own.errors if by_repeats and own.errors is not None else errors
-        single = reading_covariance(predicted, both_directions(used)) / check.repeats[..., None, None]
+        used = own.errors if by_own and own.errors is not None else errors
+        reading = replace(own if by_own else start.model, errors=both_directions(used))
+        single = covariance_beside_digits(check, reading, predicted)
         single += (_EXACT * np.abs(before).max()) ** 2 * np.eye(2)
         further = run_columns(influence.run_errors, runs_of(predicted, T, W))
         V, common, parameters = _joint(start, pick, T, single, further)

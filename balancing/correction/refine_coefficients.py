@@ -14,7 +14,7 @@ of the total hold.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -194,33 +194,46 @@ def _joined(
 ) -> Trials:
     """Trial and check runs as one table, at speeds and sensors (indices of the trial runs') that all have."""
     names, planes, weights = runs_and_weights(trials, checks, corrections)
-    blocks = [trials.readings[:, :, rows][..., columns]]
-    steps = [_steps(trials)[:, :, :, rows][..., columns]]
+    tables, picks = (trials, *checks), [(rows, columns)]
     for check in checks:
         speeds = match_speeds(check.speeds, trials.speeds, "trial runs")
         sensors = sensors_in(check, trials)
-        at, of = [speeds.index(s) for s in rows], [sensors.index(c) for c in columns]
-        blocks.append(check.readings[:, :, at][..., of])
-        steps.append(_steps(check)[:, :, :, at][..., of])
-    rounded = any(each.steps is not None for each in (trials, *checks))
+        picks.append(([speeds.index(s) for s in rows], [sensors.index(c) for c in columns]))
+
+    def of_all(arrays: Iterable[AnyArray]) -> AnyArray:
+        return _side_by_side([a[..., at, :][..., of] for a, (at, of) in zip(arrays, picks, strict=True)])
+
+    rounded = any(each.steps is not None for each in tables)
+    measured = any(each.covariance is not None for each in tables)
     return Trials(
         runs=names,
         speeds=trials.speeds[rows],
         sensors=tuple(trials.sensors[c] for c in columns),
         planes=planes,
-        readings=_side_by_side(blocks),
+        readings=of_all(each.readings for each in tables),
         weights=weights,
-        errors=next((each.errors for each in (trials, *checks) if each.errors is not None), None),
-        run_errors=next((each.run_errors for each in (trials, *checks) if each.run_errors is not None), None),
+        errors=next((each.errors for each in tables if each.errors is not None), None),
+        run_errors=next((each.run_errors for each in tables if each.run_errors is not None), None),
         labels=trials.labels,
-        warnings=tuple(dict.fromkeys(word for each in (trials, *checks) for word in each.warnings)),
-        steps=_side_by_side(steps) if rounded else None,
+        warnings=tuple(dict.fromkeys(word for each in tables for word in each.warnings)),
+        steps=of_all(map(_steps, tables)) if rounded else None,
+        covariance=of_all(_covariances(tables)) if measured else None,
     )
 
 
 def _steps(trials: Trials) -> FloatArray:
     """Of readings that are not rounded: zero."""
     return np.zeros((2, *trials.readings.shape)) if trials.steps is None else trials.steps
+
+
+def _covariances(tables: Sequence[Trials]) -> list[FloatArray]:
+    """As measured; of a table without them zero where errors are stated, else the mean of the others."""
+    known = [np.nanmean(each.covariance[[0, 1], [0, 1]]) for each in tables if each.covariance is not None]
+    variance = 0.0 if any(each.errors is not None for each in tables) else np.mean(known)
+    usual = variance * np.eye(2)[..., None, None, None, None]
+    return [
+        np.tile(usual, each.readings.shape) if each.covariance is None else each.covariance for each in tables
+    ]
 
 
 def _side_by_side(blocks: Sequence[AnyArray]) -> AnyArray:

@@ -236,10 +236,15 @@ def verdict_of_check(
     pick = np.ix_(at, [influence.sensors.index(name) for name in check.sensors])
     known = influence.part(at, [influence.sensors.index(name) for name in check.sensors])
     name = check.runs[run]
-    one = check.readings[:, [range(len(check.runs))[run]]]
-    steps = None if check.steps is None else check.steps[:, :, [range(len(check.runs))[run]]]
+    only = [range(len(check.runs))[run]]
     bare = replace(
-        check, runs=(name,), readings=one, steps=steps, planes=(), weights=np.zeros((1, 0), dtype=complex)
+        check,
+        runs=(name,),
+        readings=check.readings[:, only],
+        steps=None if check.steps is None else check.steps[:, :, only],
+        covariance=None if check.covariance is None else check.covariance[:, :, :, only],
+        planes=(),
+        weights=np.zeros((1, 0), dtype=complex),
     )
     start = starting_point(known, bare)
     warnings = start.warnings

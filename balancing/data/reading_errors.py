@@ -17,6 +17,10 @@ Rules:
    (`balancing.coefficients.influence`).
 4. Otherwise 2 % and 2° are assumed, and named so.
 
+Deviations of each reading that the instrument measured (`Trials.covariance`) count as stated errors do, and
+add to them where both are there. Readings that have none beside others that do (a check run typed by hand)
+have the root mean square of theirs.
+
 The mean of n repeats has 1/n of the variance of one reading. The digits in which a reading is written add an
 error that repeats do not make smaller. What changes from run to run: `balancing.coefficients.run_errors`.
 """
@@ -32,7 +36,9 @@ from numpy.typing import ArrayLike
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-Source = Literal["stated", "repeats", "stated, enlarged by repeats", "residuals", "assumed", "unknown"]
+Source = Literal[
+    "stated", "repeats", "stated, enlarged by repeats", "measured", "residuals", "assumed", "unknown"
+]
 
 ASSUMED = ReadingErrors(amplitude=0.02, phase=float(np.deg2rad(2.0)))
 """Of a reading, where nothing says more."""
@@ -51,9 +57,10 @@ class ErrorModel:
     Attributes
     ----------
     errors
-        None: unknown (stored coefficients without errors).
+        None: unknown (stored coefficients without errors). Where they are measured, their root mean square:
+        each reading has its own.
     dof
-        Degrees of freedom of the estimated errors; None for stated errors (taken as known).
+        Degrees of freedom of the estimated errors; None for stated and measured errors (taken as known).
     source
         In words.
     warnings
@@ -83,10 +90,10 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
     z = np.asarray(readings, dtype=complex)
     size = np.abs(z)
     floor = errors.floor**2
-    return _turned(z, (errors.amplitude * size) ** 2 + floor, (errors.phase * size) ** 2 + floor)
+    return turned(z, (errors.amplitude * size) ** 2 + floor, (errors.phase * size) ** 2 + floor)
 
 
-def _turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
+def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
     size = np.abs(z)
     unit = np.where(size > 0, z, 1.0) / np.where(size > 0, size, 1.0)
@@ -124,12 +131,33 @@ def hermitian(covariance: FloatArray) -> ComplexArray:
     return np.asarray((real + 1j * imaginary) / 2)
 
 
-def mean_covariance(trials: Trials, errors: ReadingErrors | None) -> FloatArray:
-    """Covariance (R, S, C, 2, 2) of the means of repeated readings; without errors that of their digits."""
+def mean_covariance(trials: Trials, model: ErrorModel | None) -> FloatArray:
+    """Covariance (R, S, C, 2, 2) of the means of repeated readings; without a model that of their digits."""
     rounding = _rounding(trials)
-    if errors is None:
-        return rounding
-    return reading_covariance(trials.mean, errors) / trials.repeats[..., None, None] + rounding
+    return rounding if model is None else covariance_beside_digits(trials, model) + rounding
+
+
+def covariance_beside_digits(
+    trials: Trials, model: ErrorModel, near: ComplexArray | None = None
+) -> FloatArray:
+    """Covariance (R, S, C, 2, 2) of the means of repeated readings, but for their digits.
+
+    Parameters
+    ----------
+    trials
+        The readings.
+    model
+        Their errors; zero where they are not known.
+    near
+        What they should be, (R, S, C), of which errors are so many percent; None: their means.
+    """
+    count, own = trials.repeats[..., None, None], trials.covariance
+    found = np.zeros((*trials.repeats.shape, 2, 2))
+    if model.errors is not None and (own is None or model.source != "measured"):
+        found = reading_covariance(trials.mean if near is None else near, model.errors) / count
+    if own is not None:
+        found = found + np.moveaxis(np.nansum(own, axis=2), (0, 1), (-2, -1)) / count**2
+    return found
 
 
 def _rounding(trials: Trials) -> FloatArray:
@@ -138,7 +166,7 @@ def _rounding(trials: Trials) -> FloatArray:
     if trials.steps is None:
         return np.zeros((*mean.shape, 2, 2))
     amplitude, phase = np.nanmean(trials.steps, axis=1) / np.sqrt(12.0)
-    return _turned(mean, amplitude**2, (phase * np.abs(mean)) ** 2)
+    return turned(mean, amplitude**2, (phase * np.abs(mean)) ** 2)
 
 
 def error_model(trials: Trials) -> ErrorModel:
@@ -146,17 +174,26 @@ def error_model(trials: Trials) -> ErrorModel:
     stated = trials.errors
     if stated is not None:
         return _checked_by_repeats(trials, stated)
+    said: tuple[str, ...] = ()
+    if trials.covariance is not None:
+        contradiction = _contradiction(trials, None)
+        if contradiction is None:
+            variance = np.nanmean(trials.covariance[[0, 1], [0, 1]])
+            return ErrorModel(ReadingErrors(floor=float(np.sqrt(variance))), source="measured")
+        said = (
+            f"repeated readings scatter {contradiction[0]:.2g} times as much as the measured standard "
+            "deviations: their scatter was added",
+        )
     scatter = _scatter(trials)
     if scatter is None:
-        return ErrorModel(ASSUMED, source="assumed")
+        return ErrorModel(ASSUMED, source="assumed", warnings=said)
     radial, tangential, dof = scatter
     if max(radial, tangential) < EQUAL:
         words = "all repeated readings are equal to the last digit: they say nothing about the errors"
-        return ErrorModel(ASSUMED, source="assumed", warnings=(words,))
-    said: tuple[str, ...] = ()
+        return ErrorModel(ASSUMED, source="assumed", warnings=(*said, words))
     if min(radial, tangential) < EQUAL:  # read in whole degrees, say
         equal, other = ("amplitudes", "phases") if radial < EQUAL else ("phases", "amplitudes")
-        said = (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
+        said += (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
         radial = tangential = max(radial, tangential)
     return ErrorModel(ReadingErrors(amplitude=radial, phase=tangential), dof, "repeats", said)
 
@@ -182,21 +219,35 @@ def _scatter(trials: Trials) -> tuple[float, float, int] | None:
     return float(radial), float(tangential), dof
 
 
-def _checked_by_repeats(trials: Trials, stated: ReadingErrors) -> ErrorModel:
+def _contradiction(trials: Trials, stated: ReadingErrors | None) -> tuple[float, int] | None:
+    """How many times more repeats scatter than stated and measured errors explain; degrees of freedom."""
     from scipy.special import chdtri
 
     deviation, mean, count = _groups(trials)
     size = np.abs(mean)
-    along = deviation / (np.where(size > 0, mean, 1.0) / np.where(size > 0, size, 1.0))
-    covariance = reading_covariance(size, stated)
+    unit = np.where(size > 0, mean, 1.0) / np.where(size > 0, size, 1.0)
+    along, covariance = deviation / unit, np.zeros((*size.shape, 2, 2))
+    if stated is not None:
+        covariance += reading_covariance(size, stated)
+    if trials.covariance is not None:
+        own = np.nanmean(trials.covariance[..., trials.repeats > 1], axis=2)
+        turn = np.array([[unit.real, -unit.imag], [unit.imag, unit.real]])
+        covariance += np.einsum("jig,jkg,klg->gil", turn, own, turn)
     chi_square, dof = 0.0, 0
     for part, variance in ((along.real, covariance[..., 0, 0]), (along.imag, covariance[..., 1, 1])):
         known = variance > 0
         chi_square += float(np.nansum(part[:, known] ** 2 / variance[known]))
         dof += int(np.sum(count[known] - 1))
+    if dof == 0 or chi_square <= float(chdtri(dof, 1 - CONTRADICTION)):
+        return None
+    return float(np.sqrt(chi_square / dof)), dof
+
+
+def _checked_by_repeats(trials: Trials, stated: ReadingErrors) -> ErrorModel:
     errors, degrees, warnings = stated, None, list[str]()
-    if dof > 0 and chi_square > float(chdtri(dof, 1 - CONTRADICTION)):
-        ratio = float(np.sqrt(chi_square / dof))
+    contradiction = _contradiction(trials, stated)
+    if contradiction is not None:
+        ratio, dof = contradiction
         errors = ReadingErrors(stated.amplitude * ratio, stated.phase * ratio, stated.floor * ratio)
         degrees = dof
         warnings.append(

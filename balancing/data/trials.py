@@ -84,6 +84,9 @@ class Trials:
         Steps in which the readings are written, of the amplitude (SI) and of the phase (rad): an instrument
         that shows whole degrees rounds by up to half of one. Shape (2, K, R, S, C), or (2, R, S, C) for
         K = 1, NaN where there is no reading; None where they are not rounded.
+    covariance
+        Of real and imaginary part of each reading, as its instrument measured it: shape (2, 2, K, R, S, C),
+        NaN where there is no reading; None: nothing measured it.
 
     Raises
     ------
@@ -102,6 +105,7 @@ class Trials:
     warnings: tuple[str, ...] = ()
     run_errors: RunScatter | None = None
     steps: FloatArray | None = None
+    covariance: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for name in ("runs", "sensors", "planes"):
@@ -130,6 +134,8 @@ class Trials:
             object.__setattr__(self, name, array)
         if self.steps is not None:
             object.__setattr__(self, "steps", self._checked_steps(self.steps))
+        if self.covariance is not None:
+            object.__setattr__(self, "covariance", self._checked_covariance(self.covariance))
 
     def _checked_steps(self, given: FloatArray) -> FloatArray:
         steps = np.array(given, dtype=np.float64)
@@ -144,6 +150,15 @@ class Trials:
         steps[:, missing] = np.nan
         steps.flags.writeable = False
         return steps
+
+    def _checked_covariance(self, given: FloatArray) -> FloatArray:
+        covariance, wanted = np.array(given, dtype=np.float64), (2, 2, *self.readings.shape)
+        missing = np.isnan(self.readings)
+        if covariance.shape != wanted or not (missing | np.isfinite(covariance)).all():
+            raise ValueError(f"covariance must be finite, of shape {wanted}, or None; got {covariance.shape}")
+        covariance[:, :, missing] = np.nan
+        covariance.flags.writeable = False
+        return covariance
 
     def _check_readings(self, readings: ComplexArray) -> None:
         missing = np.isnan(readings)

@@ -175,7 +175,7 @@ class RunReadings:
         Y = trials.mean
         R, S, C = Y.shape
         model = error_model(trials)
-        reading = mean_covariance(trials, model.errors)
+        reading = mean_covariance(trials, model)
         runs = runs_of(Y, trials.weights, W[..., :P])
         run = run_errors(trials, runs)
         columns = run_columns(run, runs)

@@ -35,6 +35,7 @@ from rotorid.cli.commands import (
     trial_weight,
     unbalance,
     validate,
+    vectors,
 )
 from rotorid.cli.terminal import markup_mode
 from rotorid.cli.verbose import verbosely
@@ -74,6 +75,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "modes": modes.modes,
         "calibrate": calibrate.calibrate,
     },
+    "Read instruments": {"vectors": vectors.vectors},
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
 for _job, _commands in _COMMANDS.items():

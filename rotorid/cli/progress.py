@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 import time
@@ -12,10 +13,22 @@ from rotorid.cli.terminal import dumb
 
 PATIENCE = 1.0
 """Seconds without a sign, on a terminal."""
+REDRAWN = 0.2
+"""Seconds after which the stage is shown anew."""
 FIRST_LINE = 10.0
 """Seconds before the first line where there is no terminal; each further line waits twice as long."""
 LONGEST_PAUSE = 60.0
 """Seconds between two lines at most."""
+
+
+class _Stage(logging.Handler):
+    """Keeps what the work last said of how far it is: to the logger `rotorid.progress`."""
+
+    text = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take a message."""
+        self.text = f", {record.getMessage()}"
 
 
 @contextmanager
@@ -30,26 +43,32 @@ def busy(what: str) -> Iterator[None]:
     what
         What takes so long.
     """
-    done = threading.Event()
+    done, stage = threading.Event(), _Stage()
+    log = logging.getLogger("rotorid.progress")
+    log.setLevel(logging.INFO)
+    log.propagate = False
+    log.addHandler(stage)
     show = _spinner if sys.stderr.isatty() and not dumb() else _lines
-    thread = threading.Thread(target=show, args=(what, done), daemon=True)
+    thread = threading.Thread(target=show, args=(what, done, stage), daemon=True)
     thread.start()
     try:
         yield
     finally:
+        log.removeHandler(stage)
         done.set()
         thread.join()
 
 
-def _lines(what: str, done: threading.Event) -> None:
+def _lines(what: str, done: threading.Event, stage: _Stage) -> None:
     """For a log, a pipe, or a terminal that cannot draw."""
     begun, pause = time.perf_counter(), FIRST_LINE
     while not done.wait(pause):
-        print(f"rotorid: {what}, {time.perf_counter() - begun:.0f} s so far", file=sys.stderr, flush=True)
+        seconds = f"{time.perf_counter() - begun:.0f} s so far"
+        print(f"rotorid: {what}{stage.text}, {seconds}", file=sys.stderr, flush=True)
         pause = min(2 * pause, LONGEST_PAUSE)
 
 
-def _spinner(what: str, done: threading.Event) -> None:
+def _spinner(what: str, done: threading.Event, stage: _Stage) -> None:
     """For a terminal: that it goes on, and the time."""
     if done.wait(PATIENCE):
         return
@@ -58,5 +77,6 @@ def _spinner(what: str, done: threading.Event) -> None:
 
     columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        shown.add_task(what, total=None)
-        done.wait()
+        task = shown.add_task(what, total=None)
+        while not done.wait(REDRAWN):
+            shown.update(task, description=what + stage.text)

@@ -63,6 +63,8 @@ class BalanceOptions:
         How the readings count; default: weighted where their errors are known, else least-squares.
     influence : FILE
         Stored influence coefficients, in place of trial runs.
+    waveforms : FILE
+        A waveforms file (.toml) of the runs, in place of the runs table.
     coefficients : KIND
         measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
         there are trial weights.
@@ -122,6 +124,7 @@ class BalanceOptions:
 
     method: str | None = None
     influence: Path | str | None = None
+    waveforms: Path | str | None = None
     coefficients: str | None = None
     model_error: float | None = None
     amplitude_error: float | None = None
@@ -352,7 +355,7 @@ def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
 
     stored = None if options.influence is None else Path(options.influence)
     errors = options.amplitude_error, options.phase_error, options.run_error
-    said = (options.phase, options.angles, *errors)
+    said = (options.phase, options.angles, *errors, options.waveforms)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
         return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*said))

@@ -77,6 +77,7 @@ def modes(data: Path | str, options: ModesOptions) -> ModesOfReadings:
     import numpy as np
 
     from rotorid.harmonic.modal.modal_fit import fit_modes
+    from rotorid.harmonic.modal.modal_readings import SteadyAnswers
     from rotorid.tables.data.measurements import read_amplitudes
 
     one_of(options.excitation, "--excitation", get_args(Excitation))
@@ -92,5 +93,6 @@ def modes(data: Path | str, options: ModesOptions) -> ModesOfReadings:
         excitation = excitation * experiments.frequencies**2
     points = [name for name in experiments.signals if name != "F"]
     with phase("modes"):
-        fitted = fit_modes(experiments, points, excitation, sections or None)
+        answers = SteadyAnswers(experiments.frequencies, excitation)
+        fitted = fit_modes(experiments, points, answers, sections or None)
     return ModesOfReadings(found=fitted, provenance=provenance([file], options))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import hashlib
 import inspect
 import logging
 import time
@@ -167,9 +166,9 @@ def provenance(
 
 def hash_of(file: Path) -> str:
     """SHA-256 of a file."""
-    from rotorid.tables.reader.input_file import file_content
+    from rotorid.tables.reader.input_file import sha256
 
-    return hashlib.sha256(file_content(file)).hexdigest()
+    return sha256(file)
 
 
 def text_of(file: object) -> str:

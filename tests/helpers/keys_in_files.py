@@ -6,6 +6,7 @@ from rotorid.samples import sample_data
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
+from rotorid.tables.waveforms import waveform_keys
 
 PAGE = sample_data().parent / "docs" / "files.md"
 TABLES = {
@@ -34,6 +35,8 @@ TABLES = {
     "key of a small model": small_model_file.SMALL_MODEL,
     "key of [[unbalance]]": small_model_file.UNBALANCE,
     "key of [[bow]]": small_model_file.BOW,
+    "key of a waveforms file": waveform_keys.WAVEFORMS,
+    "key of [channels.NAME]": waveform_keys.CHANNEL,
     **{f"key of [[{kind}]]": keys for kind, keys in node_forces.KEYS_OF_FORCE.items()},
 }
 

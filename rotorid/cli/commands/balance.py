@@ -26,7 +26,7 @@ from rotorid.workflows.balance import balance as work
         "best_planes": 1,
     },
     panels={
-        "Input and conventions": "phase angles amplitude_error phase_error run_error influence",
+        "Input and conventions": "phase angles amplitude_error phase_error run_error influence waveforms",
         "Method": "method planes speeds best_planes trade_off coefficients",
         "Limits": "max_mass limit",
         "Mounting": "split best",

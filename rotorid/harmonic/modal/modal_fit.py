@@ -12,7 +12,7 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.comparison import TRUSTED, whitening
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
-from rotorid.harmonic.modal.modal_readings import Readings
+from rotorid.harmonic.modal.modal_readings import Answers, Readings
 from rotorid.harmonic.modal.modal_result import FittedModes
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 
@@ -32,8 +32,9 @@ ROUNDS = 3
 def fit_modes(
     experiments: Experiments,
     points: Sequence[str],
-    excitation: ComplexArray,
+    answers: Answers,
     bands: Sequence[tuple[float, float]] | None = None,
+    around: Sequence[tuple[float, float]] | None = None,
 ) -> FittedModes:
     """Fit modes to amplitudes around resonances.
 
@@ -43,11 +44,13 @@ def fit_modes(
         Harmonic tests with their errors; where none are stated, see `UNSTATED`.
     points
         Names of the signals.
-    excitation
-        Of each experiment, (n,), but for a factor: what a displacement far below all resonances follows.
+    answers
+        Of modes to what excites them, experiment by experiment.
     bands
         Frequencies around each resonance, rad/s: one mode in each, and nothing else counts. None: around
         each peak, and everything counts.
+    around
+        The same where everything counts; None: `peak_bands`.
 
     Raises
     ------
@@ -60,10 +63,10 @@ def fit_modes(
     if not read.any():
         raise ValueError("there are no readings in --bands")
     order = np.flatnonzero(read)[np.argsort(omega[read], kind="stable")]
-    experiments, excitation = experiments.take(order), excitation[order]
+    experiments, answers = experiments.take(order), answers.take(order)
     omega, Z = experiments.frequencies, experiments.table(points)
-    H = Z / excitation[:, None]
-    sections = _peaks(omega, H) if bands is None else sorted(bands)
+    H = Z / answers.excitation[:, None]
+    sections = sorted(bands or around or peak_bands(omega, H))
     if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
         raise ValueError("--bands overlap: each holds one mode")
     rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
@@ -77,17 +80,17 @@ def fit_modes(
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(rows) + 1)]
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
-    limits = [*((low / 2, 2 * high) for low, high in ends), *[(-1.0, 1.0)] * len(ends)]
+    limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
     bounds = dict(zip(names, limits, strict=True))
-    kinds = [experiments.errors] if experiments.errors else [*UNSTATED.values()]
+    kinds = [experiments.errors] if experiments.stated else [*UNSTATED.values()]
     found = [
-        _search(replace(experiments, errors=errors), points, excitation, q, bounds, experiments.stated)
+        _search(replace(experiments, errors=errors), points, answers, q, bounds, experiments.stated)
         for errors in kinds
     ]
     best = found[0] if found[-1][0] < found[0][0] + CLEARLY else found[-1]
     _, fit, readings, left = best
     trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
-    same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
+    same = "" if experiments.stated else list(UNSTATED)[found.index(best)]
     i, p = divmod(int(np.abs(left).argmax()), len(points))
     worst = points[p], float(omega[i]), float(np.abs(left[i, p]))
     return FittedModes(tuple(points), fit, ends, float(trend), worst, same, experiments, readings)
@@ -96,7 +99,7 @@ def fit_modes(
 def _search(
     experiments: Experiments,
     points: Sequence[str],
-    excitation: ComplexArray,
+    answers: Answers,
     q: FloatArray,
     bounds: Bounds,
     stated: bool,
@@ -105,7 +108,7 @@ def _search(
     fitted = Z = experiments.table(points)
     for turn in range(ROUNDS):
         root, _ = whitening(experiments, tuple(points), fitted)
-        readings = Readings(experiments.frequencies, excitation, Z, root)
+        readings = Readings(answers, Z, root)
         fit = nonlinear_least_squares(
             partial(readings.rows, 0),
             partial(readings.rows, 1),
@@ -126,11 +129,29 @@ def _search(
     return float(likelihood * fit.estimate.dof / 2), fit, readings, left
 
 
-def _peaks(omega: FloatArray, H: ComplexArray) -> list[tuple[float, float]]:
-    """Frequencies around each peak of all points together, each point in its own size."""
+def peak_bands(
+    omega: FloatArray, H: ComplexArray, noise: FloatArray | float = 0.0
+) -> list[tuple[float, float]]:
+    """Frequencies around each peak of all points together, each point in its own size.
+
+    Parameters
+    ----------
+    omega
+        Rising, rad/s, (n,).
+    H
+        Responses (n, P).
+    noise
+        Size (n, P) of what in these is no peak.
+
+    Raises
+    ------
+    ValueError
+        Where there is no peak.
+    """
     from scipy.signal import find_peaks
 
-    level = np.log(np.nanmean((np.abs(H) / np.nanmax(np.abs(H), axis=0)) ** 2, axis=1)) / 2
+    size = np.hypot(np.abs(H), noise) / np.nanmax(np.abs(H), axis=0)
+    level = np.log(np.nanmean(size**2, axis=1)) / 2
     found = find_peaks(level, prominence=np.log(PROMINENCE))[0]
     if not len(found):
         raise ValueError(

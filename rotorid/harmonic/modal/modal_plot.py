@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -26,7 +25,11 @@ ROW, LINE, LETTERS = 2.2, 0.17, 105
 
 def figure_modes(found: FittedModes) -> Figure:
     """A row a mode: readings and fit in the complex plane, where a mode is a circle, and over frequency."""
-    k, omega, force = min(len(found.ends), MODES), found.readings.omega, found.experiments.signals.get("F")
+    k, omega, force = (
+        min(len(found.ends), MODES),
+        found.readings.answers.omega,
+        found.experiments.signals.get("F"),
+    )
     misfit = [r @ r / max(len(r), 1) for r in found.readings.each(0, found.fit.estimate.solution)]
     points = [int(p) for p in sorted(np.argsort(misfit)[-POINTS:])]
     seen = np.any([(low <= omega) & (omega <= high) for low, high in found.ends[:k]], axis=0)
@@ -62,10 +65,8 @@ def _draw_mode(found: FittedModes, mode: int, points: list[int], circle: Axes, p
     rows, force = (data.frequencies >= low) & (data.frequencies <= high), force / force[0]
     omega, read = data.frequencies[rows], unit.scale * (found.readings.Z / force[:, None])[rows]
     grid = np.unique(np.concatenate((np.linspace(low, high, CURVE_POINTS), omega)))
-    # between readings over ω², of which the force of an unbalance is a straight line
-    excitation = np.interp(grid**2, data.frequencies**2, found.readings.excitation / force)
-    basis = replace(found.readings, omega=grid, excitation=excitation).basis(q)[0]
-    fit = unit.scale * basis @ np.transpose(found.readings.each(2, q))
+    fit = found.readings.answers.at(grid).basis(q)[0] @ np.transpose(found.readings.each(2, q))
+    fit = unit.scale * fit / np.interp(grid**2, data.frequencies**2, force)[:, None]
     for p, color, marker, line in zip(points, COLORS, MARKERS, map(look, range(POINTS)), strict=False):
         mark = {"ls": "", "marker": marker, "mfc": "none", "ms": np.clip(120 / len(omega), 3, 6)}
         z, x, ends = fit[:, p], read[:, p], np.stack((read[:, p], fit[np.searchsorted(grid, omega), p]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -72,9 +73,30 @@ class FittedModes(Answered):
         """R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for `unit`."""
         return self._residues(self.readings)
 
+    def predicted(self, columns: Callable[[FloatArray], ComplexArray]) -> tuple[ComplexArray, FloatArray]:
+        """Sums of R, a and b, weighted by columns (m, k + 2) of q: (m, P), and covariances of their parts.
+
+        NaN covariances, (m, P, 2, 2), where errors are unknown.
+        """
+        readings, estimate = self.readings, self.fit.estimate
+
+        def sums(q: FloatArray) -> ComplexArray:
+            return columns(q) @ np.transpose(readings.each(2, q))
+
+        q = estimate.solution
+        steps = 1e-6 * np.diag(np.maximum(np.abs(q), 1e-4))
+        slopes = np.stack([(sums(q + d) - sums(q - d)) / (2 * d.sum()) for d in steps], axis=-1)
+        by_q = np.stack((slopes.real, slopes.imag), axis=-2)
+        unknown = np.full((q.size, q.size), np.nan)
+        own = unknown if self.fit.estimate.covariance is None else np.nan_to_num(self.fit.estimate.covariance)
+        rows = np.stack((columns(q), 1j * columns(q)), axis=-1)
+        rows = np.stack((rows.real, rows.imag), axis=1)
+        linear = np.einsum("miaj,pajbk,mnbk->mpin", rows, np.array(readings.each(3, q)), rows)
+        return sums(q), by_q @ own @ np.swapaxes(by_q, -1, -2) + self.unit * linear
+
     def _residues(self, readings: Readings) -> tuple[ComplexArray, FloatArray]:
         k, q = len(self.ends), self.fit.estimate.solution
-        return np.transpose(readings.each(2, q))[:k], np.swapaxes(readings.each(3, q), 0, 1)[:k]
+        return np.transpose(readings.each(2, q))[:k], np.einsum("piaib->ipab", readings.each(3, q))[:k]
 
     def _by_chance(self, readings: Readings) -> FloatArray:
         """Bound for the probability of each mode's residues in such readings, if there is no such mode."""
@@ -86,10 +108,19 @@ class FittedModes(Answered):
         return np.asarray((self.fit.estimate.dof + 1) * chdtrc(2 * len(self.points) + 2, size))
 
     @cached_property
+    def by_noise(self) -> FloatArray:
+        """Bound for the probability that noise alone makes each mode, (k,)."""
+        return self._by_chance(self.readings)
+
+    def told_at(self, omega: float) -> str:
+        """A frequency in the unit of the table."""
+        return f"{self.experiments.axis.scale * omega:.5g} {self.experiments.axis.word.rpartition(', ')[2]}"
+
+    @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words."""
         found = [] if self.fit.converged else [self.fit.message]
-        chance = self._by_chance(self.readings)
+        chance = self.by_noise
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
         told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
         for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
@@ -97,17 +128,17 @@ class FittedModes(Answered):
         ):
             if chance[mode - 1] > RARE:
                 found.append(
-                    f"mode {mode} ({omega:.5g} rad/s) is no more than noise: say in --bands where modes are"
+                    f"mode {mode} ({self.told_at(omega)}) is no more than noise: say in --bands where modes are"
                 )
             elif not 2 * error < high - low:
                 found.append(f"these readings do not tell frequency and damping of mode {mode}")
             elif self._by_chance(self.readings.without(omega, len(told) + 2))[mode - 1] > RARE:
                 found.append(
-                    f"mode {mode} ({omega:.5g} rad/s) stands on one frequency, perhaps a wild reading: "
+                    f"mode {mode} ({self.told_at(omega)}) stands on one frequency, perhaps a wild reading: "
                     "measure closer by, or say in --bands where modes are"
                 )
             elif not low < omega < high:
-                found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
+                found.append(f"mode {mode} ({self.told_at(omega)}) is read on one side only")
             elif zeta + 2 * other < 0:
                 found.append(f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads")
         return tuple(found)
@@ -146,7 +177,7 @@ class FittedModes(Answered):
         if (self.fit.estimate.dof + 1) * np.exp(-(size**2) / self.unit / 2) < RARE:
             off = size / self.unit**0.5
             misfits.append(
-                f"{point} at {omega:.5g} rad/s is {off:.2g} standard deviations off: a wild reading"
+                f"{point} at {self.told_at(omega)} is {off:.2g} standard deviations off: a wild reading"
             )
         if not self.fit.estimate.errors_stated and ndtr(-self.trend) < RARE:
             misfits.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")

@@ -19,6 +19,7 @@ from rotorid.tables.reader.settings_keys import Quantity
 from rotorid.tables.reader.text_file import read_bytes
 from rotorid.tables.runs.instrument_export import read_runs_grid
 from rotorid.tables.runs.stated_conventions import Conventions
+from rotorid.tables.waveforms.vectors_table import read_vectors_grid
 
 _SHEET = {"influence": "influence", "weights": "weights", "check_weights": "weights"}
 """Of a workbook that a job names for a table; all others are runs tables."""
@@ -95,6 +96,8 @@ def job_tables(source: JobSource, job: Job) -> JobTables:
             written.settings.pop("columns", None)  # the tables have the names of runs tables
             if not written.tables:
                 written.comments["settings"] = _comments(written.path, problems)
+        if source.overrides.waveforms is not None:
+            named["runs"] = Path(source.overrides.waveforms)
         tables = _grids({**named, **written.tables}, job.conventions, problems)
     problems.stop()
     _override(written.settings, source, job)
@@ -123,7 +126,10 @@ def _grids(sources: Mapping[str, Source], conventions: Conventions, problems: Pr
     out = {}
     for key, source in sources.items():
         sheet = _SHEET.get(key, "runs")
-        if key in READINGS:
+        if isinstance(source, Path) and source.suffix.lower() == ".toml":
+            found = read_vectors_grid(source, conventions.labels.phase, problems)
+            grid = None if found is None else found[0]
+        elif key in READINGS:
             grid = read_runs_grid(source, conventions, problems)
         else:
             grid = read_grid(source, sheet, problems, may_be_empty=sheet == "weights")

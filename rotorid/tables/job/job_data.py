@@ -35,6 +35,7 @@ class Overrides:
     amplitude_error_percent: float | None = None
     phase_error_deg: float | None = None
     run_error_percent: float | None = None
+    waveforms: str | Path | None = None
 
     def __post_init__(self) -> None:
         Labels(phase=as_phase(self.phase or "lead"))

@@ -24,6 +24,7 @@ def read_job(
     amplitude_error_percent: float | None = None,
     phase_error_deg: float | None = None,
     run_error_percent: float | None = None,
+    waveforms: str | Path | None = None,
 ) -> Job:
     """Read a job file (`.toml`) or a workbook (`.xlsx`, sheets runs, weights, planes, sensors, settings).
 
@@ -33,6 +34,8 @@ def read_job(
         The job; files that it names are found relative to it.
     phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
         Replace what the job says.
+    waveforms
+        A waveforms file, in place of the runs table.
 
     Returns
     -------
@@ -47,7 +50,9 @@ def read_job(
         If an argument is none of the allowed values.
     """
     path = Path(path)
-    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent)
+    overrides = Overrides(
+        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent, waveforms
+    )
     problems = Problems()
     written = open_job(path, problems)
     return job_of(path, written.top(problems), written.tables, overrides, problems)
@@ -62,6 +67,7 @@ def job_from_files(
     amplitude_error_percent: float | None = None,
     phase_error_deg: float | None = None,
     run_error_percent: float | None = None,
+    waveforms: str | Path | None = None,
 ) -> Job:
     """A job without a job file: a runs table with a weights table, or with stored coefficients.
 
@@ -74,6 +80,8 @@ def job_from_files(
     phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
         Conventions and stated errors; default: lead and with rotation, which the labels then call assumed;
         none stated.
+    waveforms
+        As of `read_job`.
 
     Returns
     -------
@@ -92,7 +100,9 @@ def job_from_files(
             "give a job (.toml or .xlsx), or a runs table and a weights table, or a runs table and "
             f"--influence with an influence table; got {counted(len(files), 'file')}"
         )
-    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent)
+    overrides = Overrides(
+        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent, waveforms
+    )
     if angles is not None:
         resolve_angles(angles, None)
     tables = {key: Path(file) for key, file in zip(("runs", "weights"), files, strict=False)}

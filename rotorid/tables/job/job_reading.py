@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from balancing.data.conventions import Labels
@@ -48,6 +49,9 @@ def job_of(
     folder = Path() if path is None else path.parent
     named = {key: folder / said[key] for key in TABLES if isinstance(said[key], str)}
     tables: dict[str, Source] = {**named, **sheets}
+    if overrides.waveforms is not None:
+        tables["runs"] = Path(overrides.waveforms)
+    overrides, records = _with_vectors(tables, overrides, said["phase"], problems)
     readings = read_readings(said, tables, overrides, problems)
     labels = Labels() if readings is None else readings.conventions.labels
     model = read_model(said, folder, labels, problems)
@@ -72,7 +76,7 @@ def job_of(
             trials=planes.trials,
             influence=readings.influence,
             conventions=readings.conventions,
-            files=tuple([file for file in read if isinstance(file, Path)]),
+            files=(*(file for file in read if isinstance(file, Path)), *records),
             planes=planes.names,
             limits=limits,
             row_weights=row_weights,
@@ -93,3 +97,22 @@ def job_of(
             key_phasor=labels.with_rotation(phasor),
         )
     )
+
+
+def _with_vectors(
+    tables: dict[str, Source], overrides: Overrides, phase: str | None, problems: Problems
+) -> tuple[Overrides, tuple[Path, ...]]:
+    """Put vectors in place of waveforms files, in the phase convention of the job, or else of these files.
+
+    Vectors know their sign, so that nothing is assumed: a job that says nothing writes lead.
+    """
+    files: list[Path] = []
+    for key in ("runs", "check", "slow_roll"):
+        path = tables.get(key)
+        if isinstance(path, Path) and path.suffix.lower() == ".toml":
+            from rotorid.tables.waveforms.vectors_table import read_vectors_grid
+
+            grid, phase, read = problems.need(read_vectors_grid(path, overrides.phase or phase, problems))
+            tables[key], files = grid, [*files, *read]
+            overrides = replace(overrides, phase=phase)
+    return overrides, tuple(files)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import stat
 import sys
 from collections.abc import Iterator
@@ -45,13 +46,39 @@ def file_content(path: Path) -> bytes:
             raise OSError(errno.EBADF, "it is closed", str(path))
         data = sys.stdin.buffer.read(MOST_BYTES + 1)
     else:
-        mode = path.stat().st_mode
-        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
-            raise OSError(errno.EINVAL, "it is no regular file; - is standard input", str(path))
-        with path.open("rb") as stream:
-            data = stream.read(MOST_BYTES + 1)
+        data = first_bytes(path, MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
     if seen is not None:
         seen[path] = data
     return data
+
+
+def first_bytes(path: Path, most: int) -> bytes:
+    """The beginning of a file, whether or not it was read before.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read or is no regular file.
+    """
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        raise OSError(errno.EINVAL, "it is no regular file; - is standard input", str(path))
+    with path.open("rb") as stream:
+        return stream.read(most)
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of what was read of a file; of the file as it is where it was mapped or read bit by bit.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    seen = _read.get() or {}
+    if path in seen or str(path) == STANDARD_INPUT:
+        return hashlib.sha256(file_content(path)).hexdigest()
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

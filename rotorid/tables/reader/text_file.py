@@ -34,14 +34,18 @@ def read_bytes(path: Path, problems: Problems) -> bytes | None:
     """The content of a file, or None and a problem."""
     try:
         return file_content(path)
-    except FileNotFoundError:
-        problems.add(str(path), None, None, None, f"a file that exists{_neighbour(path)}")
-    except IsADirectoryError:
-        problems.add(str(path), None, None, None, "a file, not a folder")
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        problems.add(str(path), None, None, None, f"a file that can be read ({reason})")
+        problems.add(str(path), None, None, None, readable(path, error))
     return None
+
+
+def readable(path: Path, error: OSError | ValueError) -> str:
+    """What is expected of a file that could not be read."""
+    if isinstance(error, FileNotFoundError):
+        return f"a file that exists{_neighbour(path)}"
+    if isinstance(error, IsADirectoryError):
+        return "a file, not a folder"
+    return f"a file that can be read ({getattr(error, 'strerror', None) or error})"
 
 
 def decode(source: str, data: bytes, problems: Problems) -> str | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
 
+from balancing.data.reading_errors import turned
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
@@ -26,7 +28,11 @@ COLUMNS = (
     Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
     PHASE,
     Column("repeat", required=False),
+    Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
+    Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
+UNUSED = re.compile(r"time_s|turns|(overall|gap)(_.+)?|order(?!1_)\d+(\.\d+)?_(amplitude|phase)(_.+)?")
+"""What `rotorid vectors` writes beside them."""
 
 
 _RUNS_NAMED, _SPEEDS_NAMED = 20, 10
@@ -48,13 +54,17 @@ def read_runs(
         Collects the complaints.
     """
     grid = read_runs_grid(source, conventions, problems)
-    table = None if grid is None else make_table(grid, COLUMNS, problems)
+    if grid is None:
+        return None, None
+    grid = replace(grid, header=tuple("" if UNUSED.fullmatch(name) else name for name in grid.header))
+    table = make_table(grid, COLUMNS, problems)
     if table is None:
         return None, None
     speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))
     table.must_be("speed", speed > 0, "a speed above 0")
     table.must_be("amplitude", amplitude >= 0, "an amplitude of 0 or more")
     table.must_be("phase", np.abs(phase) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    _complain_about_deviations(table)
     run, sensor = table.texts("run"), table.texts("sensor")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
     start = len(problems)
@@ -77,11 +87,14 @@ def read_runs(
     most = max((len(rows) for rows in cells.values()), default=1)
     written = np.array([table.steps("amplitude"), table.steps("phase")])
     readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
-    steps = np.full((2, *readings.shape), np.nan)
+    steps, covariance = np.full((2, *readings.shape), np.nan), np.full((2, 2, *readings.shape), np.nan)
+    across = np.where(amplitude > 0, amplitude * table.numbers("phase_std"), table.numbers("amplitude_std"))
+    measured = np.moveaxis(turned(values, table.numbers("amplitude_std") ** 2, across**2), 0, -1)
     for place, rows in cells.items():
         for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
             readings[(k, *place)] = values[row]
             steps[(slice(None), k, *place)] = written[:, row]
+            covariance[(..., k, *place)] = measured[..., row]
     labels = replace(
         conventions.labels,
         vibration_unit=table.unit("amplitude").name,
@@ -91,9 +104,23 @@ def read_runs(
         speed_unit=table.unit("speed").name,
     )
     nothing = np.zeros((len(runs), 0), dtype=complex)
-    return runs, Trials(
-        runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=merged, steps=steps
-    )
+    trials = Trials(runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=merged, steps=steps)
+    return runs, replace(trials, covariance=covariance) if "phase_std" in table else trials
+
+
+def _complain_about_deviations(table: Table) -> None:
+    """Standard deviations go together, and none is 0."""
+    stems = [stem for stem in ("amplitude_std", "phase_std") if stem in table]
+    if len(stems) == 1:
+        expected = "amplitude_std_… and phase_std_deg together: one alone does not tell how a reading errs"
+        table.in_header(table.fields[stems[0]].name, expected)
+        return
+    for stem in stems:
+        allowed = table.numbers(stem) > 0
+        table.must_be(stem, allowed, "a standard deviation above 0: nothing is measured exactly")
+    if stems and (unit := table.unit("amplitude")).kind != table.unit("amplitude_std").kind:
+        expected = f"a unit that converts to that of the amplitude, {unit.name or 'none'}"
+        table.in_header(table.fields["amplitude_std"].name, expected)
 
 
 def _repeat_order(table: Table) -> list[int]:

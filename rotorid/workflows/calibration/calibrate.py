@@ -193,5 +193,6 @@ def _candidates(readings: Sequence[RunReadings], speeds: Speeds | None) -> RunRe
         readings=blank,
         weights=np.zeros((1, len(trials.planes)), dtype=complex),
         steps=None,
+        covariance=None,
     )
     return replace(one, trials=bare)

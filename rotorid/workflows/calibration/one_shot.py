@@ -16,7 +16,8 @@ import numpy as np
 
 from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
 from balancing.coefficients.run_errors import runs_of
-from balancing.data.trials import ReadingErrors, Trials
+from balancing.data.reading_errors import error_model
+from balancing.data.trials import Trials
 from fem.model.rotor_parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
 from rotorid.calibration.run_readings import run_errors
@@ -186,7 +187,7 @@ def next_trial(
             influence.planes,
             np.stack((bare, bare + W @ one)),
             np.stack((0 * one, one)),
-            errors=influence.errors or job.trials.errors or ReadingErrors(0.02, np.radians(2.0)),
+            errors=influence.errors or error_model(job.trials).errors,
             run_errors=job.trials.run_errors,
         )
         rows = replace(runs, trials=two).rows(W)

@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 import fem
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.modal.modal_fit import fit_modes
+from rotorid.harmonic.modal.modal_readings import SteadyAnswers
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 from rotorid.tables.data.modes_table import read_modes
@@ -48,7 +49,8 @@ def measured(omega, Z, errors=None, drawn=None):
 
 
 def fitted(omega, experiments, bands=None):
-    return fit_modes(experiments, tuple(experiments.signals), np.ones(len(omega), dtype=complex), bands)
+    answers = SteadyAnswers(omega, np.ones(len(omega), dtype=complex))
+    return fit_modes(experiments, tuple(experiments.signals), answers, bands)
 
 
 def found(result):
@@ -260,7 +262,7 @@ def test_peaks_of_noise_are_no_modes():
     for _ in range(6):
         noise = rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)
         experiments = measured(omega, Z + 5e-3 * np.abs(Z).max(axis=0) * noise)
-        result = fit_modes(experiments, ("X1", "X2"), omega**2 + 0j)
+        result = fit_modes(experiments, ("X1", "X2"), SteadyAnswers(omega, omega**2 + 0j))
         assert len(result.ends) > 1
         assert result.warnings
         told += any("no more than noise" in words for words in result.undetermined)

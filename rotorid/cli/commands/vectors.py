@@ -1,0 +1,32 @@
+"""`rotorid vectors`: 1× and other orders of waveforms, as a runs table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.common_options import command
+from rotorid.cli.output import Destination
+from rotorid.workflows.waveforms.vectors import VectorsOptions
+from rotorid.workflows.waveforms.vectors import vectors as work
+
+
+@command(VectorsOptions)
+def vectors(
+    records: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORD…",
+            help="Records, .csv, .wav, .mat, .npz, .uff or .tdms, a run each; or one waveforms file (.toml).",
+        ),
+    ],
+    options: VectorsOptions,
+    to: Destination,
+) -> None:
+    """Vectors of 1× and other orders of waveforms with a tacho, with ±: a runs table for `balance`.
+
+    Example: rotorid vectors sample_data/waveforms/waveforms.toml --output runs.csv
+    """
+    to.deliver("vectors", lambda: work(records, options))

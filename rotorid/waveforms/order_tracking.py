@@ -1,0 +1,165 @@
+"""Vectors of orders along a record: a Vold–Kalman filter over turns.
+
+x = Σ_k Re(A_k(u) e^{2πiku}), u turns: the mean of the waveform (k = 0), 1×, 2× and so on, all together, so
+that no order leaks into another. Each A_k is a penalised spline (rotorid.waveforms.penalised_spline): where
+nothing moves its stiffness makes of it a mean over all turns, with a slope; where the speed passes a
+resonance it follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.waveforms.penalised_spline import (
+    SOFTEST,
+    Moments,
+    Smoothing,
+    along,
+    moments,
+    slopes,
+    smooth,
+    third_differences,
+    times,
+    weights,
+)
+
+KNOT, MOST_KNOTS = 2.0, 8000
+"""Turns between two knots; a longer record has more between."""
+PASSES = 2
+"""Penalties of all orders are chosen so often, each time with what the others explain taken off."""
+Parts = Callable[[], Iterator[tuple[FloatArray, FloatArray]]]
+"""Gives the record part by part: turns (L,), increasing, and samples (L, C)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orders:
+    """Complex amplitudes of orders 0 … K of C sensors along turns.
+
+    Attributes
+    ----------
+    first, knot
+        Turn of the first knot, and turns from knot to knot.
+    coefficients
+        Of the splines, (n + 3, K + 1, C).
+    smoothings
+        How stiff each is, [sensor][order].
+    density
+        Samples a turn, (n,).
+    """
+
+    first: float
+    knot: float
+    coefficients: ComplexArray
+    smoothings: tuple[tuple[Smoothing, ...], ...]
+    density: FloatArray
+
+    @property
+    def last(self) -> float:
+        """Turn of the last knot."""
+        return self.first + self.knot * len(self.density)
+
+    def _around(self, turns: FloatArray) -> tuple[IntArray, FloatArray]:
+        s = (turns - self.first) / self.knot
+        j = np.clip(s.astype(np.int64), 0, len(self.density) - 1)
+        return j, s - j
+
+    def at(self, turns: FloatArray) -> ComplexArray:
+        """Amplitudes at turns (P,), (P, K + 1, C)."""
+        return np.asarray(along(weights, self.coefficients, *self._around(turns)), dtype=complex)
+
+    def slope(self, turns: FloatArray) -> ComplexArray:
+        """Their change in a turn, (P, K + 1, C)."""
+        return np.asarray(along(slopes, self.coefficients, *self._around(turns)) / self.knot, dtype=complex)
+
+    def deviation(self, turns: FloatArray, order: int) -> FloatArray:
+        """Standard deviation of the real part, and of the imaginary one, (P, C), of one order."""
+        j, f = self._around(turns)
+        return np.transpose([own[order].deviation(weights(f), j) for own in self.smoothings])
+
+    def mean(self) -> tuple[ComplexArray, FloatArray]:
+        """Means over the record, and their standard deviations in each direction, (K + 1, C)."""
+        n = len(self.density)
+        row = np.convolve(np.ones(n), (1 / 24, 11 / 24, 11 / 24, 1 / 24)) / n
+        deviations = [
+            [own.deviation(row[None], np.zeros(1, dtype=np.int64))[0] for own in sensor]
+            for sensor in self.smoothings
+        ]
+        return np.tensordot(row, self.coefficients, 1), np.transpose(deviations)
+
+    def width(self, turns: FloatArray, order: int = 1) -> FloatArray:
+        """Turns that count around these, (P,): as many, evenly weighed, would leave the same error."""
+        noise = np.array([2 * own[order].variance for own in self.smoothings])
+        samples = np.median(noise / self.deviation(turns, order) ** 2, axis=1)
+        return np.asarray(samples / self.density[self._around(turns)[0]])
+
+
+def track_orders(parts: Parts, first: float, last: float, highest: int) -> Orders:
+    """Fit orders 0 to `highest` to a record between two turns.
+
+    Parameters
+    ----------
+    parts
+        See `Parts`.
+    first, last
+        Turns.
+    highest
+        Order.
+    """
+    n = int(np.clip(np.ceil((last - first) / KNOT), 1, MOST_KNOTS))
+    knot = (last - first) / n
+
+    def with_columns() -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+        for turns, samples in parts():
+            yield np.clip((turns - first) / knot, 0, n), _columns(turns, highest), samples
+
+    found = moments(with_columns(), n)
+    band, right = found.band(), found.sums()
+    alone = Moments(found.gram[:, :, :1, :, :1], found.right[:, :, :1]).band()
+    loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
+    M = 2 * highest + 1
+    start = _solved(band, [loose] * M, right)
+    coefficients, smoothings = [], list[tuple[Smoothing, ...]]()
+    for sensor in range(right.shape[2]):
+        c, b, own = start[:, :, sensor], right[:, :, sensor], list[Smoothing]()
+        for _ in range(PASSES):
+            left, own = b - times(band, c.reshape(-1)).reshape(c.shape), []
+            for k in range(highest + 1):
+                columns = slice(0, 1) if k == 0 else slice(2 * k - 1, 2 * k + 1)
+                gram = alone if k == 0 else alone / 2  # mean squares of cosine and sine
+                y = np.ascontiguousarray(left[:, columns] + times(gram, c[:, columns]))
+                own.append(smooth(gram, y)[0])
+            c = _solved(band, [own[(m + 1) // 2].penalty for m in range(M)], b)
+        coefficients.append(c)
+        smoothings.append(tuple(own))
+    c = np.stack(coefficients, axis=-1)
+    complex_ones = np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)
+    density = found.gram[:, :, 0, :, 0].sum(axis=(1, 2)) / knot
+    return Orders(first, knot, complex_ones, tuple(smoothings), density)
+
+
+def _columns(turns: FloatArray, highest: int) -> FloatArray:
+    """What mean, real and imaginary parts of orders multiply, (L, 2 K + 1)."""
+    out = np.ones((len(turns), 2 * highest + 1))
+    once = np.exp(2j * np.pi * (turns % 1.0))
+    power = once
+    for k in range(1, highest + 1):
+        out[:, 2 * k - 1], out[:, 2 * k] = power.real, -power.imag
+        power = power * once
+    return out
+
+
+def _solved(band: FloatArray, penalties: list[FloatArray], right: FloatArray) -> FloatArray:
+    """Coefficients (n + 3, M, …) of all columns together, each with its penalty (n,)."""
+    M = len(penalties)
+    matrix = band.copy()
+    for m, penalty in enumerate(penalties):
+        for below, line in enumerate(third_differences(penalty)):
+            matrix[below * M, m::M] += line
+    factor = cholesky_banded(matrix, lower=True)
+    flat = right.reshape(len(right) * M, -1)
+    return np.asarray(cho_solve_banded((factor, True), flat).reshape(right.shape))

@@ -1,0 +1,215 @@
+"""Penalised cubic splines: curves that move as slowly as the data allow, with their errors.
+
+Samples x_i ≈ Σ_m E_im c_m(s_i), where each c_m is a cubic spline with knots at the whole numbers of s and E
+holds known columns: ones for a curve, cosines and sines of the shaft's angle for orders. Then this is the
+Vold–Kalman filter of second generation (Feldbauer, Höldrich 2000) with splines in place of sample values. The
+penalty λ Σ w |Δ³c|² is chosen by restricted maximum likelihood, where the noise is that of the
+neighbourhood of each order: as its residual tells, with its colour. w follows how fast the curve moves:
+near a resonance the filter is wider. The errors are those of the Bayesian curve (Wahba 1983), which hold on
+the average along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.optimize import minimize_scalar
+
+from rotorid.base.arrays import AnyArray, FloatArray, IntArray
+
+TRACE, SOFTEST, STIFFEST = -22.0, -10.0, 30.0
+"""log λ, relative to the samples between two knots: what keeps knots solvable between which there are none,
+and the ends of what is chosen."""
+ROUNDS, NEIGHBOURS = 3, 12
+"""The weights of the penalty are found again so often, each from so many knots on either side."""
+EVENING = 0.1
+"""Share of the mean jump that is added to each, so that the weights stay finite."""
+
+
+def weights(f: FloatArray) -> FloatArray:
+    """What the four splines around s = j + f weigh, (…, 4), for 0 ≤ f ≤ 1."""
+    g = 1.0 - f
+    return np.stack((g**3, 4 - 6 * f**2 + 3 * f**3, 4 - 6 * g**2 + 3 * g**3, f**3), axis=-1) / 6
+
+
+def slopes(f: FloatArray) -> FloatArray:
+    """Their derivatives with respect to s, (…, 4)."""
+    g = 1.0 - f
+    return np.stack((-(g**2), -4 * f + 3 * f**2, 4 * g - 3 * g**2, f**2), axis=-1) / 2
+
+
+def along(shape: Callable[[FloatArray], FloatArray], c: AnyArray, j: IntArray, f: FloatArray) -> AnyArray:
+    """Splines (`weights`) or their slopes with coefficients c (n + 3, …) at j + f, (P,)."""
+    own = shape(f)
+    return np.asarray(sum((own[:, a] * c[j + a].T).T for a in range(4)))
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """All that the samples say about splines: sums over the intervals between knots.
+
+    Attributes
+    ----------
+    gram
+        Of the columns, (n, 4, M, 4, M) for n intervals.
+    right
+        Columns by samples, (n, 4, M, C).
+    """
+
+    gram: FloatArray
+    right: AnyArray
+
+    def band(self) -> FloatArray:
+        """Gram matrix of all coefficients (knot by knot, column by column), lower band for LAPACK."""
+        n, _, M = self.gram.shape[:3]
+        band = np.zeros((4 * M, (n + 3) * M))
+        for a in range(4):
+            for b in range(a + 1):
+                for m in range(M):
+                    for k in range(M):
+                        if (below := (a - b) * M + m - k) >= 0:
+                            band[below, b * M + k : (b + n) * M : M] += self.gram[:, a, m, b, k]
+        return band
+
+    def sums(self) -> AnyArray:
+        """Right-hand sides of all coefficients, (n + 3, M, C)."""
+        n, _, M, C = self.right.shape
+        out = np.zeros((n + 3, M, C), dtype=self.right.dtype)
+        for a in range(4):
+            out[a : a + n] += self.right[:, a]
+        return out
+
+
+def moments(parts: Iterable[tuple[FloatArray, FloatArray, FloatArray]], n: int) -> Moments:
+    """Sums over parts of a record: places s (L,), increasing, from 0 to n; columns (L, M); samples (L, C)."""
+    gram = right = None
+    for s, columns, samples in parts:
+        L, M = columns.shape
+        if gram is None or right is None:
+            gram, right = np.zeros((n, 4 * M, 4 * M)), np.zeros((n, 4 * M, samples.shape[1]))
+        j = np.minimum(s.astype(np.int64), n - 1)
+        design = (weights(s - j)[:, :, None] * columns[:, None, :]).reshape(L, 4 * M)
+        first, last = int(j[0]), int(j[-1])
+        ends = np.searchsorted(j, np.arange(first, last + 2))
+        for at, (low, high) in enumerate(pairwise(ends), start=first):
+            own = design[low:high]
+            gram[at] += own.T @ own
+            right[at] += own.T @ samples[low:high]
+    if gram is None or right is None:
+        raise ValueError("there are no samples")
+    M = gram.shape[1] // 4
+    return Moments(gram.reshape(n, 4, M, 4, M), right.reshape(n, 4, M, -1))
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothing:
+    """How stiff one curve is, and how noisy its neighbourhood.
+
+    Attributes
+    ----------
+    penalty
+        λ w of each third difference, (n,), over the variance of the samples.
+    variance
+        Of a sample, as the noise near this curve tells.
+    factor
+        Of Gram and penalty together, over the variance: Cholesky, banded, (4, n + 3).
+    """
+
+    penalty: FloatArray
+    variance: float
+    factor: FloatArray
+
+    def deviation(self, rows: FloatArray, at: AnyArray) -> FloatArray:
+        """Standard deviation of Σ rows · c from the knots `at` on, (P,), of rows (P, q)."""
+        n, out = self.factor.shape[1], np.empty(len(rows))
+        for part in range(0, len(rows), 256):
+            some = rows[part : part + 256]
+            own = np.zeros((n, len(some)))
+            index = at[part : part + 256, None] + np.arange(rows.shape[1])
+            np.add.at(own, (index, np.arange(len(some))[:, None]), some)
+            found = cho_solve_banded((self.factor, True), own)
+            out[part : part + 256] = np.sqrt(self.variance * np.einsum("np,np->p", own, found))
+        return out
+
+
+def third_differences(penalty: FloatArray) -> FloatArray:
+    """Dᵀ diag(penalty) D, lower band (4, n + 3), D of third differences."""
+    n, d = len(penalty), (-1.0, 3.0, -3.0, 1.0)
+    band = np.zeros((4, n + 3))
+    for a in range(4):
+        for b in range(a + 1):
+            band[a - b, b : b + n] += d[a] * d[b] * penalty
+    return band
+
+
+def times(band: FloatArray, c: AnyArray) -> AnyArray:
+    """A symmetric matrix, given by its lower band, times vectors (n, …)."""
+    out = (band[0] * c.T).T
+    for below, line in enumerate(band[1:], start=1):
+        out[below:] += (line[:-below] * c[:-below].T).T
+        out[:-below] += (line[:-below] * c[below:].T).T
+    return np.asarray(out)
+
+
+def smooth(
+    gram: FloatArray, right: AnyArray, total: float | None = None, count: int = 0
+) -> tuple[Smoothing, AnyArray]:
+    """Choose the penalty of one curve by restricted maximum likelihood.
+
+    Parameters
+    ----------
+    gram
+        Its Gram matrix, lower band (4, n + 3).
+    right
+        Right-hand side, real or complex, (n + 3,).
+    total, count
+        Sum of squares and number of the samples, whose noise is that of the curve; None: only the noise that
+        splines can follow counts, the one around an order.
+
+    Returns
+    -------
+    Smoothing
+        See there.
+    ndarray
+        Coefficients (n + 3,).
+    """
+    n = gram.shape[1] - 3
+    real = right.view(np.float64).reshape(n + 3, -1)
+    per = float(gram[0].mean())
+    if total is None:
+        # a trace of penalty keeps intervals solvable that hold little
+        loose = cholesky_banded(gram + third_differences(np.full(n, per * np.exp(TRACE))), lower=True)
+        total, count = float(np.vdot(real, cho_solve_banded((loose, True), real))), n * real.shape[1]
+    size, w = float(total), np.ones(n)
+
+    def solved(log: float) -> tuple[FloatArray, FloatArray, float]:
+        matrix = gram + third_differences(per * np.exp(log) * w)
+        factor = cholesky_banded(matrix, lower=True)
+        c = cho_solve_banded((factor, True), real)
+        # differences, for the stiff penalty would round what it takes of a curve that is nearly a parabola
+        bent = per * np.exp(log) * float(w @ (np.diff(c, 3, axis=0) ** 2).sum(axis=1))
+        rest = size - 2 * np.vdot(c, real) + np.vdot(c, times(gram, c)) + bent
+        return factor, c, max(float(rest), 1e-30 * size + 1e-300) / count
+
+    def likelihood(log: float) -> float:
+        factor, _, variance = solved(log)
+        return float(
+            real.shape[1] * (2 * np.log(np.abs(factor[0])).sum() - n * log) + count * np.log(variance)
+        )
+
+    for turn in range(ROUNDS):
+        best = minimize_scalar(
+            likelihood, bounds=(SOFTEST, STIFFEST), method="bounded", options={"xatol": 0.2}
+        )
+        factor, c, variance = solved(float(best.x))
+        if turn < ROUNDS - 1:
+            jump = (np.diff(c, 3, axis=0) ** 2).sum(axis=1)
+            near = np.convolve(jump, np.ones(2 * NEIGHBOURS + 1), "same")
+            w = 1 / (near + EVENING * near.mean() + 1e-300)
+            w /= np.exp(np.log(w).mean())
+    coefficients = np.ascontiguousarray(c).view(right.dtype)[:, 0]
+    return Smoothing(per * np.exp(float(best.x)) * w, variance, factor), coefficients

@@ -1,0 +1,1 @@
+"""From the instrument: vectors of waveforms, and what a run-up tells."""

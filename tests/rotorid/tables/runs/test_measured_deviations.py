@@ -1,0 +1,171 @@
+"""Runs tables with standard deviations of each reading, and what `rotorid vectors` writes beside them."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
+
+from balancing import estimate_influence
+from balancing.data.reading_errors import error_model
+from balancing.data.trials import ReadingErrors
+from rotorid.tables import read_job, read_trials
+
+JOB = 'phase = "lag"\nangles = "with rotation"\nruns = "runs.csv"\nweights = "weights.csv"\n'
+MEASURED = [
+    [*RUNS[0], "amplitude_std_um_pp", "phase_std_deg"],
+    *([*row, 0.05 + 0.01 * k, 0.4 + 0.1 * k] for k, row in enumerate(RUNS[1:])),
+]
+VECTORS = [
+    [
+        *MEASURED[0],
+        "time_s",
+        "turns",
+        "overall_um_pp",
+        "gap_um",
+        "order2_amplitude_um_pp",
+        "order2_phase_deg",
+    ],
+    *([*row, 1.5 * k, 120, 15.0, -250.0, 0.8, 12.0] for k, row in enumerate(MEASURED[1:])),
+]
+VECTORS[0] += ["order0.5_amplitude_um_pp", "order0.5_phase_deg"]
+for line in VECTORS[1:]:
+    line += ["", ""]  # what does not count may be missing
+
+
+@pytest.fixture
+def read(tmp_path):
+    def run(runs=MEASURED, weights=WEIGHTS, **options):
+        files = write_csv(tmp_path / "runs.csv", runs), write_csv(tmp_path / "weights.csv", weights)
+        return read_trials(*files, **options)
+
+    return run
+
+
+@pytest.fixture
+def job(tmp_path):
+    def run(runs=MEASURED, text=""):
+        write_csv(tmp_path / "runs.csv", runs)
+        write_csv(tmp_path / "weights.csv", WEIGHTS)
+        (tmp_path / "job.toml").write_text(JOB + text, encoding="utf-8")
+        return tmp_path / "job.toml"
+
+    return run
+
+
+@pytest.mark.parametrize("phase", ["lead", "lag"])
+def test_a_deviation_is_along_and_across_its_reading(read, phase):
+    covariance = read(phase=phase).covariance[:, :, 0, :, 0]
+    for k, (_, _, _, amplitude, degrees) in enumerate(RUNS[1:]):
+        along, across = 0.5e-6 * (0.05 + 0.01 * k), 0.5e-6 * amplitude * math.radians(0.4 + 0.1 * k)
+        u = cmath.rect(1, math.radians(degrees) * (1 if phase == "lead" else -1))
+        turn = np.array([[u.real, -u.imag], [u.imag, u.real]])
+        expected = turn @ np.diag([along**2, across**2]) @ turn.T
+        np.testing.assert_allclose(covariance[..., k // 2, k % 2], expected, rtol=1e-9)
+
+
+def test_nothing_is_assumed_then(read):
+    assert error_model(read()).source == "measured"
+    assert error_model(read(RUNS)).source == "assumed"
+    assert read(RUNS).covariance is None
+    assert estimate_influence(read()).error_source == "measured"
+    assert error_model(read(errors=ReadingErrors(0.01))).source == "stated"
+
+
+def test_another_unit_of_the_same_kind(read):
+    head = replaced(MEASURED, 1, "amplitude_std_um_pp", "amplitude_std_um")
+    peak = [head[0], *([*row[:5], row[5] / 2, row[6]] for row in MEASURED[1:])]
+    np.testing.assert_allclose(read(peak).covariance, read().covariance, rtol=1e-12)
+
+
+def test_a_label_serves_too(read):
+    rename = {"amplitude_um_pp": "amplitude_V", "amplitude_std_um_pp": "amplitude_std_V"}
+    volts = [[rename.get(name, name) for name in MEASURED[0]], *MEASURED[1:]]
+    np.testing.assert_allclose(read(volts).covariance, read().covariance * 4e12, rtol=1e-12)
+
+
+def test_at_amplitude_zero_it_is_alike_in_all_directions(read):
+    zero = replaced(MEASURED, 2, "amplitude_um_pp", 0.0)
+    np.testing.assert_allclose(
+        read(zero).covariance[:, :, 0, 0, 0, 0], (0.025e-6) ** 2 * np.eye(2), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("amplitude_std_um_pp", 0, "a standard deviation above 0: nothing is measured exactly"),
+        ("phase_std_deg", 0, "a standard deviation above 0"),
+        ("phase_std_deg", -0.5, "a standard deviation above 0"),
+        ("amplitude_std_um_pp", "", "a number"),
+        ("phase_std_deg", "few", "a number"),
+    ],
+)
+def test_none_is_zero_negative_or_missing(read, column, value, words):
+    problems = complaints(read, replaced(MEASURED, 4, column, value))
+    the_only(problems, "runs.csv", 4, column, str(value), words)
+
+
+@pytest.mark.parametrize("column", ["amplitude_std_um_pp", "phase_std_deg"])
+def test_both_or_neither(read, column):
+    at = MEASURED[0].index(column)
+    one = [row[:at] + row[at + 1 :] for row in MEASURED]
+    other = "phase_std_deg" if column.startswith("amplitude") else "amplitude_std_um_pp"
+    the_only(complaints(read, one), "runs.csv", 1, other, None, "amplitude_std_… and phase_std_deg together")
+
+
+def test_the_unit_of_another_quantity(read):
+    wrong = replaced(MEASURED, 1, "amplitude_std_um_pp", "amplitude_std_mm_s")
+    the_only(
+        complaints(read, wrong), "runs.csv", 1, "amplitude_std_mm_s", None, "that of the amplitude, um_pp"
+    )
+
+
+def test_a_table_of_vectors_is_a_runs_table(read):
+    plain, vectors = read(), read(VECTORS)
+    np.testing.assert_array_equal(vectors.readings, plain.readings)
+    np.testing.assert_array_equal(vectors.covariance, plain.covariance)
+    assert vectors.warnings == plain.warnings
+
+
+@pytest.mark.parametrize(
+    "name", ["order1_amplitude_um", "turn", "times_s", "order2", "order_2_amplitude_um", "gaps_um"]
+)
+def test_other_columns_are_unknown_as_before(read, name):
+    (problem,) = complaints(read, replaced(VECTORS, 1, "time_s", name))
+    assert (problem.row, problem.column) == (1, name)
+    assert problem.expected.startswith("a known column")
+
+
+def test_balance_names_them(job, cli):
+    errors = cli("balance", job(VECTORS), "--json").json["errors"]
+    squares = [
+        (0.05 + 0.01 * k) ** 2 + (row[3] * math.radians(0.4 + 0.1 * k)) ** 2 for k, row in enumerate(RUNS[1:])
+    ]
+    assert errors["source"] == "measured"
+    assert errors["floor"] == pytest.approx(math.sqrt(np.mean(squares) / 2), rel=1e-9)
+    assert errors["between_runs"]["source"] == "assumed"
+
+
+def test_check_runs_and_slow_roll_read_them(job, tmp_path):
+    at = {name: k for k, name in enumerate(VECTORS[0])}
+    check = [VECTORS[0], *(["check", *row[1:]] for row in VECTORS[1:3])]
+    slow = [VECTORS[0], *(["slow", 100, *row[2:]] for row in VECTORS[1:3])]
+    for row in slow[1:]:
+        row[at["amplitude_um_pp"]] = 0.5
+    write_csv(tmp_path / "check.csv", check)
+    write_csv(tmp_path / "slow.csv", slow)
+    found = read_job(job(VECTORS, 'check = "check.csv"\nslow_roll = "slow.csv"\n'))
+    plain = read_job(job(VECTORS, 'check = "check.csv"\n'))
+    np.testing.assert_array_equal(found.trials.covariance, plain.trials.covariance)
+    np.testing.assert_array_equal(found.check.covariance, plain.check.covariance)
+    np.testing.assert_allclose(np.abs(found.slow_roll), 0.25e-6)
+
+
+def test_many_speeds_of_one_run(read):
+    rows = [[*row[:1], speed, *row[2:]] for speed in (900, 1000, 1100) for row in MEASURED[1:]]
+    trials = read([MEASURED[0], *rows])
+    assert trials.covariance.shape == (2, 2, 1, 3, 3, 2)
