@@ -21,6 +21,8 @@ MEASURED: dict[str, UnitReader] = {
 }
 _NEEDED = {"run", "speed", "sensor", *READING}
 _TIDY = re.compile(r"(?:(speed|amplitude|phase)(?:_(.*))?|run|sensor|repeat)")
+_BESIDE = re.compile(r"(?:amplitude|phase)_std(?:_|$)|order")
+"""What `rotorid vectors` writes beside the readings."""
 _AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs"
 _ROLES = {
     stem: re.compile(rf"(?<![^\W\d_])(?:{words})(?![^\W\d_])", re.IGNORECASE)
@@ -61,8 +63,8 @@ class Heading:
     index, name
         Its place, and its name in the file.
     stem
-        Of the column of a runs table; `vector` for amplitude and phase in one cell, `note`, the order of
-        another harmonic (`2X`); empty: unknown.
+        Of the column of a runs table; `vector` for amplitude and phase in one cell, the order of another
+        harmonic (`2X`), `note` of what stays as it is; empty: unknown.
     unit
         As it is written.
     sensor
@@ -130,10 +132,10 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
 
 
 def _heading(unknown: Heading, name: str, *, probes: bool) -> Heading:
+    if name.casefold().startswith(REMARKS) or _BESIDE.match(name):
+        return replace(unknown, stem="note")
     if (tidy := _TIDY.fullmatch(name)) is not None:
         return replace(unknown, stem=tidy[1] or tidy[0], unit=tidy[2] or "", tidy=True)
-    if name.casefold().startswith(REMARKS):
-        return replace(unknown, stem="note")
     order = None if probes else _ORDER.search(name)
     if order is not None and order[1] != "1":
         return replace(unknown, stem=f"{order[1]}X")

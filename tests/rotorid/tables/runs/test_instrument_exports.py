@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import tomllib
 from dataclasses import fields
 
 import numpy as np
@@ -12,11 +13,15 @@ import pytest
 from cases import each_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
+from rotorid.base.text import listing
 from rotorid.tables import InputError, job_from_files, read_job, read_trials
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
+from rotorid.tables.runs.runs_table import COLUMNS
+from rotorid.tables.schema import schema
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase
@@ -263,6 +268,8 @@ def test_a_workbook_with_results_holds_the_runs_table(tmp_path, name):
 
 
 ONE_UNIT = "expected the same unit in all cells of the column (row 2 has {}), or in its heading"
+NAMES = listing([name for column in COLUMNS for name in column.names], "and")
+KNOWN = f"a known column: {NAMES}; remarks go into 'note'"
 VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
 EXPLAINED = {
     "radians or degrees": (
@@ -374,9 +381,7 @@ EXPLAINED = {
     ),
     "a vector of a weight": (
         WIDE_VECTORS.replace("B", "Trial weight"),
-        "runs.csv, row 1, column Trial weight: found 'Trial weight', expected a known column: run, "
-        "speed_rpm, speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, phase_deg "
-        "and repeat; remarks go into 'note'",
+        f"runs.csv, row 1, column Trial weight: found 'Trial weight', expected {KNOWN}",
     ),
     "a blank reading": (
         WIDE_VECTORS.replace("9,2 @ 347°", ""),
@@ -415,6 +420,30 @@ def test_a_phase_that_says_lag_must_be_what_the_job_says(tmp_path):
         read_trials(tmp_path / "runs.csv", None)
 
 
+def keeps_to(text):
+    """Whether a job file keeps to its schema, as editors check it."""
+    return Draft202012Validator(schema("job")).is_valid(tomllib.loads(text))
+
+
+BESIDE = [
+    "amplitude_std_um_pp phase_std_deg",
+    "order2_amplitude_um_pp order2_phase_deg",
+    "overall_um_pp turns",
+]
+
+
+@each_of("beside", BESIDE)
+def test_what_vectors_writes_beside_the_readings_stays(tmp_path, beside):
+    """With degrees in its cells the table is the same as without."""
+    rows = [line.split(",") for line in tidy_text("").splitlines()]
+    plain, signs = (
+        [[*rows[0], *beside.split()], *([*row[:4], f"{row[4]}{sign}", "0.25", "1"] for row in rows[1:])]
+        for sign in ("", "°")
+    )
+    (tmp_path / "plain").mkdir()
+    assert_same(read(tmp_path, csv_text(signs)).trials, read(tmp_path / "plain", csv_text(plain)).trials)
+
+
 GERMAN = """\
 Messung vom 1.5.2024
 Lauf;Drehzahl;Messstelle;Ausschlag;Phase
@@ -444,6 +473,8 @@ def test_other_names_of_columns(tmp_path):
     (tmp_path / "check.csv").write_text(tidy_text("german"), encoding="utf-8")
     slow = "Lauf;Drehzahl;Messstelle;Ausschlag;Phase\nx;200;A;1,5;20\nx;200;B;2,5;30\n"
     (tmp_path / "slow.csv").write_text(slow, encoding="utf-8")
+    assert keeps_to(job_text(more=NAMED))
+    assert not keeps_to(job_text(more=NAMED.replace("speed_rpm", "speed_mph")))
     both = read(tmp_path, GERMAN, 'check = "check.csv"\nslow_roll = "slow.csv"\n' + NAMED)
     np.testing.assert_array_equal(both.check.readings, both.trials.readings)
     shown = both.trials.labels.vibration(both.slow_roll)
@@ -498,9 +529,7 @@ def test_other_names_in_a_workbook(tmp_path):
         (
             'sensor = "Messstelle"',
             "",
-            "runs.csv, row 2, column Messstelle: found 'Messstelle', expected a known column: run, "
-            "speed_rpm, speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, "
-            "phase_deg and repeat; remarks go into 'note'\n"
+            f"runs.csv, row 2, column Messstelle: found 'Messstelle', expected {KNOWN}\n"
             "runs.csv, row 2, column sensor: expected a column sensor; the columns are Lauf, Drehzahl, "
             "Messstelle, Ausschlag and Phase",
         ),
