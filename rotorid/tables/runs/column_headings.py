@@ -14,6 +14,8 @@ from rotorid.tables.reader.columns import REMARKS
 from rotorid.tables.reader.units import UnitError, UnitReader, one_of
 
 READING = ("amplitude", "phase")
+LONGEST = 100
+"""Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
 MEASURED: dict[str, UnitReader] = {
     "speed": one_of(units.SPEED),
     "amplitude": units.vibration,
@@ -90,6 +92,8 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
         Where it is no unit of the quantity. Labels stand only in names such as `amplitude_div`.
     """
     direction, plain = "", text.strip()
+    if len(plain) > LONGEST:
+        raise UnitError(f"a unit, not {len(plain)} characters")
     if stem == "phase":
         direction = " and ".join(sorted({word.casefold() for word in _DIRECTION.findall(plain)}))
         plain = _DIRECTION.sub("", plain).strip(" ,;/")
@@ -132,6 +136,8 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
 
 
 def _heading(unknown: Heading, name: str, *, probes: bool) -> Heading:
+    if len(name) > LONGEST:
+        return unknown
     if name.casefold().startswith(REMARKS) or _BESIDE.match(name):
         return replace(unknown, stem="note")
     if (tidy := _TIDY.fullmatch(name)) is not None:

@@ -20,6 +20,7 @@ from rotorid.tables.reader.grid import Cell, Grid, Row, show
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import UnitError, spelt
 from rotorid.tables.runs.column_headings import (
+    LONGEST,
     MEASURED,
     READING,
     Heading,
@@ -153,9 +154,8 @@ def _halves(column: _Column, headings: Sequence[Heading], rows: Sequence[Row]) -
 def _holds_vectors(heading: Heading, headings: Sequence[Heading], cells: Sequence[Cell]) -> bool:
     """Whether a column holds amplitude and phase in one cell."""
     others = [one for one in headings if one.stem in READING and one is not heading]
-    if _WEIGHT.search(heading.name):
-        return False
-    if heading.stem and any(one.stem == "phase" and one.sensor == heading.sensor for one in others):
+    paired = any(one.stem == "phase" and one.sensor == heading.sensor for one in others)
+    if (heading.stem and paired) or _WEIGHT.search(heading.name):
         return False
     found = [vector for cell in cells if (vector := _vector(cell)) is not None]
     return heading.stem == "vector" or any(sure for *_, sure in found) or (bool(found) and not others)
@@ -163,7 +163,7 @@ def _holds_vectors(heading: Heading, headings: Sequence[Heading], cells: Sequenc
 
 def _vector(cell: Cell) -> tuple[str, str, bool] | None:
     """Amplitude and phase of a cell such as `6.93 um @ 98°`, and whether it can be nothing else."""
-    found = _VECTOR.fullmatch(cell) if isinstance(cell, str) else None
+    found = _VECTOR.fullmatch(cell) if isinstance(cell, str) and len(cell) <= LONGEST else None
     if found is None:
         return None
     return found[1], found[3], found[2] != "/" or _PLAIN.fullmatch(found[3]) is None

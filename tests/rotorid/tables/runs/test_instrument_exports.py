@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import re
+import time
 import tomllib
+from contextlib import suppress
 from dataclasses import fields
 
 import numpy as np
@@ -442,6 +444,17 @@ def test_what_vectors_writes_beside_the_readings_stays(tmp_path, beside):
     )
     (tmp_path / "plain").mkdir()
     assert_same(read(tmp_path, csv_text(signs)).trials, read(tmp_path / "plain", csv_text(plain)).trials)
+
+
+@each_of("piece", ["9", "9.", "9 ", "a@", " ", "1X", "(", "9/", "9um ", "Phase "])
+def test_long_cells_and_headings_take_no_time(tmp_path, piece):
+    long = piece * (200_000 // len(piece))
+    for text in (WIDE_VECTORS, UNITS_ROW, CELLS_WITH_UNITS):
+        for word in ("7,2 @ 238°", "um pp", "Phase", "deg", "13.5", "RPM"):
+            start = time.monotonic()
+            with suppress(InputError):
+                read(tmp_path, text.replace(word, long + "x", 1))
+            assert time.monotonic() - start < 5.0
 
 
 GERMAN = """\
