@@ -102,7 +102,7 @@ class SweptAnswers:
         return np.hstack((own, self.excitation[:, None], constant)), np.hstack((by_omega, by_zeta))
 
     def _answer(self, omega: float, zeta: float) -> ComplexArray:
-        """g of a mode and its slopes by ω and ζ, (3, n)."""
+        """G of a mode and its slopes by ω and ζ, (3, n)."""
         root = np.sqrt(1 - zeta**2)
         s, by_zeta = omega * (-zeta + 1j * root), omega * (-1 - 1j * zeta / root)
         (z, w), (z_, w_) = self._first_order(s), self._first_order(np.conj(s))
@@ -126,7 +126,7 @@ class SweptAnswers:
         return steps, rest, self.speed.force(self.time[:, None] - rest[:, None] * (1 - NODES))
 
     def _first_order(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
-        """z of z' = s z + force, which begins as for a steady speed, at each time, and its slope by s."""
+        """Z of z' = s z + force, which begins as for a steady speed, at each time, and its slope by s."""
         from scipy.signal import lfilter
 
         h, (steps, rest, last) = self.speed.step, self._rests
