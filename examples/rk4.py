@@ -23,7 +23,7 @@ from balancing.coefficients.run_errors import (
     run_columns,
     runs_of,
 )
-from balancing.data.reading_errors import mean_covariance
+from balancing.data.reading_errors import ErrorModel, mean_covariance
 from rotorid import read_job
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"
@@ -125,7 +125,7 @@ def difference(influence: balancing.Influence, one: balancing.Trials) -> balanci
     more = np.zeros((2, columns.common.shape[2], *common.shape[2:]), dtype=complex)
     more[..., 0] = columns.common[:, 0]
     joint = covariance * np.outer(flip, flip) + marginal(more)
-    own = mean_covariance(one, errors)[0] + columns.own[0, ..., None, None] * np.eye(2)
+    own = mean_covariance(one, ErrorModel(errors))[0] + columns.own[0, ..., None, None] * np.eye(2)
     joint[..., :2, :2] += own
     both = np.concatenate((common * flip[::2], more), axis=1)
     model = None if influence.parameters is None else influence.parameters * flip[::2]

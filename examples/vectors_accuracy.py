@@ -114,7 +114,9 @@ def main(seeds: int) -> None:
     for ripple in (0.0, RIPPLE):
         run = machine(ripple)
         found = [accuracy(run, seed) for seed in range(seeds)]
-        worst = (max(abs(getattr(one, name)) for one in found) for name in ("rms", "largest", "ends", "offset"))
+        worst = (
+            max(abs(getattr(one, name)) for one in found) for name in ("rms", "largest", "ends", "offset")
+        )
         mean = (100 * np.mean([getattr(one, name) for one in found]) for name in ("along", "across"))
         numbers = "  ".join(f"{value:7.3f}" for value in worst)
         covered = "  ".join(f"{value:7.1f}" for value in mean)

@@ -21,7 +21,7 @@ SMALL = 5e-4
 
 _SOURCES = {
     "stated": "as stated in the job",
-    "measured": "root mean square of those measured, in the runs table",
+    "measured": "root mean square of those that the instrument measured",
     "repeats": "from repeated readings",
     "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
     "residuals": "from the disagreement of the runs",

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _SOURCES = {
     "stated": "as stated in the job",
-    "measured": "measured, in the runs table",
+    "measured": "as the instrument measured them, reading by reading",
     "repeats": "from repeated readings",
     "stated, enlarged by repeats": "as stated, enlarged because repeated readings scatter more",
     "residuals": "from the disagreement of the runs",

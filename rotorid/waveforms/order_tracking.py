@@ -30,6 +30,8 @@ from rotorid.waveforms.penalised_spline import (
 
 KNOT, MOST_KNOTS = 2.0, 8000
 """Turns between two knots; a longer record has more between."""
+PARTS = 16
+"""Of a steady record, whose means are compared."""
 PASSES = 2
 """Penalties of all orders are chosen so often, each time with what the others explain taken off."""
 Parts = Callable[[], Iterator[tuple[FloatArray, FloatArray]]]
@@ -50,6 +52,8 @@ class Orders:
         How stiff each is, [sensor][order].
     density
         Samples a turn, (n,).
+    raw
+        Means of some turns around each coefficient, without any penalty, (n + 3, K + 1, C).
     """
 
     first: float
@@ -57,6 +61,7 @@ class Orders:
     coefficients: ComplexArray
     smoothings: tuple[tuple[Smoothing, ...], ...]
     density: FloatArray
+    raw: ComplexArray
 
     @property
     def last(self) -> float:
@@ -82,14 +87,22 @@ class Orders:
         return np.transpose([own[order].deviation(weights(f), j) for own in self.smoothings])
 
     def mean(self) -> tuple[ComplexArray, FloatArray]:
-        """Means over the record, and their standard deviations in each direction, (K + 1, C)."""
+        """Means over the record, and their standard deviations in each direction, (K + 1, C).
+
+        Those of the filter, or of the means of parts of the record where these scatter more: noise beside an
+        order, slower than two turns, looks like a vector that moves.
+        """
         n = len(self.density)
         row = np.convolve(np.ones(n), (1 / 24, 11 / 24, 11 / 24, 1 / 24)) / n
-        deviations = [
+        filtered = [
             [own.deviation(row[None], np.zeros(1, dtype=np.int64))[0] for own in sensor]
             for sensor in self.smoothings
         ]
-        return np.tensordot(row, self.coefficients, 1), np.transpose(deviations)
+        parts = np.stack([part.mean(axis=0) for part in np.array_split(self.raw, min(PARTS, n))])
+        scatter = np.sqrt(
+            np.mean(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / 2 / max(len(parts) - 1, 1)
+        )
+        return np.tensordot(row, self.coefficients, 1), np.maximum(np.transpose(filtered), scatter)
 
     def width(self, turns: FloatArray, order: int = 1) -> FloatArray:
         """Turns that count around these, (P,): as many, evenly weighed, would leave the same error."""
@@ -123,23 +136,26 @@ def track_orders(parts: Parts, first: float, last: float, highest: int) -> Order
     loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
     M = 2 * highest + 1
     start = _solved(band, [loose] * M, right)
-    coefficients, smoothings = [], list[tuple[Smoothing, ...]]()
+    coefficients, raw, smoothings = [], [], list[tuple[Smoothing, ...]]()
+    total = times(alone, np.ones(n + 3))
     for sensor in range(right.shape[2]):
         c, b, own = start[:, :, sensor], right[:, :, sensor], list[Smoothing]()
         for _ in range(PASSES):
-            left, own = b - times(band, c.reshape(-1)).reshape(c.shape), []
+            left, own, means = b - times(band, c.reshape(-1)).reshape(c.shape), [], []
             for k in range(highest + 1):
                 columns = slice(0, 1) if k == 0 else slice(2 * k - 1, 2 * k + 1)
                 gram = alone if k == 0 else alone / 2  # mean squares of cosine and sine
                 y = np.ascontiguousarray(left[:, columns] + times(gram, c[:, columns]))
                 own.append(smooth(gram, y)[0])
+                means.append(y @ ((1.0,) if k == 0 else (2.0, 2.0j)) / total)
             c = _solved(band, [own[(m + 1) // 2].penalty for m in range(M)], b)
         coefficients.append(c)
         smoothings.append(tuple(own))
+        raw.append(np.stack(means, axis=-1))
     c = np.stack(coefficients, axis=-1)
     complex_ones = np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)
     density = found.gram[:, :, 0, :, 0].sum(axis=(1, 2)) / knot
-    return Orders(first, knot, complex_ones, tuple(smoothings), density)
+    return Orders(first, knot, complex_ones, tuple(smoothings), density, np.stack(raw, axis=-1))
 
 
 def _columns(turns: FloatArray, highest: int) -> FloatArray:

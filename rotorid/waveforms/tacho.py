@@ -44,6 +44,8 @@ BACKFITTING = 3
 RARE, CLEARLY, EVEN = 0.3, 5.0, 0.02
 """A tooth that shows in fewer turns is not there; a gap is the longest if it is longer by so many standard
 deviations of the mean, and so much of an even one."""
+EXACT = 1e-8
+"""Turns; no pulse counts as more exact."""
 OUTLYING = 15.0
 """Squares count for no more, over their median, in the variance of pulses."""
 PARTS, MOST_CHI_SQUARE = 10, 30.0
@@ -367,7 +369,7 @@ def _variance(left: FloatArray, rate: FloatArray) -> FloatArray:
     at.
     """
     columns = np.stack((np.ones_like(rate), rate**2), axis=1)
-    size = np.median(left**2) + np.finfo(float).tiny
+    size = np.median(left**2) + EXACT**2
     found = nnls(columns / columns.mean(axis=0), np.minimum(left**2 / size, OUTLYING))[0]
     return np.asarray(np.maximum(columns / columns.mean(axis=0) @ found, 1e-3) * size)
 

@@ -16,7 +16,7 @@ from scipy.io import wavfile
 RATE, RADIUS = 2048, 0.15
 MODES = np.array([1560.0, 2640.0]) * np.pi / 30
 DAMPING = np.array([0.03, 0.025])
-SHAPES = {"A": (0.9, 0.7), "V": (0.9j, 0.7j), "B": (0.8, -0.75)}
+SHAPES = {"A": (0.9, 0.7), "V": (-0.9j, -0.7j), "B": (0.8, -0.75)}
 PLANES = {"left": (0.8, 0.6), "right": (0.75, -0.7)}
 MASS = 60.0
 FOUND = {"left": 9e-3 * np.exp(1j * np.radians(75)), "right": 6e-3 * np.exp(1j * np.radians(200))}
@@ -33,7 +33,9 @@ def motion(weights, time, speed, rate):
         q, v = np.split(y, 2)
         w = speed(t)
         stiff = MODES**2 - w**2 + 1j * rate + 2j * DAMPING * MODES * w
-        return np.concatenate((v, force * (w**2 - 1j * rate) - 2 * (DAMPING * MODES + 1j * w) * v - stiff * q))
+        return np.concatenate(
+            (v, force * (w**2 - 1j * rate) - 2 * (DAMPING * MODES + 1j * w) * v - stiff * q)
+        )
 
     w = speed(0.0)
     start = force * w**2 / (MODES**2 - w**2 + 2j * DAMPING * MODES * w)
@@ -52,7 +54,9 @@ def write(name, weights, seconds, first, last, seed):
     angle = start * t + rate * t**2 / 2 + rng.uniform(0, 2 * np.pi)
     q = motion({p: FOUND[p] + weights.get(p, 0) for p in FOUND}, t, lambda s: start + rate * s, rate)
     # the recorder's converter takes means over its sampling interval
-    inside = (np.mean([(angle + k / 64 * np.gradient(angle)) % (2 * np.pi) < np.radians(18) for k in range(-32, 32)], 0))
+    inside = np.mean(
+        [(angle + k / 64 * np.gradient(angle)) % (2 * np.pi) < np.radians(18) for k in range(-32, 32)], 0
+    )
     volts = [-1.0 - 7.0 * inside]
     for sensor, shape in SHAPES.items():
         z = (np.array(shape) @ q + RUN_OUT[sensor]) * np.exp(1j * angle)

@@ -142,7 +142,10 @@ class VectorsOfRecords(Outcome):
         return Answer(head, f"{told}\n\n{text(self.columns, width=COLUMNS)}", warnings=self.warnings)
 
     def figure(self) -> Figure:
-        """The picture that was asked for, of the first record."""
+        """The picture that was asked for, of the first record.
+
+        Orbits are those of its first two sensors, where 1× is largest; spectra those of the first.
+        """
         from rotorid.waveforms.waveform_pictures import figure_of
 
         return figure_of(self.picture, self.waveforms.records[0], self.found[0])

@@ -53,7 +53,7 @@ def test_equal_ones_say_what_a_stated_floor_says(exact):
     assert not any("assumed" in line for line in own.summary().splitlines() if "reading" in line)
     document = own.to_dict()["errors"]
     assert (document["source"], document["floor"]) == ("measured", pytest.approx(0.03))
-    assert "root mean square of those measured, in the runs table" in " ".join(own.answer.whole().split())
+    assert "root mean square of those that the instrument measured" in " ".join(own.answer.whole().split())
 
 
 def test_stated_errors_add_to_them(exact):

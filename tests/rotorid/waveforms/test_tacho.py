@@ -1,0 +1,149 @@
+"""The tacho: turns counted over damaged pulses, edges, polarity, marks of several pulses."""
+
+import numpy as np
+import pytest
+
+from rotorid.waveforms.record import Channel, TachoSettings
+from rotorid.waveforms.tacho import read_tacho
+
+RATE = 5120.0
+T = np.arange(int(20 * RATE)) / RATE
+START = 0.3
+TURNS = START + 12 * T + T**2
+"""12 to 52 turns a second."""
+
+
+def pulses(at=(0.0,), wide=0.05, high=5.0):
+    return high * np.any([(TURNS - place) % 1 < wide for place in at], axis=0)
+
+
+def read(samples, **settings):
+    return read_tacho(Channel("KEY", samples), RATE, TachoSettings(**settings))
+
+
+def offsets(tacho, zero=0.0):
+    """Turns found less exact ones, of the angle throughout, but for whole turns."""
+    t = T[(tacho.span[0] < T) & (tacho.span[1] > T)]
+    off = tacho.turn_at(t) - (TURNS[(tacho.span[0] < T) & (tacho.span[1] > T)] - zero)
+    return off - np.round(off.mean())
+
+
+def test_the_angle_is_far_more_exact_than_an_edge():
+    tacho = read(pulses())
+    # an edge is off by half a sample at most, uniformly: 0.6° at 30 turns a second
+    assert tacho.jitter_deg == pytest.approx(
+        360 * np.median(12 + 2 * tacho.times) / RATE / np.sqrt(12), rel=0.06
+    )
+    assert np.abs(offsets(tacho)).max() * 360 < 0.15
+    assert np.all(np.diff(tacho.turns) == 1)
+    assert tacho.warnings == ()
+
+
+def test_its_stated_error_holds():
+    ratios = []
+    for seed in range(40):
+        turns = TURNS + 0.01 * T**3 + np.random.default_rng(seed).uniform()
+        tacho = read(5.0 * (turns % 1 < 0.05))
+        t = np.linspace(1, 19, 40)
+        off = tacho.turn_at(t) - np.interp(t, T, turns)
+        ratios.append((off - np.round(off.mean())) / tacho.angle.deviation(t))
+    assert np.mean(np.abs(ratios) < 1.96) == pytest.approx(0.95, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("edge", "zero"),
+    [("leading", 0.0), ("rising", 0.0), ("trailing", 0.05), ("falling", 0.05), ("centre", 0.025)],
+)
+def test_edges(edge, zero):
+    tacho = read(pulses(), edge=edge)
+    assert np.abs(offsets(tacho, zero)).max() * 360 < 0.2
+    assert bool(tacho.warnings) == (edge == "falling")
+
+
+def test_a_notch_is_the_mark_although_it_is_low():
+    tacho = read(5.0 - pulses())
+    assert np.abs(offsets(tacho)).max() * 360 < 0.15
+    assert tacho.warnings == ()
+    (words,) = read(5.0 - pulses(), edge="rising").warnings
+    assert words == "the tacho's marks are low (5 % of the time), and edge = rising is where they end"
+
+
+def test_a_mark_of_half_a_turn_is_said():
+    (words,) = read(pulses(wide=0.5)).warnings
+    assert "either level may be the mark" in words
+
+
+def damaged(missing=0, double=0, seed=1):
+    rng = np.random.default_rng(seed)
+    samples, last = pulses(), int(TURNS[-1])
+    for turn in rng.choice(np.arange(4, last - 4), missing, replace=False):
+        samples[(turn - 0.01 <= TURNS) & (turn + 0.06 > TURNS)] = 0
+    for turn in rng.choice(np.arange(4, last - 4), double, replace=False):
+        where = turn + rng.uniform(0.15, 0.9)
+        samples[(where <= TURNS) & (where + 0.04 > TURNS)] = 5
+    return samples
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("missing", "double"), [(12, 0), (0, 12), (12, 12)])
+def test_missing_and_double_pulses_are_bridged_and_counted(missing, double, seed):
+    tacho = read(damaged(missing, double, seed))
+    assert np.abs(offsets(tacho)).max() * 360 < 0.5
+    (words,) = tacho.warnings
+    if seed == 0:
+        assert ("missing" in words, "too many" in words) == (missing > 0, double > 0)
+    # a pulse too many in the turn of a missing one may stand for it, off by a part of a turn
+    assert abs(len(tacho.missing) - missing) <= min(missing, double)
+    assert abs(len(tacho.double) - double) <= min(missing, double)
+
+
+def test_jitter_is_found():
+    rng = np.random.default_rng(3)
+    turns = np.arange(0, TURNS[-1] + 2)
+    worn = np.interp(TURNS, turns + 0.01 * rng.standard_normal(len(turns)), turns)
+    tacho = read(5.0 * (worn % 1 < 0.05))
+    assert tacho.jitter_deg == pytest.approx(3.6, rel=0.1)
+    assert np.sqrt(np.mean(offsets(tacho) ** 2)) * 360 < 0.5
+
+
+def test_even_pulses_leave_the_turn_open_and_uneven_ones_do_not():
+    even = read(pulses((0, 0.5)), pulses=2)
+    assert not even.indexed
+    assert "multiples of 180°" in even.warnings[0]
+    assert min(np.abs(offsets(even, zero)).max() for zero in (0, 0.5)) * 360 < 0.2
+    uneven = read(pulses((0, 0.4)), pulses=2)
+    assert uneven.indexed
+    assert np.abs(offsets(uneven)).max() * 360 < 0.2  # the gap from 0.4 to 1 is the longest
+
+
+def test_a_wheel_that_lacks_a_tooth():
+    teeth = 5.0 * ((TURNS * 12 % 1 < 0.5) & (TURNS % 1 < 11 / 12))
+    tacho = read(teeth, pulses=12, edge="rising")
+    assert tacho.indexed
+    assert len(tacho.missing) == 0
+    assert np.abs(offsets(tacho)).max() * 360 < 0.2
+
+
+def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
+    turns = START + (RATE / 160) * T  # 160 samples a turn: every edge is between the same two
+    tacho = read(5.0 * (turns % 1 < 0.05))
+    assert tacho.offset_s == pytest.approx(1 / RATE / np.sqrt(12))
+    assert read(pulses()).offset_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("samples", "words"),
+    [
+        (np.zeros(10000), "has no pulses: it reads 0 throughout"),
+        (5.0 * (0.3 * T % 1 < 0.05), "at least 8 are needed"),
+        (np.where((T > 8) & (T < 8.6), 0.0, pulses()), "is silent from 7.989 to 8.618 s, about 17"),
+    ],
+)
+def test_what_does_not_tell_turns_is_refused(samples, words):
+    with pytest.raises(ValueError, match=words):
+        read(samples)
+
+
+def test_a_level_beyond_the_pulses_is_refused():
+    with pytest.raises(ValueError, match="tacho_level must be between 0 and 5"):
+        read(pulses(), level=7.0)

@@ -1,0 +1,175 @@
+"""Vectors of drawn records: exact answers by integration, errors, damage, filters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from examples.vectors_accuracy import NOISE, RATE, RIPPLE, accuracy, machine, record
+from rotorid.waveforms.record import Channel, SignalPath, TachoSettings, WaveformRecord
+from rotorid.waveforms.vectors import find_vectors
+
+
+@pytest.fixture(scope="module")
+def run():
+    return machine()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_run_up_through_a_resonance(run, seed):
+    found = accuracy(run, seed)
+    assert found.rms <= 0.06
+    assert found.largest <= 0.25
+    assert found.ends <= 0.6
+    assert abs(found.offset) <= 0.1
+    assert (found.along + found.across) / 2 >= 0.9
+
+
+def test_a_speed_that_ripples():
+    found = accuracy(machine(RIPPLE), 1)
+    assert found.rms <= 0.15
+    assert found.largest <= 0.6
+
+
+def test_second_order_gap_and_overall(run):
+    found = find_vectors(record(run, 5), TachoSettings(), (1, 2))
+    middle = slice(10, -10)
+    twice = found.vectors[middle, 0, 1]
+    assert np.abs(twice.mean()) == pytest.approx(1.5e-6, rel=0.01)
+    assert np.degrees(np.angle(twice.mean())) == pytest.approx(np.degrees(0.3), abs=1)
+    assert np.max(np.abs(twice - 1.5e-6 * np.exp(0.3j)) / found.radial[middle, 0, 1]) < 5
+    assert np.abs(found.gap).max() < 0.5e-6
+    size = np.abs(run.vector(found.times))
+    assert np.all(found.overall[:, 0, 0] > 0.9 * size)
+    assert found.end[[0, -1]].tolist() == [True, True] or not found.end[1:-1].any()
+
+
+def test_chosen_speeds(run):
+    speeds = np.array([900.0, 1500.0, 3000.0]) * np.pi / 30
+    found = find_vectors(record(run, 6), TachoSettings(), speeds=speeds)
+    assert found.speeds == pytest.approx(speeds, rel=1e-4)
+    assert np.abs(found.vectors[:, 0, 0] - run.vector(found.times)).max() < 0.3e-6
+    with pytest.raises(ValueError, match=r"no speed of 4000 rpm: the record runs from 60\d\.\d+ to 359\d"):
+        find_vectors(record(run, 6), TachoSettings(), speeds=np.array([4000.0]) * np.pi / 30)
+
+
+def steady(x, turns, path=None, derivative=0, rate=RATE):
+    sensor = Channel("A", x, 1.0, derivative, path or SignalPath())
+    return WaveformRecord("run", "file", rate, Channel("T", 5.0 * (turns % 1 < 0.05)), (sensor,))
+
+
+VECTOR = 20e-6 * np.exp(0.5j)
+
+
+def drawn(seed, kind):
+    """A steady record with noise of a kind, and the mean vector during it."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(RATE * 20)) / RATE
+    turns = 25.3 * t + 0.003 * np.sin(2 * np.pi * 0.3 * t) + rng.uniform()
+    vector = VECTOR * np.ones(len(t), dtype=complex)
+    noise = 5e-6 * rng.standard_normal(len(t))
+    if kind == "coloured":  # another machine beside it, at about the same speed
+        band = butter(1, (24.0, 27.0), "band", fs=RATE, output="sos")
+        noise = 10 * sosfilt(band, noise)
+    if kind == "wandering":
+        vector = VECTOR * (1 + 0.05 * np.sin(2 * np.pi * t / 9 + seed))
+    x = (vector * np.exp(2j * np.pi * turns)).real + noise
+    return steady(x, turns), vector.mean()
+
+
+@pytest.mark.parametrize("kind", ["white", "coloured", "wandering"])
+def test_stated_errors_of_a_steady_record_hold(kind):
+    pulls = []
+    for seed in range(60):
+        measured, vector = drawn(seed, kind)
+        found = find_vectors(measured, TachoSettings())
+        assert found.steady
+        assert len(found.times) == 1
+        turned = (found.vectors[0, 0, 0] - vector) * np.exp(-0.5j)
+        pulls += [turned.real / found.radial[0, 0, 0], turned.imag / found.tangential[0, 0, 0]]
+    assert np.mean(np.abs(pulls) < 1.96) > 0.9
+    if kind != "wandering":  # whose mean during the record is known better than that of another
+        assert np.std(pulls) == pytest.approx(1, abs=0.2)
+
+
+def test_the_error_of_white_noise_is_that_of_least_squares():
+    found = [find_vectors(drawn(seed, "white")[0], TachoSettings()).radial[0, 0, 0] for seed in range(8)]
+    assert np.mean(found) == pytest.approx(5e-6 * np.sqrt(2 / (20 * RATE)), rel=0.12)
+
+
+@pytest.mark.parametrize("derivative", [1, 2])
+def test_velocities_and_accelerations_are_integrated(derivative):
+    rate, turning = 20480.0, machine()
+    t = np.arange(int(rate * 60)) / rate
+    turns, h = turning.turns(t), 1 / rate
+    x = (turning.vector(t) * np.exp(2j * np.pi * turns)).real
+    if derivative == 1:
+        y = (-np.roll(x, -2) + 8 * np.roll(x, -1) - 8 * np.roll(x, 1) + np.roll(x, 2)) / (12 * h)
+    else:
+        y = (-np.roll(x, -2) + 16 * np.roll(x, -1) - 30 * x + 16 * np.roll(x, 1) - np.roll(x, 2)) / (
+            12 * h**2
+        )
+    y[:4] = y[-4:] = 0
+    noise = NOISE * (2 * np.pi * 30) ** derivative * np.random.default_rng(1).standard_normal(len(t))
+    found = find_vectors(steady(y + noise, turns, None, derivative, rate), TachoSettings(), derivative=0)
+    exact = turning.vector(found.times)
+    inside = (found.times > 2) & (found.times < 58)
+    assert np.abs(found.vectors[inside, 0, 0] - exact[inside]).max() < 0.0015 * np.abs(exact).max()
+    assert np.isnan(found.gap).all()
+    assert np.isnan(found.overall).all()
+
+
+@pytest.mark.parametrize(("order", "corner"), [(1, 1.0), (2, 3.0)])
+def test_an_ac_coupling_is_taken_off(run, order, corner):
+    measured = record(run, 7)
+    sensor = measured.sensors[0]
+    coupled = sosfilt(butter(order, corner, "high", fs=RATE, output="sos"), sensor.samples)
+    known = Channel("A", coupled, path=SignalPath(2 * np.pi * corner, order))
+
+    def worst(channel):
+        found = find_vectors(replace(measured, sensors=(channel,)), TachoSettings())
+        inside = (found.times > 2) & (found.times < 58)
+        return np.abs(found.vectors[inside, 0, 0] - run.vector(found.times[inside])).max() / 95e-6
+
+    assert worst(known) < 0.0025
+    assert worst(replace(known, path=SignalPath())) > 0.02
+
+
+def test_a_delay_is_taken_off(run):
+    measured = record(run, 8)
+    late = np.concatenate((np.zeros(10), measured.sensors[0].samples[:-10]))
+    sensor = Channel("A", late, path=SignalPath(delay_s=10 / RATE))
+    found = find_vectors(replace(measured, sensors=(sensor,)), TachoSettings())
+    inside = (found.times > 2) & (found.times < 58)
+    assert np.abs(found.vectors[inside, 0, 0] - run.vector(found.times[inside])).max() < 0.0025 * 95e-6
+
+
+def test_damaged_channels_are_said_or_refused(run):
+    measured = record(run, 9)
+    x = measured.sensors[0].samples
+
+    def with_samples(samples):
+        return find_vectors(replace(measured, sensors=(Channel("A", samples),)), TachoSettings())
+
+    assert with_samples(x).warnings == ()
+    assert any("'A' is clipped at 6e-05" in word for word in with_samples(np.clip(x, -9, 60e-6)).warnings)
+    rounded = with_samples(np.round(x / 2e-6) * 2e-6)  # some hundred steps
+    assert rounded.warnings == ()
+    with pytest.raises(ValueError, match="reads 0 throughout: it is dead or not connected"):
+        with_samples(0 * x)
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(len(x))
+    assert "cannot be told from noise" in with_samples(noise).warnings[0]
+    with pytest.raises(ValueError, match="a tacho channel is needed"):
+        find_vectors(replace(measured, tacho=None), TachoSettings())
+    with pytest.raises(ValueError, match="50× is 2999 Hz at the highest speed"):
+        find_vectors(measured, TachoSettings(), (1, 50))
+
+
+def test_a_vector_that_moves_at_a_steady_speed_is_said():
+    t = np.arange(int(RATE * 20)) / RATE
+    turns = 25.3 * t
+    x = (VECTOR * (1 + 0.02 * t) * np.exp(2j * np.pi * turns)).real
+    x += 1e-7 * np.random.default_rng(1).standard_normal(len(t))
+    (words,) = find_vectors(steady(x, turns), TachoSettings()).warnings
+    assert words.startswith("1× of 'A' moves by up to 1")
