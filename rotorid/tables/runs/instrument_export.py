@@ -31,7 +31,7 @@ from rotorid.tables.runs.column_headings import (
 )
 from rotorid.tables.runs.stated_conventions import Conventions
 
-_NUMBER = r"[+-]?(?:[0-9][0-9.,]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?"
+_NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(_NUMBER)
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\s0-9].*)")
 _VECTOR = re.compile(rf"({_NUMBER}[^@<∠]*?)\s*([@<∠/])\s*({_NUMBER}[^@<∠/]*)")

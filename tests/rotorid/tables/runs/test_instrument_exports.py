@@ -338,6 +338,10 @@ EXPLAINED = {
         VECTORS.replace("∠114°", " / 114"),
         f"runs.csv, row 4, column 1X [um pp]: found '4,9 / 114', {VECTOR}",
     ),
+    "a comma beside the sign": (
+        VECTORS.replace("@79", "@,79"),
+        f"runs.csv, row 6, column 1X [um pp]: found '4,0@,79 deg', {VECTOR}",
+    ),
     "half a vector": (
         VECTORS.replace("@79 deg", "@"),
         f"runs.csv, row 6, column 1X [um pp]: found '4,0@', {VECTOR}",
