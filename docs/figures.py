@@ -24,6 +24,7 @@ RESPONSE = (
 )
 CALIBRATE = f"calibrate {COMPRESSOR} sample_data/calibration/trial.toml --estimate 'bearing[*].*'"
 MOTION = "sample_data/motion"
+RUN_UP = "sample_data/waveforms/run_up.wav --tacho 1 --sensors 2,3,4 --unit um --phase lag"
 THREE = "reduce sample_data/rotor23.csv --nodes 7,12,18"
 PNG_DOTS = 150
 """Dots an inch of a .png."""
@@ -271,6 +272,28 @@ GALLERY = (
         f"{CALIBRATE} --prior 'bearing[*].*=20%'",
         "One run with two weights tells stiffness and damping of both bearings, known to 20 % before, to 1.4 "
         "to 7 %, and nothing of their cross-coupled stiffness or of the discs.",
+    ),
+    Picture(
+        "tacho",
+        "instruments",
+        f"vectors {RUN_UP} --picture tacho",
+        "The marks pass the level once a turn, none is missing; the later the steeper, a pulse is half a sample "
+        "early or late, which the angle, through all of them, is not.",
+        dense=True,
+    ),
+    Picture(
+        "orbit",
+        "instruments",
+        f"vectors {RUN_UP} --picture orbit",
+        "Near the second critical speed the shaft goes round in a circle with the rotation, from the dark mark on.",
+        dense=True,
+    ),
+    Picture(
+        "waterfall",
+        "instruments",
+        f"vectors {RUN_UP} --picture waterfall",
+        "What goes with the speed lies on the line of 1×, and grows where it crosses the two modes.",
+        dense=True,
     ),
     Picture(
         "bearings",
