@@ -35,6 +35,7 @@ def fit_modes(
     answers: Answers,
     bands: Sequence[tuple[float, float]] | None = None,
     around: Sequence[tuple[float, float]] | None = None,
+    start: FloatArray | None = None,
 ) -> FittedModes:
     """Fit modes to amplitudes around resonances.
 
@@ -51,6 +52,8 @@ def fit_modes(
         each peak, and everything counts.
     around
         The same where everything counts; None: `peak_bands`.
+    start
+        ω_r and ζ_r to begin with; None: of the circle in each.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def fit_modes(
     order = np.flatnonzero(read)[np.argsort(omega[read], kind="stable")]
     experiments, answers = experiments.take(order), answers.take(order)
     omega, Z = experiments.frequencies, experiments.table(points)
-    H = Z / answers.excitation[:, None]
+    H = (Z.T / answers.reference).T
     sections = sorted(bands or around or peak_bands(omega, H))
     if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
         raise ValueError("--bands overlap: each holds one mode")
@@ -76,13 +79,13 @@ def fit_modes(
             f"too few readings: every resonance needs 3 frequencies, and every point {len(rows) + 2} (one a "
             "mode and two for modes beyond the range), and one more for the frequencies and damping"
         )
-    q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel()
+    q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel() if start is None else start
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(rows) + 1)]
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
     limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
     bounds = dict(zip(names, limits, strict=True))
-    kinds = [experiments.errors] if experiments.errors else [*UNSTATED.values()]
+    kinds = [experiments.errors] if experiments.stated else [*UNSTATED.values()]
     found = [
         _search(replace(experiments, errors=errors), points, answers, q, bounds, experiments.stated)
         for errors in kinds
@@ -90,7 +93,7 @@ def fit_modes(
     best = found[0] if found[-1][0] < found[0][0] + CLEARLY else found[-1]
     _, fit, readings, left = best
     trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
-    same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
+    same = "" if experiments.stated else list(UNSTATED)[found.index(best)]
     i, p = divmod(int(np.abs(left).argmax()), len(points))
     worst = points[p], float(omega[i]), float(np.abs(left[i, p]))
     return FittedModes(tuple(points), fit, ends, float(trend), worst, same, experiments, readings)

@@ -18,6 +18,8 @@ from rotorid.harmonic.modal.swept_answers import swept_answers
 
 NOISE = 5.0
 """Standard deviations of a vector that are no peak."""
+SLOWEST = 3
+"""So many vectors of the slowest are the run-out, where peaks are looked for."""
 NEIGHBOURS = 7
 """So many vectors around a speed lie on a parabola, where no modes explain them."""
 
@@ -128,23 +130,26 @@ def fit_sweep(
     if steady or sweep.time is None:
         return SweepModes(_fit(sweep, held, bands), None)
     fit = _fit(sweep, swept_answers(sweep.time, sweep.speeds), bands)
-    return SweepModes(fit, fit_modes(sweep.experiments, sweep.sensors, held, bands, fit.ends))
+    beside = fit_modes(sweep.experiments, sweep.sensors, held, bands, fit.ends, fit.fit.estimate.solution)
+    return SweepModes(fit, beside)
 
 
-def _fit(
-    sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, float]] | None
-) -> FittedModes:
+def _fit(sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, float]] | None) -> FittedModes:
     """Modes around the peaks, but for those that are no more than noise."""
-    around = None
-    if bands is None:
-        order = np.argsort(sweep.speeds, kind="stable")
-        square = np.abs(answers.excitation[order])[:, None]
-        around = peak_bands(sweep.speeds[order], sweep.vectors[order] / square, NOISE * sweep.noise[order] / square)
+    around = None if bands else _peaks(sweep)
     while True:
         fit = fit_modes(sweep.experiments, sweep.sensors, answers, bands, around)
         if not around or len(around) == 1 or fit.by_noise.max() <= RARE:
             return fit
         del around[int(fit.by_noise.argmax())]
+
+
+def _peaks(sweep: SweepVectors) -> list[tuple[float, float]]:
+    """Speeds around each peak of what differs from the slowest vectors."""
+    order = np.argsort(sweep.speeds, kind="stable")
+    Z = sweep.vectors[order]
+    slow = [own[~np.isnan(own)][:SLOWEST].mean() for own in Z.T]
+    return peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise[order])
 
 
 def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:

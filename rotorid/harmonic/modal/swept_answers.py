@@ -18,11 +18,11 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_GAUSS = np.polynomial.legendre.leggauss(4)
+_GAUSS = np.polynomial.legendre.leggauss(8)
 NODES, WEIGHTS = (_GAUSS[0] + 1) / 2, _GAUSS[1] / 2
-STEP = 0.5
-"""Angle of a step at the highest speed, rad: the quadrature is good to 1e-9."""
-MOST_STEPS = 5_000_000
+STEP = 2.0
+"""Angle of a step at the highest speed, rad: the quadrature is good to 1e-10."""
+MOST_STEPS = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,16 +74,12 @@ class SweptAnswers:
     speed: Speed
     time: FloatArray
     damping: tuple[float, float] = (0.0, 0.99)
+    reference: float = 1.0
 
     @cached_property
     def omega(self) -> FloatArray:
         """Speeds (n,), rad/s."""
         return np.asarray(self.speed.omega(self.time))
-
-    @cached_property
-    def excitation(self) -> ComplexArray:
-        """Ω² − iΩ', (n,)."""
-        return self.speed.growth(self.time)
 
     def take(self, rows: IntArray) -> SweptAnswers:
         """Those of some readings."""
@@ -99,7 +95,7 @@ class SweptAnswers:
         answers = [self._answer(omega, zeta) for omega, zeta in np.reshape(q, (2, -1)).T]
         own, by_omega, by_zeta = np.moveaxis(np.array(answers), 0, -1)
         constant = np.full((len(self.time), 1), q[0] ** 2)  # as it is for a steady speed
-        return np.hstack((own, self.excitation[:, None], constant)), np.hstack((by_omega, by_zeta))
+        return np.hstack((own, self.speed.growth(self.time)[:, None], constant)), np.hstack((by_omega, by_zeta))
 
     def _answer(self, omega: float, zeta: float) -> ComplexArray:
         """g of a mode and its slopes by ω and ζ, (3, n)."""
