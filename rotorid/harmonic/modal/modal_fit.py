@@ -132,7 +132,9 @@ def _search(
     return float(likelihood * fit.estimate.dof / 2), fit, readings, left
 
 
-def peak_bands(omega: FloatArray, H: ComplexArray, noise: FloatArray | float = 0.0) -> list[tuple[float, float]]:
+def peak_bands(
+    omega: FloatArray, H: ComplexArray, noise: FloatArray | float = 0.0
+) -> list[tuple[float, float]]:
     """Frequencies around each peak of all points together, each point in its own size.
 
     Parameters

@@ -25,7 +25,11 @@ ROW, LINE, LETTERS = 2.2, 0.17, 105
 
 def figure_modes(found: FittedModes) -> Figure:
     """A row a mode: readings and fit in the complex plane, where a mode is a circle, and over frequency."""
-    k, omega, force = min(len(found.ends), MODES), found.readings.answers.omega, found.experiments.signals.get("F")
+    k, omega, force = (
+        min(len(found.ends), MODES),
+        found.readings.answers.omega,
+        found.experiments.signals.get("F"),
+    )
     misfit = [r @ r / max(len(r), 1) for r in found.readings.each(0, found.fit.estimate.solution)]
     points = [int(p) for p in sorted(np.argsort(misfit)[-POINTS:])]
     seen = np.any([(low <= omega) & (omega <= high) for low, high in found.ends[:k]], axis=0)

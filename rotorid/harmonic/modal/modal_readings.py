@@ -93,7 +93,7 @@ class Readings:
         return self._last[key]
 
     def point(self, p: int, q: FloatArray) -> tuple[AnyArray, ...]:
-        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariance, (k, 2, k, 2)."""
+        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariance."""
         from scipy.linalg import lapack
 
         seen = ~np.isnan(self.Z[:, p])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,8 @@ from rotorid.harmonic.modal.swept_answers import swept_answers
 
 NOISE = 5.0
 """Standard deviations of a vector that are no peak."""
+SAME = 1e-9
+"""So much beyond its ends a speed is still one of a sweep."""
 SLOWEST = 3
 """So many vectors of the slowest are the run-out, where peaks are looked for."""
 NEIGHBOURS = 7
@@ -77,7 +80,9 @@ class SweepVectors:
             self.speeds,
             dict(zip(self.sensors, self.vectors.T, strict=True)),
             np.zeros(len(self.speeds), dtype=bool),
-            covariances={} if stated is None else dict(zip(self.sensors, np.swapaxes(stated, 0, 1), strict=True)),
+            covariances={}
+            if stated is None
+            else dict(zip(self.sensors, np.swapaxes(stated, 0, 1), strict=True)),
             axis=speed_axis("speed", labels.speed_unit),
             units=dict.fromkeys(self.sensors, Shown(labels.vibration_in, labels.vibration_scale)),
         )
@@ -126,7 +131,7 @@ def fit_sweep(
     ValueError
         As `fit_modes`.
     """
-    held = SteadyAnswers(sweep.speeds, sweep.speeds**2 + 0j)
+    held = SteadyAnswers(sweep.speeds, (sweep.speeds**2).astype(np.complex128))
     if steady or sweep.time is None:
         return SweepModes(_fit(sweep, held, bands), None)
     fit = _fit(sweep, swept_answers(sweep.time, sweep.speeds), bands)
@@ -156,7 +161,7 @@ def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
     """What no speed changes: run-out, and modes far below. Vectors (C,) and covariances of their parts."""
 
     def columns(q: FloatArray) -> ComplexArray:
-        return np.eye(q.size // 2 + 2)[-1:] * (q[0] ** 2 + 0j)
+        return np.asarray(np.eye(q.size // 2 + 2)[-1:] * q[0] ** 2, dtype=complex)
 
     vectors, covariances = fit.predicted(columns)
     return vectors[0], covariances[0]
@@ -188,23 +193,34 @@ def slow_vectors(sweep: SweepVectors, speed: float) -> tuple[ComplexArray, Float
     return mean, np.einsum("nci,ncj->cij", parts, parts) / free[:, None, None]
 
 
-def vectors_at(sweep: SweepVectors, fit: FittedModes | None, speeds: FloatArray) -> tuple[ComplexArray, FloatArray]:
+def vectors_when_passing(
+    sweep: SweepVectors,
+    speeds: FloatArray,
+    modes: SweepModes | None = None,
+    *,
+    steady: bool = False,
+    bands: Sequence[tuple[float, float]] = (),
+) -> tuple[ComplexArray, FloatArray]:
     """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
 
-    Of the fit, if there is one; else of a parabola through the nearest vectors.
+    Of its modes (None: they are fitted), where these explain it and count everywhere; else of a parabola
+    through the nearest vectors.
 
     Raises
     ------
     ValueError
-        For a speed that the sweep does not pass.
+        For a speed that the sweep does not pass, and for too few vectors near it.
     """
-    low, high = float(sweep.speeds.min()), float(sweep.speeds.max())
-    if len(beyond := speeds[(speeds < low) | (speeds > high)]):
-        words = sweep.labels.speed_words
+    low, high, words = float(sweep.speeds.min()), float(sweep.speeds.max()), sweep.labels.speed_words
+    if len(beyond := speeds[(speeds < low * (1 - SAME)) | (speeds > high * (1 + SAME))]):
         raise ValueError(
-            f"--speeds: run {sweep.run!r} goes from {words(low)} to {words(high)} only, not to {words(beyond[0])}"
+            f"--speeds: run {sweep.run!r} goes from {words(low)} to {words(high)}, not to {words(beyond[0])}"
         )
-    if fit is not None:
+    if modes is None and not bands:
+        with suppress(ValueError):
+            modes = fit_sweep(sweep, steady=steady)
+    if modes is not None and not bands and modes.fit.explains:
+        fit = modes.fit
         return fit.predicted(lambda q: fit.readings.answers.at(speeds).basis(q)[0])
     shape = len(speeds), len(sweep.sensors)
     vectors, covariances = np.zeros(shape, dtype=complex), np.zeros((*shape, 2, 2))
