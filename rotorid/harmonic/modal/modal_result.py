@@ -123,7 +123,9 @@ class FittedModes(Answered):
         chance = self.by_noise
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
         told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
-        for mode, ((omega, _, error, _), (low, high)) in enumerate(zip(told, self.ends, strict=True), 1):
+        for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
+            zip(told, self.ends, strict=True), 1
+        ):
             if chance[mode - 1] > RARE:
                 found.append(
                     f"mode {mode} ({self.told_at(omega)}) is no more than noise: say in --bands "
@@ -136,23 +138,17 @@ class FittedModes(Answered):
                     f"mode {mode} ({self.told_at(omega)}) stands on one frequency, perhaps a wild reading: "
                     "measure closer by, or say in --bands where modes are"
                 )
-            elif not low < omega < high:
+            elif not self._on_both_sides(omega, low, high):
                 found.append(f"mode {mode} ({self.told_at(omega)}) is read on one side only")
-            elif negative := self._negative(mode):
-                found.append(negative)
+            elif zeta + 2 * other < 0:
+                found.append(f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads")
         return tuple(found)
 
-    def _negative(self, mode: int) -> str:
-        """That the damping of a mode, from 1, is negative; nothing, where it may be positive."""
-        place = len(self.ends) + mode - 1
-        zeta, std = self.fit.estimate.solution[place], 0.0 if self.fit.std is None else self.fit.std[place]
-        beyond = zeta + 2 * std < 0
-        return f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads" if beyond else ""
-
-    @property
-    def negative(self) -> tuple[str, ...]:
-        """Damping that is negative, in words."""
-        return tuple(filter(None, map(self._negative, range(1, len(self.ends) + 1))))
+    def _on_both_sides(self, omega: float, low: float, high: float) -> bool:
+        """Whether there are readings below and above, within the ends around a peak or half as far beyond."""
+        read, more = self.readings.answers.omega, (high - low) / 2
+        near = read[(low - more <= read) & (read <= high + more)]
+        return bool(near.min() < omega < near.max())
 
     @property
     def explains(self) -> bool:

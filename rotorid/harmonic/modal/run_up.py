@@ -24,7 +24,7 @@ SAME = 1e-9
 SLOWEST = 3
 """So many vectors of the slowest are the run-out, where peaks are looked for."""
 NEIGHBOURS = 7
-"""So many vectors around a speed lie on a parabola, where no modes explain them."""
+"""So many vectors around a speed lie on a parabola, but for what modes explain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,13 @@ class SweepVectors:
             vectors=self.vectors[rows],
             covariances=None if own is None else own[rows],
         )
+
+    @property
+    def mirrored(self) -> SweepVectors:
+        """With phases of the other sign."""
+        own = self.covariances
+        turned = None if own is None else own * [[1.0, -1.0], [-1.0, 1.0]]
+        return replace(self, vectors=self.vectors.conj(), covariances=turned)
 
     @property
     def experiments(self) -> Experiments:
@@ -203,8 +210,8 @@ def vectors_when_passing(
 ) -> tuple[ComplexArray, FloatArray]:
     """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
 
-    Of its modes (None: they are fitted), where these explain it and count everywhere; else of a parabola
-    through the nearest vectors.
+    Of its modes (None: they are fitted), where these explain it and count everywhere; else what they leave
+    of the nearest vectors lies on a parabola.
 
     Raises
     ------
@@ -219,14 +226,19 @@ def vectors_when_passing(
     if modes is None and not bands:
         with suppress(ValueError):
             modes = fit_sweep(sweep, steady=steady)
-    if modes is not None and not bands and modes.fit.explains:
-        fit = modes.fit
+    fit = None if modes is None or bands or modes.fit.undetermined else modes.fit
+    if fit is not None and fit.explains:
         return fit.predicted(lambda q: fit.readings.answers.at(speeds).basis(q)[0])
+    known = np.zeros((len(sweep.speeds) + len(speeds), len(sweep.sensors)), dtype=complex)
+    if fit is not None:
+        every = fit.readings.answers.at(np.concatenate((sweep.speeds, speeds)))
+        known = every.basis(q := fit.fit.estimate.solution)[0] @ np.transpose(fit.readings.each(2, q))
+    rest = replace(sweep, vectors=sweep.vectors - known[: len(sweep.speeds)])
     shape = len(speeds), len(sweep.sensors)
     vectors, covariances = np.zeros(shape, dtype=complex), np.zeros((*shape, 2, 2))
     for m, c in np.ndindex(shape):
-        vectors[m, c], covariances[m, c] = _between(sweep, c, float(speeds[m]))
-    return vectors, covariances
+        vectors[m, c], covariances[m, c] = _between(rest, c, float(speeds[m]))
+    return vectors + known[len(sweep.speeds) :], covariances
 
 
 def _between(sweep: SweepVectors, c: int, speed: float) -> tuple[complex, FloatArray]:

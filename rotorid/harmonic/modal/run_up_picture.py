@@ -66,7 +66,7 @@ def bode_plot(sweeps: Sequence[SweepVectors], roll: ComplexArray, fit: FittedMod
             hidden = np.abs(model) < HIDDEN * np.median(sweep.noise[seen, c])
             below.plot(RPM * omega, np.where(hidden, np.nan, turned - 360 * np.round(off / 360)), **FIT)
     if fit is not None:
-        above.plot([], [], label=f"fit, run {sweeps[0].run}", **FIT)
+        above.plot([], [], label="fit" if len(sweeps) == 1 else f"fit, run {sweeps[0].run}", **FIT)
         for omega in fit.fit.estimate.solution[: len(fit.ends)]:
             for ax in (above, below):
                 ax.axvline(RPM * omega, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
@@ -78,7 +78,7 @@ def bode_plot(sweeps: Sequence[SweepVectors], roll: ComplexArray, fit: FittedMod
             }
             note(above, f"{RPM * omega:.0f} rpm", (RPM * omega, 0.98), (-2, 0), bbox=BOX, **place)
     above.set(ylabel=f"amplitude, {labels.vibration_in or 'no unit'}")
-    above.set_ylim(bottom=0.0)
+    above.set_ylim(0.0, above.get_ylim()[1] * (1.0 if fit is None else 1.25))  # room for the words
     below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees")
     below.yaxis.set_major_locator(right_angles(below))
     if labels.phase == "lag":

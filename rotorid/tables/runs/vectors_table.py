@@ -38,7 +38,7 @@ def read_vectors(path: str | Path, phase: Phase) -> tuple[SweepVectors, ...]:
 
     The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
     `phase_deg`) and, optionally, `time_s` and, both or neither, `amplitude_std_<unit>` and `phase_std_deg`,
-    one standard deviation. Vectors of one time were read at one speed; without times, every speed stands once.
+    one standard deviation. Vectors of one time were read at one speed; without times a speed stands once.
 
     Raises
     ------

@@ -19,6 +19,7 @@ from rotorid.workflows.vibration.runup_result import RunUp, SlowRollVectors
 if TYPE_CHECKING:
     from rotorid.harmonic.modal.run_up import SweepModes, SweepVectors
 
+TABLES = (".csv", ".xlsx", ".txt")
 Phase = Literal["lead", "lag"]
 """Whether positive phases lead or lag."""
 
@@ -178,18 +179,17 @@ def _slow_roll(
     from rotorid.harmonic.modal.run_up import constant_vectors, slow_vectors
     from rotorid.tables.runs.vectors_table import read_slow_roll
 
-    if given == "fit":
+    if isinstance(given, str) and given == "fit":
         if modes is None or modes.fit.undetermined:
             return SlowRollVectors(None, None, "unknown: there is no fit to tell it (--slow-roll SPEED does)")
         words = "of the fit: what no speed changes, modes far below the sweep included"
         return SlowRollVectors(*constant_vectors(modes.fit), words)
-    if (isinstance(given, str) and not number(given.rstrip("rpmadHz/_s")) > 0) or isinstance(given, Path):
+    if isinstance(given, Path) or (isinstance(given, str) and Path(given).suffix.lower() in TABLES):
         file = file_of(given, "a runs table of one run at slow speed")
         files.append(file)
         vectors, said = read_slow_roll(file, sweep)
         return SlowRollVectors(vectors, None, f"of {file.name}", said)
-    from rotorid.workflows.option_values import speeds
-
-    (speed,) = speeds(given if isinstance(given, str) else [given], sweep.labels.speed_unit, "--slow-roll")
+    wanted = given if isinstance(given, str) else [float(given)]
+    (speed,) = read_speeds(wanted, sweep.labels.speed_unit, "--slow-roll")
     words = f"mean of the vectors at or below {sweep.labels.speed_words(speed)}"
     return SlowRollVectors(*slow_vectors(sweep, speed), words)

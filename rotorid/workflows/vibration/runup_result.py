@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rotorid.base.answer import COLUMNS, Answer
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 
 View = Literal["bode", "polar"]
 """What a picture shows."""
+
+
+MUCH_BETTER = 0.25
+"""So much less of the sum of squares phases of the other sign leave, if they are the right ones."""
 
 
 class SlowRollVectors(NamedTuple):
@@ -67,7 +72,26 @@ class RunUp(Outcome):
     @property
     def fit(self) -> FittedModes | None:
         """The modes that can be gone on with."""
-        return None if self.modes is None or self.modes.fit.undetermined else self.modes.fit
+        determined = self.modes is not None and not (self.modes.fit.undetermined or self._turned)
+        return self.modes.fit if self.modes is not None and determined else None
+
+    @cached_property
+    def _turned(self) -> tuple[str, ...]:
+        """That modes explain phases of the other sign much better."""
+        from rotorid.harmonic.modal.run_up import fit_sweep
+
+        sweep = self.sweeps[0]
+        if self.modes is None or self.modes.fit.explains:
+            return ()
+        try:
+            other = fit_sweep(sweep.mirrored, steady=self.steady, bands=self.bands or None).fit
+        except ValueError:
+            return ()
+        left = [float(r @ r) for r in (one.fit.estimate.residuals for one in (self.modes.fit, other))]
+        if other.undetermined or left[1] > MUCH_BETTER * left[0]:
+            return ()
+        sign = "lag" if sweep.labels.phase == "lead" else "lead"
+        return (f"phases are read as {sweep.labels.phase}s; modes explain them as {sign}s (--phase {sign})",)
 
     @property
     def acceleration(self) -> float | None:
@@ -84,9 +108,7 @@ class RunUp(Outcome):
         """What must be known before the numbers are used."""
         if self.modes is None:
             return (f"no modes: {self.why}", *self.roll.warnings)
-        beside = self.modes.steady
-        turned = beside.negative if beside is not None and self.fit is None else ()
-        return (*turned, *self.modes.fit.warnings, *self.roll.warnings)
+        return (*self._turned, *self.modes.fit.warnings, *self.roll.warnings)
 
     def columns(self) -> tuple[Column, ...]:
         """A row a mode: with the acceleration, and as a steady fit has it."""
@@ -170,6 +192,8 @@ class RunUp(Outcome):
         """
         if self.modes is None:
             raise ValueError(f"there is no table of modes: {self.why}")
+        if self._turned:
+            raise ValueError(f"there is no table of modes: {self._turned[0]}")
         table = self.modes.fit.to_frame()
         table.insert(1, "critical_speed_rpm", RPM * table.pop("frequency_rad_s"))
         return table
