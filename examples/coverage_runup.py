@@ -2,11 +2,11 @@
 
 Run `python examples/coverage_runup.py [seed] [rotors]`, rotors at each acceleration (1 and 500).
 
-A rotor has critical speeds of 900 to 1500 rpm and 1.7 to 2.4 times that, damping of 1 to 5 %, and unbalance of
-both modes at angles of their own. It runs up from 300 rpm to 1.25 times its second critical speed, or down, and
-150 vectors of two sensors are read at uneven times, with an error of 1 µm in each direction, on run-out of 5 µm;
-speeds are written to 0.1 rpm. The vectors are exact: z'' + 2ζω z' + ω² z = −(e^{iθ})'' has for a constant
-acceleration a closed form with the error function of a complex number.
+A rotor has critical speeds of 900 to 1500 rpm and 1.7 to 2.4 times that, damping of 1 to 5 %, and unbalance
+of both modes at angles of their own. It runs up from 300 rpm to 1.25 times its second critical speed, or
+down, and 150 vectors of two sensors are read at uneven times, with an error of 1 µm in each direction, on
+run-out of 5 µm; speeds are written to 0.1 rpm. The vectors are exact: z'' + 2ζω z' + ω² z = −(e^{iθ})'' has
+for a constant acceleration a closed form with the error function of a complex number.
 """
 
 from __future__ import annotations

@@ -26,11 +26,11 @@ def truth(rotor):
     return np.concatenate((rotor.omega, rotor.zeta))
 
 
-@pytest.mark.parametrize("rate", [20.0, 300.0, -100.0])
-def test_exact_vectors_give_the_exact_modes(rate):
+@pytest.mark.parametrize(("rate", "first"), [(20.0, 8), (300.0, 25), (-100.0, 8)])
+def test_exact_vectors_give_the_exact_modes(rate, first):
     """The first vectors are left out, so that how the motion began is forgotten."""
     rotor, sweep = drawn(rate=rate, noise=0.0)
-    late = sweep.take(np.arange(8, len(sweep.speeds)))
+    late = sweep.take(np.arange(first, len(sweep.speeds)))
     modes = fit_sweep(replace(late, covariances=None))
     np.testing.assert_allclose(found(modes), truth(rotor), rtol=1e-6)
     off = modes.steady.fit.estimate.solution[:2] / rotor.omega - 1

@@ -106,7 +106,7 @@ def test_options_that_cannot_be(cli, vectors, monkeypatch, tmp_path, words, mess
 
 
 def test_of_several_runs_one_is_chosen(cli, rotor_and_sweep, tmp_path):
-    rotor, sweep = rotor_and_sweep
+    _, sweep = rotor_and_sweep
     both = [replace(sweep, run="A"), replace(sweep, run="B", vectors=sweep.vectors * 1.3j)]
     path = table(tmp_path / "both.csv", both, lag=True)
     found = cli("runup", path, "--phase", "lag")
@@ -138,8 +138,7 @@ def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
     assert reduced.code == 0
 
 
-def test_slow_roll_of_a_speed_and_of_a_file(cli, rotor_and_sweep, vectors, tmp_path):
-    rotor, sweep = rotor_and_sweep
+def test_slow_roll_of_a_speed_and_of_a_file(cli, vectors, tmp_path):
     found = cli("runup", vectors, "--slow-roll", "450", "--json").json
     assert found["slow_roll_from"] == "mean of the vectors at or below 450 rpm"
     file = tmp_path / "slow.csv"

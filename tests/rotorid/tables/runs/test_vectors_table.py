@@ -63,17 +63,17 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
         (HEAD + ROWS.replace("600", "0"), r"row 2, column speed_rpm: found '0', expected a speed above 0"),
         (
             HEAD + ROWS.replace(",20,", ",-20,"),
-            "column amplitude_um_pp: found '-20', expected an amplitude of 0",
+            "amplitude_um_pp: found '-20', expected an amplitude of 0",
         ),
         (HEAD + ROWS.replace(",30,", ",400,"), "column phase_deg: found '400', expected a phase from -360"),
         (
             HEAD + ROWS.replace(",2,6", ",0,6"),
-            "amplitude_std_um_pp: found '0', expected a standard deviation",
+            "amplitude_std_um_pp: found '0', expected a standard dev",
         ),
         (HEAD + ROWS + "a,900,DE,1,1,2,1,1\n", "row 4, column sensor: found 'DE', expected another .* row 3"),
         (
             HEAD + ROWS + "a,901,NDE,1,1,2,1,1\n",
-            "row 4, column speed_rpm: found '901', expected 900 as in row 3",
+            "column speed_rpm: found '901', expected 900 as in row 3",
         ),
         (HEAD.replace(",phase_std_deg", "") + ROWS.replace(",2,6", ",2").replace(",2,3", ",2"), "phase_std"),
         (HEAD.replace("std_um_pp", "std_mm_s") + ROWS, "amplitude_std_mm_s.* a unit that converts"),
