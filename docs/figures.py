@@ -277,15 +277,16 @@ GALLERY = (
         "tacho",
         "instruments",
         f"vectors {RUN_UP} --picture tacho",
-        "The marks pass the level once a turn, none is missing; the later the steeper, a pulse is half a sample "
-        "early or late, which the angle, through all of them, is not.",
+        "No mark is missing. At the end a pulse is half a sample, 0.8°, early or late; the angle, through all of "
+        "them, is not.",
         dense=True,
     ),
     Picture(
         "orbit",
         "instruments",
         f"vectors {RUN_UP} --picture orbit",
-        "Near the second critical speed the shaft goes round in a circle with the rotation, from the dark mark on.",
+        "Near the second critical speed the shaft goes round in a circle, with the rotation; each turn begins at "
+        "the mark.",
         dense=True,
     ),
     Picture(

@@ -19,8 +19,9 @@ def runup(
     data: Annotated[
         Path,
         typer.Argument(
-            metavar="VECTORS",
-            help="Table, .csv or .xlsx, a runs table with time_s: what `vectors` writes.",
+            metavar="RECORD|VECTORS",
+            help="A record, .wav, .mat, .npz, .uff, .tdms, or .csv with --tacho; a waveforms file (.toml); or "
+            "a runs table with time_s, .csv or .xlsx: what `vectors` writes.",
         ),
     ],
     options: RunUpOptions,
@@ -41,7 +42,7 @@ def runup(
     The table of modes (--output) is for `reduce --measured` and `calibrate`, if sensors are named as nodes or
     stations of the rotor.
 
-    Example: rotorid runup vectors.csv --phase lag --plot bode.png --output modes.csv
+    Example: rotorid runup sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --plot bode.png
     """
     from rotorid.tables.reader.table_writing import table_bytes
 

@@ -148,17 +148,7 @@ def fit_sweep(
 
 def _fit(sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, float]] | None) -> FittedModes:
     """Modes around the peaks, but for those that are no more than noise."""
-<<<<<<< HEAD
-    around = None
-    if bands is None:
-        order = np.argsort(sweep.speeds, kind="stable")
-        square = np.abs(answers.excitation[order])[:, None]
-        around = peak_bands(
-            sweep.speeds[order], sweep.vectors[order] / square, NOISE * sweep.noise[order] / square
-        )
-=======
     around = None if bands else _peaks(sweep)
->>>>>>> runup
     while True:
         fit = fit_modes(sweep.experiments, sweep.sensors, answers, bands, around)
         if not around or len(around) == 1 or fit.by_noise.max() <= RARE:
@@ -210,10 +200,6 @@ def slow_vectors(sweep: SweepVectors, speed: float) -> tuple[ComplexArray, Float
     return mean, np.einsum("nci,ncj->cij", parts, parts) / free[:, None, None]
 
 
-<<<<<<< HEAD
-def vectors_at(
-    sweep: SweepVectors, fit: FittedModes | None, speeds: FloatArray
-=======
 def vectors_when_passing(
     sweep: SweepVectors,
     speeds: FloatArray,
@@ -221,7 +207,6 @@ def vectors_when_passing(
     *,
     steady: bool = False,
     bands: Sequence[tuple[float, float]] = (),
->>>>>>> runup
 ) -> tuple[ComplexArray, FloatArray]:
     """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
 

@@ -15,7 +15,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.result import Column as Told
 from rotorid.harmonic.modal.run_up import SweepVectors as SweepVectors
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
+from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
 from rotorid.tables.runs import runs_table
@@ -33,7 +33,7 @@ _BESIDE = re.compile(r"(order\d+_|overall|gap|turns).*")
 _SAME = 1e-9
 
 
-def read_vectors(path: str | Path, phase: Phase) -> tuple[SweepVectors, ...]:
+def read_vectors(source: Source, phase: Phase) -> tuple[SweepVectors, ...]:
     """Read the vectors of each run over speed.
 
     The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
@@ -46,7 +46,7 @@ def read_vectors(path: str | Path, phase: Phase) -> tuple[SweepVectors, ...]:
         With all problems of the file.
     """
     problems = Problems()
-    grid = problems.need(read_grid(path, "vectors", problems, first=True))
+    grid = problems.need(read_grid(source, "vectors", problems, first=True))
     header = tuple("note" if _BESIDE.fullmatch(name) else name for name in grid.header)
     table = problems.need(make_table(replace(grid, header=header), COLUMNS, problems))
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")

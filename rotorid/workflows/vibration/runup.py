@@ -36,6 +36,10 @@ class RunUpOptions:
         Whose modes are fitted, where there are several runs; all are drawn.
     sensors : LIST
         Only these.
+    tacho : NAME
+        Of a record: channel of the tacho, where no waveforms file says.
+    unit : UNIT
+        Of a record: of its numbers, um, mm_s, g, likewise.
     acceleration : A
         Where the table has no times: 50rpm/s, or -50rpm/s down; 0: the speed is held for each vector.
     bands : LIST
@@ -51,6 +55,8 @@ class RunUpOptions:
     phase: Phase | None = None
     run: str | None = None
     sensors: Names | None = None
+    tacho: str | None = None
+    unit: str | None = None
     acceleration: str | float | None = None
     bands: str | Sequence[Band] | None = None
     slow_roll: str | float | Path = "fit"
@@ -64,7 +70,7 @@ def runup(data: Path | str | Sequence[SweepVectors], options: RunUpOptions | Non
     Parameters
     ----------
     data
-        A table of vectors over speed, or these.
+        A table of vectors over speed, a record or waveforms file (.toml), or vectors.
     options
         What differs from the defaults.
 
@@ -77,9 +83,12 @@ def runup(data: Path | str | Sequence[SweepVectors], options: RunUpOptions | Non
 
     options = options or RunUpOptions()
     files: list[Path] = []
+    assumed = options.phase is None and isinstance(data, Path | str)
     if isinstance(data, Path | str):
-        files.append(file_of(data, "a table of vectors"))
-        data = sweep_of(files[0], options)
+        file = file_of(data, "a table of vectors, or a record")
+        recorded = file.suffix.lower() not in TABLES or options.tacho is not None
+        data, read = (_of_records if recorded else _of_table)(file, options)
+        files, assumed = [*read], assumed and not recorded
     sweeps = _ordered(data, options)
     labels = sweeps[0].labels
     given = options.bands.split(",") if isinstance(options.bands, str) else options.bands or []
@@ -105,19 +114,34 @@ def runup(data: Path | str | Sequence[SweepVectors], options: RunUpOptions | Non
         why=why,
         roll=roll,
         steady=steady,
-        assumed=options.phase is None and bool(files),
+        assumed=assumed,
         bands=tuple(bands),
         speeds=speeds,
         provenance=provenance(files, options),
     )
 
 
-def sweep_of(file: Path, options: RunUpOptions) -> tuple[SweepVectors, ...]:
-    """Vectors of each run in a file."""
+def _of_table(file: Path, options: RunUpOptions) -> tuple[tuple[SweepVectors, ...], Sequence[Path]]:
+    """Vectors of each run in a table, and the files that were read."""
     from rotorid.tables.runs.vectors_table import read_vectors
 
     one_of(options.phase or "lead", "--phase", get_args(Phase))
-    return read_vectors(file, options.phase or "lead")
+    return read_vectors(file, options.phase or "lead"), (file,)
+
+
+def _of_records(file: Path, options: RunUpOptions) -> tuple[tuple[SweepVectors, ...], Sequence[Path]]:
+    """The same of a record, or of those of a waveforms file."""
+    from rotorid.tables.reader.problems import Problems
+    from rotorid.tables.runs.vectors_table import read_vectors
+    from rotorid.tables.waveforms.vectors_table import read_vectors_grid
+    from rotorid.tables.waveforms.waveforms import WaveformWishes
+
+    given = WaveformWishes(
+        tacho=options.tacho, sensors=names(options.sensors), unit=options.unit, phase=options.phase
+    )
+    problems = Problems()
+    grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given))
+    return read_vectors(grid, phase), read
 
 
 def _ordered(sweeps: Sequence[SweepVectors], options: RunUpOptions) -> list[SweepVectors]:
