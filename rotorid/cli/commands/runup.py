@@ -20,8 +20,8 @@ def runup(
         Path,
         typer.Argument(
             metavar="RECORD|VECTORS",
-            help="A record, .wav, .mat, .npz, .uff, .tdms, or .csv with --tacho; a waveforms file (.toml); or "
-            "a runs table with time_s, .csv or .xlsx: what `vectors` writes.",
+            help="A record, .wav, .mat, .npz, .uff, .tdms, or .csv with --tacho; a waveforms file (.toml); "
+            "or a runs table with time_s, .csv or .xlsx: what `vectors` writes.",
         ),
     ],
     options: RunUpOptions,
