@@ -172,7 +172,7 @@ def _found(
         wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
         rate = np.full(len(times), (last - first) * record.rate / (end - 1 - begin))
     nearby = np.stack((times, np.maximum(wide, LEAST_TURNS) / rate), axis=1)
-    vectors, deviation, gap = _before_paths(record, tracked, tacho, orders, derivative, times, steady)
+    vectors, deviation, gap = _before_paths(record, tracked, tacho, orders, derivative, times, rate, wide, steady)
     drawn = np.zeros(len(times)) if steady else tacho.angle.deviation(times)
     angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * rate)
     across = np.hypot(deviation, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None, :])
@@ -234,11 +234,14 @@ def _before_paths(
     orders: tuple[int, ...],
     derivative: int | None,
     times: FloatArray,
+    speed: FloatArray,
+    wide: FloatArray,
     steady: bool,
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Vectors and their deviations, (P, C, K), and means (P, C), without what the channels' paths did."""
-    turns, speed = tacho.turn_at(times), tacho.angle.speed(times)
-    rate = np.gradient(speed, times) if len(times) > 1 else np.zeros(1)
+    turns = tacho.turn_at(times)
+    before, after = (np.clip(times + side * wide / speed, *tacho.span) for side in (-0.5, 0.5))
+    rate = (tacho.angle.speed(after) - tacho.angle.speed(before)) / (after - before)
     read, change = tracked.at(turns), tracked.slope(turns) * speed[:, None, None]
     deviation = np.stack([tracked.deviation(turns, k) for k in orders], axis=2)
     if steady:
