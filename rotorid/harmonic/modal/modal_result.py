@@ -145,8 +145,8 @@ class FittedModes(Answered):
         return tuple(found)
 
     def _on_both_sides(self, omega: float, low: float, high: float) -> bool:
-        """Whether there are readings below and above, within the ends around a peak or half as far beyond."""
-        read, more = self.readings.answers.omega, (high - low) / 2
+        """Whether there are readings below and above, at a peak or near: in a fast sweep it stands beside."""
+        read, more = self.readings.answers.omega, 2 * (high - low)
         near = read[(low - more <= read) & (read <= high + more)]
         return bool(near.min() < omega < near.max())
 
