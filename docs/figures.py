@@ -277,8 +277,8 @@ GALLERY = (
         "run-up-bode",
         "instruments",
         f"runup {RUN_UP}",
-        "Two modes explain the run-up to the line. Its peaks come 40 rpm after the critical speeds, because it "
-        "takes 24 s.",
+        "Two modes explain the run-up to the line. Its peaks come 40 rpm after the critical speeds, because "
+        "it takes 24 s.",
         dense=True,
     ),
     Picture(
@@ -292,16 +292,16 @@ GALLERY = (
         "tacho",
         "instruments",
         f"vectors {RUN_UP} --picture tacho",
-        "No mark is missing. At the end a pulse is half a sample, 0.8°, early or late; the angle, through all "
-        "of them, is not.",
+        "No mark is missing. At the end a pulse is half a sample, 0.8°, early or late; the angle, "
+        "through all of them, is not.",
         dense=True,
     ),
     Picture(
         "orbit",
         "instruments",
         f"vectors {RUN_UP} --picture orbit",
-        "Near the second critical speed the shaft goes round in a circle, with the rotation; each turn begins "
-        "at the mark.",
+        "Near the second critical speed the shaft goes round in a circle, with the rotation; each turn "
+        "begins at the mark.",
         dense=True,
     ),
     Picture(

@@ -37,7 +37,7 @@ HIDDEN = 3.0
 """Standard deviations below which a vector has no phase to draw."""
 CURVES = len(COLORS)
 """Most curves of a picture."""
-FIT_POINTS = 1500
+FIT_POINTS, ARROWS = 1500, 6
 FIT: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1))}
 
 
@@ -92,7 +92,11 @@ def bode_plot(sweeps: Sequence[SweepVectors], roll: ComplexArray, fit: FittedMod
 
 
 def polar_plot(sweeps: Sequence[SweepVectors], roll: ComplexArray) -> Figure:
-    """Paths of the vectors less the slow roll (C,), with speeds marked; several runs over each other."""
+    """Paths of the vectors less the slow roll (C,), with speeds marked.
+
+    Several runs are drawn over each other, with arrows from the first to the others at some speeds: what the
+    weights of a trial run did.
+    """
     labels, (curves, words) = sweeps[0].labels, _curves(sweeps)
     every = np.unique(np.concatenate([sweep.speeds for sweep, _, _ in curves]))
     paths = np.full((len(every), len(curves)), complex(np.nan, np.nan))
@@ -106,9 +110,31 @@ def polar_plot(sweeps: Sequence[SweepVectors], roll: ComplexArray) -> Figure:
 
     def draw(ax: Axes) -> None:
         draw_polar(every, paths, names, ax, marks=marks, unit=unit, lag=labels.phase == "lag")
-        ax.set_title(f"{ax.get_title()}\nless the slow roll{words}", fontsize=TEXT)
+        trial = _draw_trial_vectors(ax, every, paths * unit.scale, curves)
+        ax.set_title(f"{ax.get_title()}\nless the slow roll{words}{trial}", fontsize=TEXT)
 
     return on_figure(draw, height=7.4, projection="polar")
+
+
+def _draw_trial_vectors(
+    ax: Axes, speeds: FloatArray, paths: ComplexArray, curves: Sequence[tuple[SweepVectors, int, str]]
+) -> str:
+    """Arrows from the curves of the first run to those of the same sensor in others; what they are, in
+    words.
+    """
+    drawn = False
+    first = {sweep.sensors[c]: k for k, (sweep, c, _) in enumerate(curves) if sweep is curves[0][0]}
+    for k, (sweep, c, _) in enumerate(curves):
+        own = first.get(sweep.sensors[c], k)
+        both = np.flatnonzero(~np.isnan(paths[:, k] + paths[:, own]))
+        if own == k or not both.size:
+            continue
+        for speed in np.linspace(speeds[both[0]], speeds[both[-1]], ARROWS + 2)[1:-1]:
+            ends = [complex(np.interp(speed, speeds[both], paths[both, each])) for each in (own, k)]
+            start, end = ((float(np.angle(z)), abs(z)) for z in ends)
+            ax.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": DARK, "linewidth": 0.9})
+            drawn = True
+    return "; arrows: from the first run to another at one speed" if drawn else ""
 
 
 def _curves(sweeps: Sequence[SweepVectors]) -> tuple[list[tuple[SweepVectors, int, str]], str]:
