@@ -129,7 +129,7 @@ influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller
 influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
 vectors                     vectors sample_data/waveforms/waveforms.toml --orders 1,2 --output runs.csv
 vectors-run-up              vectors sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm --picture orbit --plot orbit.png
-runup-record                runup sample_data/waveforms/run_up.wav --tacho 1 --sensors 2,4 --unit um --phase lag --output modes.csv --table
+runup-record                runup sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --plot bode.png
 vectors-no-tacho            vectors sample_data/waveforms/run_up.wav --unit um
 demo-list                   demo --list
 demo-misspelt               demo --sample maine
