@@ -14,7 +14,7 @@ from rotorid.workflows.vibration.runup import runup as work
 from rotorid.workflows.vibration.runup_result import View
 
 
-@command(RunUpOptions, panels={OUTPUT: "view save_runs"})
+@command(RunUpOptions, panels={"Vectors at some speeds, to balance with": "speeds save_runs", OUTPUT: "view"})
 def runup(
     data: Annotated[
         Path,

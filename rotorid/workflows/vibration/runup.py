@@ -32,7 +32,7 @@ class RunUpOptions:
     ----------
     phase
         What a positive phase is; default: lead, and that is said.
-    run
+    run : NAME
         Whose modes are fitted, where there are several runs; all are drawn.
     sensors : LIST
         Only these.
