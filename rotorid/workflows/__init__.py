@@ -26,6 +26,8 @@ from rotorid.workflows.unbalance import UnbalanceAtStations, UnbalanceOptions, u
 from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
 from rotorid.workflows.vibration.runup import RunUpOptions, runup
 from rotorid.workflows.vibration.runup_result import RunUp
+from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
+from rotorid.workflows.vibration.vectors_result import VectorsOfRecords
 
 __all__ = [
     "Balance",
@@ -69,6 +71,8 @@ __all__ = [
     "TrialWeights",
     "UnbalanceAtStations",
     "UnbalanceOptions",
+    "VectorsOfRecords",
+    "VectorsOptions",
     "balance",
     "bearings",
     "calibrate",
@@ -89,4 +93,5 @@ __all__ = [
     "tolerance",
     "trial_weight",
     "unbalance",
+    "vectors",
 ]

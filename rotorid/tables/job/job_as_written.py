@@ -126,7 +126,7 @@ def _grids(sources: Mapping[str, Source], conventions: Conventions, problems: Pr
     for key, source in sources.items():
         sheet = _SHEET.get(key, "runs")
         if isinstance(source, Path) and source.suffix.lower() == ".toml":
-            from rotorid.tables.waveforms.vectors_table import read_vectors_grid
+            from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
 
             found = read_vectors_grid(source, conventions.labels.phase, problems)
             grid = None if found is None else found[0]

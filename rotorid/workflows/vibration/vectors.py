@@ -82,7 +82,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions) -> VectorsOf
     ValueError
         For records without turns, and options that cannot be.
     """
-    from rotorid.tables.waveforms.vectors_table import find_each, vectors_columns
+    from rotorid.tables.waveforms.vectors_of_records import find_each, vectors_columns
     from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
 
     if options.edge is not None:
