@@ -136,6 +136,10 @@ def track_orders(parts: Parts, first: float, last: float, highest: int) -> Order
     loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
     M = 2 * highest + 1
     start = _solved(band, [loose] * M, right)
+    # parabolas, which no penalty changes, are taken off: stiff penalties would round them
+    parabolas = np.linalg.qr(np.vander(np.linspace(-1, 1, n + 3), 3))[0]
+    trend = np.tensordot(parabolas, np.tensordot(parabolas.T, start, 1), 1)
+    start, right = start - trend, right - times(band, trend.reshape(len(band.T), -1)).reshape(right.shape)
     coefficients, raw, smoothings = [], [], list[tuple[Smoothing, ...]]()
     total = times(alone, np.ones(n + 3))
     for sensor in range(right.shape[2]):
@@ -147,9 +151,10 @@ def track_orders(parts: Parts, first: float, last: float, highest: int) -> Order
                 gram = alone if k == 0 else alone / 2  # mean squares of cosine and sine
                 y = np.ascontiguousarray(left[:, columns] + times(gram, c[:, columns]))
                 own.append(smooth(gram, y)[0])
-                means.append(y @ ((1.0,) if k == 0 else (2.0, 2.0j)) / total)
+                full = y + times(gram, trend[:, columns, sensor])
+                means.append(full @ ((1.0,) if k == 0 else (2.0, 2.0j)) / total)
             c = _solved(band, [own[(m + 1) // 2].penalty for m in range(M)], b)
-        coefficients.append(c)
+        coefficients.append(c + trend[:, :, sensor])
         smoothings.append(tuple(own))
         raw.append(np.stack(means, axis=-1))
     c = np.stack(coefficients, axis=-1)

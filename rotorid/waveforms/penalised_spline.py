@@ -17,6 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize_scalar
 
 from rotorid.base.arrays import AnyArray, FloatArray, IntArray
@@ -208,7 +209,7 @@ def smooth(
         factor, c, variance = solved(float(best.x))
         if turn < ROUNDS - 1:
             jump = (np.diff(c, 3, axis=0) ** 2).sum(axis=1)
-            near = np.convolve(jump, np.ones(2 * NEIGHBOURS + 1), "same")
+            near = uniform_filter1d(jump, 2 * NEIGHBOURS + 1, mode="constant")
             w = 1 / (near + EVENING * near.mean() + 1e-300)
             w /= np.exp(np.log(w).mean())
     coefficients = np.ascontiguousarray(c).view(right.dtype)[:, 0]

@@ -8,6 +8,7 @@ mark two usable edges, each has an offset of its own, which is estimated: marks 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,9 +24,14 @@ HYSTERESIS = 0.15
 """Half of the band, over the height of the pulses."""
 SHARP = 0.9
 """Edges from one sample to the next are higher than this share of the pulses."""
-AVERAGED = 1.3
-"""Such edges scatter by half a sample, uniformly; what scatters so much less, squared, is an offset of all
-of them."""
+EXTREMES = (1, 99)
+"""Per cent of pulses between which sharp edges scatter: over a sample, but for an offset of all of them."""
+MOST_LEFT_OUT = 0.3
+"""Share of pulses too many; more do not belong to a mark a turn."""
+UNEVEN = 0.015
+"""Turns, and a sample; pulses that scatter by more are of several marks, or of no mark."""
+RESTING = 0.5
+"""Share of the samples that are within the band where the level is no edge but where the signal rests."""
 LEAST_PULSES = 8
 WINDOW = 25
 """The median of so many intervals between pulses is the usual one there."""
@@ -100,8 +106,8 @@ class Tacho:
     jitter_deg
         Standard deviation of a pulse, degrees of a turn (median over the record).
     offset_s
-        Standard deviation of all pulses together: sharp edges are somewhere between two samples, and at a
-        speed that goes with the sampling rate no pulse tells more than another.
+        Standard deviation of all pulses together, that of their mean: sharp edges are somewhere between two
+        samples, and at a speed that goes with the sampling rate no pulse tells more than another.
     warnings
         What the user should know.
     angle
@@ -149,7 +155,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     ValueError
         For a signal without pulses, with too few, and with gaps over which turns cannot be counted.
     """
-    level, band = _levels(channel, settings.level)
+    level, band = _levels(channel, settings)
     rising, falling, sharp = _edges(channel.samples, level, band)
     rising, falling = rising / rate, falling / rate
     if min(len(rising), len(falling)) < LEAST_PULSES:
@@ -165,8 +171,17 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     if settings.pulses > 1:
         index, indexed, lost = _from_first_of_turn(begin, index, lost, settings.pulses)
     turns, angle, jitter = _angle(begin, end, index, settings)
-    seen = jitter / float(np.median(angle.speed(begin)))
-    offset = float(np.sqrt(max(0.0, 1 / (12 * rate**2) - AVERAGED * seen**2))) if sharp else 0.0
+    speed = angle.speed(begin)
+    apart = ((turns - angle.turns(begin)) / speed)[index % settings.pulses == 0]
+    seen = float(np.ptp(np.percentile(apart, EXTREMES)))
+    offset = max(0.0, 1 / rate - seen) / np.sqrt(12) if sharp else 0.0
+    worn = max(0.0, (jitter / np.median(speed)) ** 2 - sharp / (12 * rate**2)) / len(begin)
+    if jitter > UNEVEN + np.median(speed) / rate:
+        words += (
+            f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks than "
+            f"{counted(settings.pulses, 'pulse')} a turn (pulses), or is it noise (tacho_level)?",
+        )
+    words += tuple(_silent(begin, speed, len(channel.samples) / rate))
     words += _damage(len(lost), len(double), len(index))
     if not indexed:
         words += (
@@ -174,11 +189,21 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
             f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared",
         )
     return Tacho(
-        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, offset, words, angle, indexed
+        begin,
+        turns,
+        lost / settings.pulses,
+        double,
+        level,
+        band,
+        360 * jitter,
+        float(np.hypot(offset, np.sqrt(worn))),
+        words,
+        angle,
+        indexed,
     )
 
 
-def _levels(channel: Channel, level: float | None) -> tuple[float, float]:
+def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float]:
     """Where edges are, and half the band of hysteresis, in the numbers of the record."""
     some = np.asarray(channel.samples[:: max(1, len(channel.samples) // CHUNK)], dtype=np.float64)
     low, high = np.percentile(some, (0.2, 99.8))
@@ -187,10 +212,16 @@ def _levels(channel: Channel, level: float | None) -> tuple[float, float]:
         low, high = np.median(some[some < middle]), np.median(some[some >= middle])
     if not high > low:
         raise ValueError(f"the tacho {channel.name!r} has no pulses: it reads {low:.4g} throughout")
-    at = middle if level is None else level
+    at = middle if settings.level is None else settings.level
     if not low < at < high:
         raise ValueError(f"tacho_level must be between {low:.4g} and {high:.4g}, the levels of the pulses")
-    return float(at), float(HYSTERESIS * (high - low))
+    band = HYSTERESIS * (high - low)
+    if settings.edge not in ("rising", "falling") and np.mean(np.abs(some - at) < band) > RESTING:
+        raise ValueError(
+            f"the tacho {channel.name!r} rests near {at:.4g} and its pulses go both ways, as of a magnetic "
+            "pickup: say edge = rising or falling, whichever is the steeper, or another tacho_level"
+        )
+    return float(at), float(band)
 
 
 def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, FloatArray, bool]:
@@ -274,6 +305,12 @@ def _counted(begin: FloatArray, pulses: int, name: str) -> tuple[IntArray, IntAr
         at = int(link[at])
         chain.append(at)
     kept = np.array(chain[::-1])
+    if len(begin) - len(kept) > MOST_LEFT_OUT * len(begin):
+        raise ValueError(
+            f"only {len(kept)} of {len(begin)} pulses of the tacho {name!r} follow each other as "
+            f"{counted(pulses, 'pulse')} a turn do: is that number right, and the tacho_level (where marks "
+            "bounce, or differ in height)?"
+        )
     interval = np.diff(begin[kept]) / usual[kept[:-1]]
     count = np.maximum(np.rint(interval), 1)
     unclear = (count > 1) & (np.abs(interval - count) > UNCOUNTED) | (count > SILENT)
@@ -345,7 +382,7 @@ def _angle(
 def _keeps_distance(begin: FloatArray, end: FloatArray, turns: FloatArray) -> bool:
     """Whether the two edges of the marks are the same part of a turn apart throughout the record."""
     apart = (end - begin) * np.gradient(turns, begin)
-    parts = np.array_split(apart, PARTS)
+    parts = np.array_split(apart, min(PARTS, len(apart)))
     means, errors = (np.array([f(part) for part in parts]) for f in (np.mean, np.std))
     errors = np.maximum(errors, 1e-9) / np.sqrt([len(part) for part in parts])
     return bool(np.sum(((means - means.mean()) / errors) ** 2) < MOST_CHI_SQUARE)
@@ -372,6 +409,19 @@ def _variance(left: FloatArray, rate: FloatArray) -> FloatArray:
     size = np.median(left**2) + EXACT**2
     found = nnls(columns / columns.mean(axis=0), np.minimum(left**2 / size, OUTLYING))[0]
     return np.asarray(np.maximum(columns / columns.mean(axis=0) @ found, 1e-3) * size)
+
+
+def _silent(begin: FloatArray, speed: FloatArray, end: float) -> Iterator[str]:
+    """Say where the record goes on without pulses, unless the machine, as its speed changes, stands there."""
+    change = np.gradient(speed, begin)
+    ends = (("first", begin[0], speed[0], change[0]), ("last", end - begin[-1], speed[-1], -change[-1]))
+    for where, span, own, rise in ends:
+        turns = own * span if rise <= 0 else min(own * span, own**2 / (2 * rise))
+        if turns > SILENT:
+            yield (
+                f"the tacho is silent in the {where} {span:.3g} s, about {turns:.0f} turns, which are left "
+                "out: are its pulses too low there (tacho_level)?"
+            )
 
 
 def _damage(missing: int, double: int, pulses: int) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ import typer
 
 from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination
-from rotorid.workflows.waveforms.vectors import VectorsOptions
-from rotorid.workflows.waveforms.vectors import vectors as work
+from rotorid.workflows.vibration.vectors import VectorsOptions
+from rotorid.workflows.vibration.vectors import vectors as work
 
 
 @command(VectorsOptions)

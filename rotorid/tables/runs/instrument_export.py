@@ -106,13 +106,17 @@ def _as_runs_table(grid: Grid, named: Mapping[str, str], phase: str) -> Grid:
             raise _Unclear(f"readings at the running speed (1X) alone: {other}", heading)
     below = _units_row(grid, headings)
     rows = grid.rows[1:] if below else grid.rows
+    plain = not below and all(h in own or h.stem in ("", "note") for h in headings)
+    measured = [h.index for h in own if h.stem in MEASURED]
+    if plain and all(_PLAIN.fullmatch(show(cells[k])) for _, cells in rows for k in measured):
+        return grid
     columns = [_Column(h, h.stem, h.unit, [cells[h.index] for _, cells in rows]) for h in headings]
     found = [
         _numbers(part, below.get(part.heading.index), rows, phase) if part.stem in MEASURED else part
         for column in columns
         for part in _halves(column, headings, rows)
     ]
-    if found == columns and not below and all(h in own or h.stem in ("", "note") for h in headings):
+    if found == columns and plain:
         return grid
     return _assembled(replace(grid, rows=rows), found)
 

@@ -17,7 +17,7 @@ from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.units import VIBRATION
 from rotorid.tables.runs.stated_conventions import as_phase
-from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, read_waveforms
+from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, WaveformWishes, read_waveforms
 from rotorid.waveforms.vectors import Vectors, find_vectors
 
 DIGITS = 6
@@ -121,7 +121,7 @@ def _note(end: np.bool_) -> str:
 
 
 def read_vectors_grid(
-    path: Path, phase: str | None, problems: Problems
+    path: Path, phase: str | None, problems: Problems, given: WaveformWishes | None = None
 ) -> tuple[Grid, Phase, tuple[Path, ...]] | None:
     """The vectors of a waveforms file as the cells of a runs table, their phase convention, files that were
     read.
@@ -129,14 +129,16 @@ def read_vectors_grid(
     Parameters
     ----------
     path
-        Of the waveforms file.
+        Of the waveforms file, or a record.
     phase
         Convention in which phases are wanted; None: that of the file.
     problems
         Collects the complaints; then there is nothing.
+    given
+        What is said beside the file.
     """
     try:
-        waveforms = read_waveforms([path])
+        waveforms = read_waveforms([path], given)
         labels = waveforms.labels if phase is None else replace(waveforms.labels, phase=as_phase(phase))
         columns = vectors_columns(find_each(waveforms), labels)
     except InputError as error:

@@ -10,7 +10,7 @@ from scipy.io import wavfile
 from rotorid.samples import sample_data
 from rotorid.tables.reader.problems import InputError
 from rotorid.workflows import BalanceOptions, balance
-from rotorid.workflows.waveforms.vectors import VectorsOptions, vectors
+from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
 
 SAMPLE = sample_data() / "waveforms"
 RATE = 2048
@@ -118,7 +118,10 @@ def test_pictures(cli, tmp_path, picture):
         (("--tacho", "1", "--speeds", "9000rpm"), "there is no speed of 9000 rpm"),
         (("--tacho", "1", "--pulses", "0"), "pulses"),
         (("--tacho", "1", "--edge", "left"), "leading"),
-        (("--tacho", "1", "--amplitude", "um", "--unit", "V"), "a unit that can become that of the amplitudes"),
+        (
+            ("--tacho", "1", "--amplitude", "um", "--unit", "V"),
+            "a unit that can become that of the amplitudes",
+        ),
     ],
 )
 def test_what_cannot_be_is_told_in_one_message(cli, words, message):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, get_args
 
 from rotorid.workflows.option_values import Names, Speeds, names, one_of, speeds
 from rotorid.workflows.result_provenance import phase, provenance, workflow
-from rotorid.workflows.waveforms.vectors_result import Picture, VectorsOfRecords
+from rotorid.workflows.vibration.vectors_result import Picture, VectorsOfRecords
 
 if TYPE_CHECKING:
     from balancing.data.conventions import Phase
