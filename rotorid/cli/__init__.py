@@ -52,6 +52,7 @@ app = typer.Typer(
 _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Balance rotors": {
         "balance": balance.balance,
+        "vectors": vectors.vectors,
         "trial-weight": trial_weight.trial_weight,
         "split": split.split,
         "tolerance": tolerance.tolerance,
@@ -77,7 +78,6 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "runup": runup.runup,
         "calibrate": calibrate.calibrate,
     },
-    "Read instruments": {"vectors": vectors.vectors},
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
 for _job, _commands in _COMMANDS.items():

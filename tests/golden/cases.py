@@ -339,7 +339,18 @@ PRINTED_ONLY = (
     "task_8_2",
 )
 RECORDS = ("limit_cycle", "quasilinearization", "run_down", "three_masses")
-DEMOS = ("main", "balancing", "holes", "rig", "rotor", "reduction", "identification", "record", "calibration")
+DEMOS = (
+    "main",
+    "balancing",
+    "holes",
+    "rig",
+    "rotor",
+    "reduction",
+    "identification",
+    "record",
+    "calibration",
+    "waveforms",
+)
 COMMANDS = (
     *(
         "demo",

@@ -26,8 +26,8 @@ from rotorid.workflows.balance import balance as work
         "best_planes": 1,
     },
     panels={
-        "Input and conventions": "phase angles amplitude_error phase_error run_error influence waveforms",
-        "Method": "method planes speeds best_planes trade_off coefficients",
+        "Input and conventions": "phase angles amplitude_error phase_error run_error waveforms",
+        "Method": "method planes speeds best_planes trade_off coefficients influence",
         "Limits": "max_mass limit",
         "Mounting": "split best",
         "Check run": "refine history",

@@ -37,7 +37,7 @@ def runup(
     *,
     to: Destination,
 ) -> None:
-    """Critical speeds and damping of a run-up, its acceleration in the model, with ±; slow roll.
+    """Critical speeds and damping of a run-up, its acceleration in the model, with ±.
 
     The table of modes (--output) is for `reduce --measured` and `calibrate`, if sensors are named as nodes or
     stations of the rotor.
