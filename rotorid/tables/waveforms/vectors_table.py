@@ -14,6 +14,7 @@ from rotorid.base import result
 from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.result import Column
 from rotorid.base.rpm import RPM
+from rotorid.base.text import listing
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import InputError, Problems, TableWarning
 from rotorid.tables.reader.units import VIBRATION
@@ -146,6 +147,11 @@ def read_vectors_grid(
         return None
     except ValueError as error:
         problems.add(str(path), None, None, None, f"records with vectors: {error}")
+        return None
+    moving = [each.run for each in found if not each.steady]
+    if moving and waveforms.speeds is None:
+        expected = f"speeds at which {listing(map(repr, moving), 'and')} are read, whose speed is not steady"
+        problems.add(str(path), None, "speeds_rpm", None, f"{expected}, such as speeds_rpm = [900, 1200]")
         return None
     for each in found:
         for word in each.warnings:
