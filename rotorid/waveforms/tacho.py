@@ -155,7 +155,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     ValueError
         For a signal without pulses, with too few, and with gaps over which turns cannot be counted.
     """
-    level, band = _levels(channel, settings)
+    level, band, rests = _levels(channel, settings)
     rising, falling, sharp = _edges(channel.samples, level, band)
     rising, falling = rising / rate, falling / rate
     if min(len(rising), len(falling)) < LEAST_PULSES:
@@ -163,7 +163,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
             f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: "
             f"at least {LEAST_PULSES} are needed (is this the tacho's channel, and the level right?)"
         )
-    begin, end, words = _marks(rising, falling, settings.edge)
+    begin, end, words = _marks(rising, falling, settings.edge, rests)
     kept, index = _counted(begin, settings.pulses, channel.name)
     double, begin, end = np.delete(begin, kept), begin[kept], end[kept]
     lost = np.setdiff1d(np.arange(index[-1]), index).astype(np.float64)
@@ -203,25 +203,30 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     )
 
 
-def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float]:
-    """Where edges are, and half the band of hysteresis, in the numbers of the record."""
+def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float, bool]:
+    """Where edges are, and half the band of hysteresis, in the numbers of the record; and whether it is there
+    that the signal rests.
+    """
     some = np.asarray(channel.samples[:: max(1, len(channel.samples) // CHUNK)], dtype=np.float64)
     low, high = np.percentile(some, (0.2, 99.8))
     middle = (low + high) / 2
-    if high > low:
+
+    def rests(at: float) -> bool:
+        return bool(np.mean(np.abs(some - at) < HYSTERESIS * (high - low)) > RESTING)
+
+    if high > low and not rests(middle):
         low, high = np.median(some[some < middle]), np.median(some[some >= middle])
     if not high > low:
         raise ValueError(f"the tacho {channel.name!r} has no pulses: it reads {low:.4g} throughout")
-    at = middle if settings.level is None else settings.level
+    at = float(middle if settings.level is None else settings.level)
     if not low < at < high:
         raise ValueError(f"tacho_level must be between {low:.4g} and {high:.4g}, the levels of the pulses")
-    band = HYSTERESIS * (high - low)
-    if settings.edge not in ("rising", "falling") and np.mean(np.abs(some - at) < band) > RESTING:
+    if rests(at) and settings.edge not in ("rising", "falling"):
         raise ValueError(
             f"the tacho {channel.name!r} rests near {at:.4g} and its pulses go both ways, as of a magnetic "
             "pickup: say edge = rising or falling, whichever is the steeper, or another tacho_level"
         )
-    return float(at), float(band)
+    return at, float(HYSTERESIS * (high - low)), rests(at)
 
 
 def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, FloatArray, bool]:
@@ -242,7 +247,7 @@ def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, Fl
 
 
 def _marks(
-    rising: FloatArray, falling: FloatArray, edge: Edge
+    rising: FloatArray, falling: FloatArray, edge: Edge, rests: bool
 ) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
     """Where each pulse has its angle 0, and its other edge; and what to say about the polarity."""
     first, second = _paired(rising, falling)
@@ -257,7 +262,7 @@ def _marks(
             f"the tacho is high for {100 * share:.0f} % of the time, so that either level may be the mark: "
             "high is taken (say edge = rising or falling)",
         )
-    elif not unclear and edge in ("rising", "falling") and (edge == "rising") != high:
+    elif not (unclear or rests) and edge in ("rising", "falling") and (edge == "rising") != high:
         words = (
             f"the tacho's marks are {'high' if high else 'low'} ({100 * min(share, 1 - share):.0f} % of the "
             f"time), and edge = {edge} is where they end",

@@ -172,7 +172,9 @@ def _found(
         wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
         rate = np.full(len(times), (last - first) * record.rate / (end - 1 - begin))
     nearby = np.stack((times, np.maximum(wide, LEAST_TURNS) / rate), axis=1)
-    vectors, deviation, gap = _before_paths(record, tracked, tacho, orders, derivative, times, rate, wide, steady)
+    vectors, deviation, gap = _before_paths(
+        record, tracked, tacho, orders, derivative, times, rate, wide, steady
+    )
     drawn = np.zeros(len(times)) if steady else tacho.angle.deviation(times)
     angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * rate)
     across = np.hypot(deviation, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None, :])

@@ -13,6 +13,8 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit
 
 ROUNDING = 1e-12
+UNSAID = 0.1
+"""Per cent within which no machine keeps its speed from run to run, so that nothing need be said."""
 _NAMED = 3
 
 
@@ -93,7 +95,7 @@ def _merged_words(
     alike = [
         f"{', '.join(f'{speed * unit.scale:.6g}' for speed in members)} as {show_speed(mean, unit)}"
         for members, mean in zip(groups, merged, strict=True)
-        if len(members) > 1
+        if not same_speed(members[0], members[-1], UNSAID)
     ]
     if not alike:
         return ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +14,9 @@ from rotorid.base import result
 from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.result import Column
 from rotorid.base.rpm import RPM
+from rotorid.base.text import listing
 from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.tables.reader.problems import InputError, Problems, TableWarning
 from rotorid.tables.reader.units import VIBRATION
 from rotorid.tables.runs.stated_conventions import as_phase
 from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, WaveformWishes, read_waveforms
@@ -124,7 +126,7 @@ def read_vectors_grid(
     path: Path, phase: str | None, problems: Problems, given: WaveformWishes | None = None
 ) -> tuple[Grid, Phase, tuple[Path, ...]] | None:
     """The vectors of a waveforms file as the cells of a runs table, their phase convention, files that were
-    read.
+    read. What is to be known of the records is a `TableWarning`.
 
     Parameters
     ----------
@@ -140,13 +142,22 @@ def read_vectors_grid(
     try:
         waveforms = read_waveforms([path], given)
         labels = waveforms.labels if phase is None else replace(waveforms.labels, phase=as_phase(phase))
-        columns = vectors_columns(find_each(waveforms), labels)
+        found = find_each(waveforms)
+        columns = vectors_columns(found, labels)
     except InputError as error:
         problems.extend(error.problems)
         return None
     except ValueError as error:
         problems.add(str(path), None, None, None, f"records with vectors: {error}")
         return None
+    moving = [each.run for each in found if not each.steady]
+    if moving and waveforms.speeds is None:
+        expected = f"speeds at which {listing(map(repr, moving), 'and')} are read, whose speed is not steady"
+        problems.add(str(path), None, "speeds_rpm", None, f"{expected}, such as speeds_rpm = [900, 1200]")
+        return None
+    for each in found:
+        for word in each.warnings:
+            warnings.warn(f"{path}: run {each.run!r}: {word}", TableWarning, stacklevel=2)
     cells = (tuple("" if value is None else value for value in row.values()) for row in result.rows(columns))
     header = tuple(column.name for column in columns)
     return Grid(str(path), 1, header, tuple(enumerate(cells, start=2))), labels.phase, waveforms.files

@@ -128,7 +128,9 @@ def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
     turns = START + (RATE / 160) * T  # 160 samples a turn: every edge is between the same two
     tacho = read(5.0 * (turns % 1 < 0.05))
     assert tacho.offset_s == pytest.approx(1 / RATE / np.sqrt(12))
-    assert read(pulses()).offset_s == 0.0
+    assert read(pulses()).offset_s < 0.05 / RATE  # all places between two samples occur
+    turns = START + (RATE / 160.3) * T  # ten of them
+    assert read(5.0 * (turns % 1 < 0.05)).offset_s == pytest.approx(0.1 / RATE / np.sqrt(12), rel=0.2)
 
 
 @pytest.mark.parametrize(
@@ -142,6 +144,55 @@ def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
 def test_what_does_not_tell_turns_is_refused(samples, words):
     with pytest.raises(ValueError, match=words):
         read(samples)
+
+
+def test_a_wrong_number_of_uneven_pulses_is_said():
+    (words,) = read(pulses((0, 0.4)), pulses=1).warnings
+    assert words.startswith(
+        "the tacho's pulses scatter by 36° around even turns: are there other marks than 1"
+    )
+
+
+def test_marks_that_bounce_or_are_too_many_to_follow_each_other_are_refused():
+    turn = TURNS % 1
+    bounces = 5.0 * ((turn < 0.02) | ((turn > 0.025) & (turn < 0.03)) | ((turn > 0.034) & (turn < 0.05)))
+    with pytest.raises(ValueError, match=r"only \d+ of 1\d\d\d pulses of the tacho 'KEY' follow each other"):
+        read(bounces)
+
+
+def test_pulses_that_grow_out_of_the_level_are_said():
+    (words,) = read(pulses(high=1.0) * (0.5 + T / 4)).warnings
+    assert words.startswith("the tacho is silent in the first 11.1 s, about 292 turns")
+
+
+def test_a_machine_that_stands_at_first_and_at_last_is_silent_without_a_word():
+    turns = np.where(T < 3, 0.2, 0.2 + np.clip(T - 3, 0, 8) ** 2)
+    turns = np.where(T > 11, turns + 16 * np.clip(T - 11, 0, 6) - 16 / 12 * np.clip(T - 11, 0, 6) ** 2, turns)
+    assert read(5.0 * (turns % 1 < 0.05)).warnings == ()
+
+
+@pytest.mark.parametrize(("polarity", "edge"), [(-1.0, "falling"), (1.0, "rising")])
+def test_a_magnetic_pickup_is_read_where_it_is_steep(polarity, edge):
+    place = ((TURNS + 0.5) % 1 - 0.5) / 0.02
+    signal = polarity * place * np.exp(-(place**2) / 2) * (12 + 2 * T)
+    signal += 0.02 * np.random.default_rng(0).standard_normal(len(T))
+    with pytest.raises(
+        ValueError, match="rests near .* and its pulses go both ways, as of a magnetic pickup"
+    ):
+        read(signal)
+    tacho = read(signal, edge=edge)
+    assert np.abs(offsets(tacho)).max() * 360 < 0.1
+    assert tacho.warnings == ()
+
+
+@pytest.mark.parametrize("count", range(8, 13))
+def test_a_few_turns_are_enough(count):
+    some = pulses()[: int(np.searchsorted(TURNS, count + 1.2))]
+    tacho = read_tacho(Channel("KEY", some), RATE, TachoSettings())
+    assert len(tacho.times) == count + 1
+    t = np.linspace(*tacho.span, 50)
+    off = tacho.turn_at(t) - np.interp(t, T, TURNS)
+    assert np.abs(off - np.round(off.mean())).max() * 360 < 1.0
 
 
 def test_a_level_beyond_the_pulses_is_refused():

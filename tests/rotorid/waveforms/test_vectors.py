@@ -184,3 +184,74 @@ def test_a_vector_that_moves_at_a_steady_speed_is_said():
     x += 1e-7 * np.random.default_rng(1).standard_normal(len(t))
     (words,) = find_vectors(steady(x, turns), TachoSettings()).warnings
     assert words.startswith("1× of 'A' moves by up to 1")
+
+
+def noisy(turns, vector, noise, seed, rate=RATE):
+    x = (vector * np.exp(2j * np.pi * turns)).real
+    return steady(x + noise * np.random.default_rng(seed).standard_normal(len(x)), turns, rate=rate)
+
+
+@pytest.mark.parametrize("turns", [9.5, 12.5, 21.5, 45.5])
+def test_a_short_record(turns):
+    t = np.arange(int(RATE * turns / 25.3)) / RATE
+    found = find_vectors(noisy(25.3 * t + 0.4, VECTOR, 1e-6, 0), TachoSettings())
+    error = abs(found.vectors[0, 0, 0] - VECTOR)
+    assert error < 4 * np.hypot(found.radial[0, 0, 0], found.tangential[0, 0, 0])
+    assert error < 0.01 * abs(VECTOR)
+
+
+@pytest.mark.parametrize(("seconds", "noise"), [(1.0, 1e-6), (20.0, 1e-7)])
+def test_stated_errors_of_a_steady_phase_hold_where_the_tacho_is_the_bottleneck(seconds, noise):
+    pulls = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        turns = rng.uniform(15, 60) * np.arange(int(RATE * seconds)) / RATE + rng.uniform()
+        found = find_vectors(noisy(turns, VECTOR, noise, seed), TachoSettings())
+        pulls.append((found.vectors[0, 0, 0] * np.exp(-0.5j)).imag / found.tangential[0, 0, 0])
+    assert np.mean(np.abs(pulls) < 1.96) >= 0.93
+
+
+def test_stiff_filters_do_not_round():
+    for seed in range(4):
+        turns = 57.40985 * np.arange(int(RATE * 20)) / RATE + 0.2
+        measured = noisy(turns, VECTOR, 1e-6, seed)
+        found = find_vectors(measured, TachoSettings())
+        begin, end = (round(at * RATE) for at in found.tacho.span)
+        part = slice(begin, end)
+        plain = 2 * np.mean(measured.sensors[0].samples[part] * np.exp(-2j * np.pi * turns[part]))
+        assert abs(abs(found.vectors[0, 0, 0]) - abs(plain)) < 0.1 * found.radial[0, 0, 0]
+
+
+@pytest.mark.parametrize("derivative", [1, 2])
+def test_a_steady_speed_integrates_with_its_mean(derivative):
+    turns = 30.3 * np.arange(int(RATE * 10)) / RATE + 0.3
+    vector = VECTOR * (2j * np.pi * 30.3) ** derivative
+    x = (vector * np.exp(2j * np.pi * turns)).real
+    found = find_vectors(steady(x, turns, derivative=derivative), TachoSettings(), derivative=0)
+    assert abs(found.vectors[0, 0, 0]) == pytest.approx(abs(VECTOR), rel=5e-5)
+
+
+def test_one_speed_that_is_asked_for_is_integrated_as_all_are(run):
+    rate = 20480.0
+    t = np.arange(int(rate * 60)) / rate
+    turns = run.turns(t)
+    x = np.gradient((run.vector(t) * np.exp(2j * np.pi * turns)).real, t)
+    measured = steady(x, turns, None, 1, rate)
+    for speeds in ([30.0], [30.0, 30.0], [40.0, 30.0]):
+        found = find_vectors(measured, TachoSettings(), derivative=0, speeds=2 * np.pi * np.array(speeds))
+        assert np.abs(found.vectors[:, 0, 0] / run.vector(found.times) - 1).max() < 1e-3
+
+
+def test_the_overall_level_is_over_whole_turns():
+    t = np.arange(int(RATE * 20)) / RATE
+    turns = 10 * t + t**2
+    found = find_vectors(steady((VECTOR * np.exp(2j * np.pi * turns)).real, turns), TachoSettings())
+    assert found.overall[:, 0, 0] == pytest.approx(abs(VECTOR), rel=0.01)
+    assert found.overall[:, 0, 1] == pytest.approx(abs(VECTOR), rel=0.2)
+
+
+def test_a_resonance_that_is_passed_within_few_turns_is_said():
+    fast = machine(seconds=2.3)  # 2.5 turns within the half-power points
+    found = find_vectors(record(fast, 1, 2.3), TachoSettings())
+    (words,) = found.warnings
+    assert words.startswith("1× of 'A' is hardly told along the run-up")
