@@ -27,13 +27,13 @@ from rotorid.workflows.balance import balance as work
     },
     panels={
         "Input and conventions": "phase angles amplitude_error phase_error run_error waveforms",
-        "Method": "method planes speeds best_planes trade_off coefficients influence",
+        "Method": "method planes speeds best_planes trade_off coefficients",
         "Limits": "max_mass limit",
         "Mounting": "split best",
         "Check run": "refine history",
         "Grade": "grade rotor_mass service_speed positions bearings centre",
         OUTPUT: "save_influence template",
-        "Expert": "model_error ridge truncate split_seconds",
+        "Expert": "influence model_error ridge truncate split_seconds",
     },
     to=(*WITH_REPORT, *EQUATIONS),
 )

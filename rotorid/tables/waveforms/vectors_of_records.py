@@ -123,10 +123,16 @@ def _note(end: np.bool_) -> str:
 
 
 def read_vectors_grid(
-    path: Path, phase: str | None, problems: Problems, given: WaveformWishes | None = None
+    path: Path,
+    phase: str | None,
+    problems: Problems,
+    given: WaveformWishes | None = None,
+    *,
+    moving: bool = False,
 ) -> tuple[Grid, Phase, tuple[Path, ...]] | None:
-    """The vectors of a waveforms file as the cells of a runs table, their phase convention, files that were
-    read. What is to be known of the records is a `TableWarning`.
+    """The vectors of a waveforms file as cells of a runs table, their phase convention, files that were read.
+
+    What is to be known of the records is a `TableWarning`.
 
     Parameters
     ----------
@@ -138,6 +144,8 @@ def read_vectors_grid(
         Collects the complaints; then there is nothing.
     given
         What is said beside the file.
+    moving
+        Whether records whose speed changes need no chosen speeds.
     """
     try:
         waveforms = read_waveforms([path], given)
@@ -150,9 +158,9 @@ def read_vectors_grid(
     except ValueError as error:
         problems.add(str(path), None, None, None, f"records with vectors: {error}")
         return None
-    moving = [each.run for each in found if not each.steady]
-    if moving and waveforms.speeds is None:
-        expected = f"speeds at which {listing(map(repr, moving), 'and')} are read, whose speed is not steady"
+    swept = [each.run for each in found if not each.steady]
+    if swept and waveforms.speeds is None and not moving:
+        expected = f"speeds at which {listing(map(repr, swept), 'and')} are read, whose speed is not steady"
         problems.add(str(path), None, "speeds_rpm", None, f"{expected}, such as speeds_rpm = [900, 1200]")
         return None
     for each in found:

@@ -140,7 +140,7 @@ def _of_records(file: Path, options: RunUpOptions) -> tuple[tuple[SweepVectors, 
         tacho=options.tacho, sensors=names(options.sensors), unit=options.unit, phase=options.phase
     )
     problems = Problems()
-    grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given))
+    grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given, moving=True))
     return read_vectors(grid, phase), read
 
 
