@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BENCH_VENV ?= .venv-bench
 HSBALANCE_VENV ?= .venv-hsbalance
+ROTA_ORDER_VENV ?= .venv-rota-order
 LATEST_VENV ?= .venv-latest
 LOWEST_VENV ?= .venv-lowest
 LOWEST_PYTHON ?= python3.11
@@ -96,8 +97,9 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer
-	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python $(BENCH_VENV)/bin/python -m benchmarks --json docs/benchmarks.json
+bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer $(ROTA_ORDER_VENV)/.peer
+	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python ROTORID_ROTA_ORDER_PYTHON=$(ROTA_ORDER_VENV)/bin/python \
+	  $(BENCH_VENV)/bin/python -m benchmarks --json docs/benchmarks.json
 
 build: $(VENV)/.dev
 	$(BIN)/python -m pip -q install build
@@ -110,7 +112,7 @@ constraints:
 	$(UV_VENV)/bin/python -m pip -q install uv
 	$(UV_VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --upgrade --no-config --no-annotate \
 	  --custom-compile-command 'make constraints' --output-file constraints.txt pyproject.toml \
-	  --extra fast --extra instruments --group dev --group bench --group peer --group house > /dev/null
+	  --extra fast --extra instruments --group dev --group bench --group peer --group peer-vectors --group house > /dev/null
 
 $(VENV)/.pip: $(CONSTRAINTS)
 	$(call environment,$(VENV))
@@ -136,6 +138,12 @@ $(HSBALANCE_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
 	$(HSBALANCE_VENV)/bin/python -m pip -q uninstall -y xpress
 	touch $@
 
+# rota-order is under the GPL: in its own environment, with nothing of rotorid
+$(ROTA_ORDER_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
+	$(call environment,$(ROTA_ORDER_VENV))
+	$(ROTA_ORDER_VENV)/bin/python -m pip -q install --group peer-vectors
+	touch $@
+
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) build dist demo docs/_build
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(ROTA_ORDER_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) build dist demo docs/_build
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .mutants

@@ -22,6 +22,7 @@ BENCHMARKS = (
     "reduction",
     "motion",
     "calibrate",
+    "vectors",
 )
 
 

@@ -20,7 +20,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import contextlib
-import subprocess
 import sys
 import tempfile
 import time
@@ -73,14 +72,12 @@ def joint() -> tuple[np.ndarray, np.ndarray]:
 def run() -> list:
     from balancing.mounting.discrete_weights import solve_discrete
     from balancing.mounting.holes import equal_holes, from_list
-    from benchmarks.balancing_solvers import peer_python
+    from benchmarks.peers import run_peer
     from benchmarks.timing import Row, best_of
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "split.npz"
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-        command = [str(peer_python()), str(Path(__file__).resolve()), str(file)]
-        subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
+        run_peer("hsbalance", __file__, file)
         theirs = dict(np.load(file))
     rows = []
     for H in HOLES:

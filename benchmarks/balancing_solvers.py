@@ -17,7 +17,6 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import subprocess
 import sys
 import tempfile
 import time
@@ -35,7 +34,6 @@ REQUIRED = {("least-squares", N): 100.0 for N, _ in SIZES} | {
 }
 REPEAT = {24: 40, 120: 20, 600: 8}  # of the peer; five times as often ours
 ALLOWED = 1e-6
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def problem(N: int, P: int) -> tuple[np.ndarray, np.ndarray]:
@@ -71,25 +69,9 @@ def peer(file: Path) -> None:
     np.savez(file, **answers)
 
 
-def peer_python() -> Path:
-    """The Python of hsbalance's environment.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where there is none.
-    """
-    path = Path(os.environ.get("ROTORID_HSBALANCE_PYTHON", ROOT / ".venv-hsbalance" / "bin" / "python"))
-    if not path.exists():
-        raise FileNotFoundError(
-            f"there is no Python with hsbalance at {path}: run `make .venv-hsbalance/.peer`, or name one in "
-            "ROTORID_HSBALANCE_PYTHON"
-        )
-    return path
-
-
 def run() -> list:
     from balancing.solvers.least_squares_minmax import solve
+    from benchmarks.peers import run_peer
     from benchmarks.timing import Row, best_of
 
     problems = {N: problem(N, P) for N, P in SIZES}
@@ -99,9 +81,7 @@ def run() -> list:
             file,
             **{f"{name}{N}": a for N, pair in problems.items() for name, a in zip("WY", pair, strict=True)},
         )
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-        command = [str(peer_python()), str(Path(__file__).resolve()), str(file)]
-        subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
+        run_peer("hsbalance", __file__, file)
         theirs = dict(np.load(file))
     rows = []
     for method in METHODS:

@@ -24,6 +24,7 @@ RESPONSE = (
 )
 CALIBRATE = f"calibrate {COMPRESSOR} sample_data/calibration/trial.toml --estimate 'bearing[*].*'"
 MOTION = "sample_data/motion"
+RUN_UP = "sample_data/waveforms/run_up.wav --tacho 1 --sensors 2,3,4 --unit um --phase lag"
 THREE = "reduce sample_data/rotor23.csv --nodes 7,12,18"
 PNG_DOTS = 150
 """Dots an inch of a .png."""
@@ -271,6 +272,44 @@ GALLERY = (
         f"{CALIBRATE} --prior 'bearing[*].*=20%'",
         "One run with two weights tells stiffness and damping of both bearings, known to 20 % before, to 1.4 "
         "to 7 %, and nothing of their cross-coupled stiffness or of the discs.",
+    ),
+    Picture(
+        "run-up-bode",
+        "instruments",
+        f"runup {RUN_UP}",
+        "Two modes explain the run-up to the line. Its peaks come 40 rpm after the critical speeds, because "
+        "it takes 24 s.",
+        dense=True,
+    ),
+    Picture(
+        "run-up-polar",
+        "instruments",
+        f"runup {RUN_UP} --view polar",
+        "The same as polar plots: each mode a loop, the speed at its marks.",
+        dense=True,
+    ),
+    Picture(
+        "tacho",
+        "instruments",
+        f"vectors {RUN_UP} --picture tacho",
+        "No mark is missing. At the end a pulse is half a sample, 0.8°, early or late; the angle, "
+        "through all of them, is not.",
+        dense=True,
+    ),
+    Picture(
+        "orbit",
+        "instruments",
+        f"vectors {RUN_UP} --picture orbit",
+        "Near the second critical speed the shaft goes round in a circle, with the rotation; each turn "
+        "begins at the mark.",
+        dense=True,
+    ),
+    Picture(
+        "waterfall",
+        "instruments",
+        f"vectors {RUN_UP} --picture waterfall",
+        "What goes with the speed lies on the line of 1×, and grows where it crosses the two modes.",
+        dense=True,
     ),
     Picture(
         "bearings",

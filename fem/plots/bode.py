@@ -34,6 +34,7 @@ from rotorid.base.plot_style import (
 )
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted
+from rotorid.base.unit_words import Shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 
 
 _ROWS = 5
+MICROMETRES = Shown("µm peak", 1e6)
 
 
 def draw_response(
@@ -101,7 +103,7 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
         plain(phases)
         phases.margins(x=0.01)
         phases.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
-        phases.yaxis.set_major_locator(_right_angles(phases))
+        phases.yaxis.set_major_locator(right_angles(phases))
         if legend := sizes.get_legend():
             legend.remove()
         for ax in rows[c] if c < C - 1 else ():
@@ -172,7 +174,7 @@ def draw_bode(
     plain(below)
     below.margins(x=0.01)
     below.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
-    below.yaxis.set_major_locator(_right_angles(below))
+    below.yaxis.set_major_locator(right_angles(below))
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     for speed, text in _together(peaks, factors, 0.06 * (omega[-1] - omega[0])):
@@ -213,6 +215,8 @@ def draw_polar(
     *,
     marks: int = 6,
     windows: Sequence[Window] = (),
+    unit: Shown = MICROMETRES,
+    lag: bool = False,
 ) -> Axes:
     """Draw readings as curves in the plane (Nyquist): distance is amplitude, angle is phase lead.
 
@@ -226,6 +230,10 @@ def draw_polar(
         About how many speeds to write along each curve.
     windows
         Ranges without a steady response, which are left out.
+    unit
+        Of the amplitudes.
+    lag
+        Whether angles are written as lags, which grow against the rotation, clockwise.
     """
     ax = new_axes((WIDTH, 6.6), projection="polar") if ax is None else ax
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
@@ -233,20 +241,26 @@ def draw_polar(
     omega, Z = omega[steady], Z[steady]
     marked: list[complex] = []
     for k, (reading, named) in enumerate(zip(Z.T, labels, strict=True)):
-        curve, phase, size = look(k), np.unwrap(np.angle(reading)), 1e6 * np.abs(reading)
+        curve, phase, size = look(k), np.angle(reading), unit.scale * np.abs(reading)
+        read = ~np.isnan(reading)
+        phase[read] = np.unwrap(np.angle(reading[read]))
         ax.plot(_with_gaps(phase, steady), _with_gaps(size, steady), linewidth=1.6, label=named, **curve)
-        for speed in _along(omega * RPM, reading, marks):
-            there = complex(np.interp(speed, omega * RPM, reading))
-            if any(abs(there - other) < 0.08 * np.abs(Z).max() for other in marked):
+        for speed in _along(omega[read] * RPM, reading[read], marks):
+            there = complex(np.interp(speed, omega[read] * RPM, reading[read]))
+            if any(abs(there - other) < 0.08 * np.nanmax(np.abs(Z)) for other in marked):
                 continue
             marked.append(there)
             angle, color = float(np.angle(there)), curve["color"]
-            place, marker = (angle, 1e6 * abs(there)), MARKERS[k % len(MARKERS)]
+            place, marker = (angle, unit.scale * abs(there)), MARKERS[k % len(MARKERS)]
             ax.plot(*place, marker, color=color, markersize=6, zorder=4)
             outwards = (20 * np.cos(angle), 11 * np.sin(angle))
             note(ax, f"{speed:.0f}", place, outwards, ha="center", va="center", color=color, bbox=BOX)
     ax.grid(color="#d0d5dc", linewidth=0.8)
-    ax.set_title("amplitude, µm peak, over phase lead, degrees; marks: speed, rpm", fontsize=TEXT)
+    way = "phase lag, degrees, against the rotation" if lag else "phase lead, degrees"
+    ax.set_title(f"amplitude, {unit.word}, over {way}; marks: speed, rpm", fontsize=TEXT)
+    if lag:
+        leads = range(0, 360, 45)
+        ax.set_xticks(np.radians(leads), [f"{-angle % 360}°" for angle in leads])
     legend_above(ax, height=-0.08)
     rays = np.arange(22.5, 360.0, 45.0)
     near = np.abs(np.angle(Z[..., None] * np.exp(-1j * np.radians(rays)))) < np.radians(12)
@@ -276,10 +290,11 @@ def _along(rpm: FloatArray, curve: ComplexArray, marks: int) -> list[float]:
     return list(dict.fromkeys(taken))
 
 
-def _right_angles(ax: Axes) -> MultipleLocator:
+def right_angles(ax: Axes) -> MultipleLocator:
+    """Ticks of degrees on a vertical axis: not more than eight, of a quarter turn if possible."""
     from matplotlib.ticker import MultipleLocator
 
-    low, high = ax.get_ylim()
+    low, high = sorted(ax.get_ylim())
     return MultipleLocator(next(step for step in (15, 30, 45, 90, 180, 360, 1e9) if (high - low) / step <= 8))
 
 

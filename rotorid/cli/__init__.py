@@ -28,6 +28,7 @@ from rotorid.cli.commands import (
     periodic,
     reduce,
     response,
+    runup,
     schema,
     simulate,
     split,
@@ -51,6 +52,7 @@ app = typer.Typer(
 _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Balance rotors": {
         "balance": balance.balance,
+        "vectors": vectors.vectors,
         "trial-weight": trial_weight.trial_weight,
         "split": split.split,
         "tolerance": tolerance.tolerance,
@@ -73,9 +75,9 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "fit": fit.fit,
         "simulate": simulate.simulate,
         "modes": modes.modes,
+        "runup": runup.runup,
         "calibrate": calibrate.calibrate,
     },
-    "Read instruments": {"vectors": vectors.vectors},
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
 for _job, _commands in _COMMANDS.items():

@@ -19,7 +19,7 @@ from rotorid.waveforms.tacho import Tacho, read_tacho
 
 STEADY, WINDOWS = 0.01, 20
 """A record whose speed, in so many windows, stays within this share of it has one vector."""
-PART, MOST_PLACES = 1 << 18, 500
+PART, MOST_PLACES = 1 << 16, 500
 """Samples at a time; places at which the turns that count are found."""
 HIGHEST = 0.45
 """Of the sampling rate: beyond, an order is not what the samples hold."""

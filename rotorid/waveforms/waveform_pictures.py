@@ -15,19 +15,21 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import BLUE, DARK, QUIET, TEXT, VERMILION, legend_below, new_figure, note, plain
 from rotorid.regression import solution
 from rotorid.waveforms.record import Channel, WaveformRecord
+from rotorid.waveforms.tacho_picture import figure_tacho
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.waveforms.tacho import Tacho
+    from rotorid.waveforms.vectors import Vectors
 
 UNITS = {0: ("µm", 1e6), 1: ("mm/s", 1e3), 2: ("m/s²", 1.0), None: ("", 1.0)}
 """By the derivative that a sensor measures: the unit shown, and how many of it are 1 in SI."""
 LOOKS = {"1×": (VERMILION, 2.4, 8.0, 2), "as measured": (BLUE, 0.8, 4.0, 4)}
 """Colour of a curve, widths of its line and its dots, and how near the front."""
-BLANK, POINTS = 0.06, 200
-"""Of a turn, before its mark; of a curve in a turn."""
+TURNS, BLANK, POINTS = 4, 0.06, 200
+"""Of an orbit; share of a turn before its mark; points of a curve in a turn."""
 A_LINE = 0.02
 """An orbit that is narrower, of its length, has no direction."""
 LINES, TALLEST, SEEN = 48, 0.3, 0.02
@@ -41,13 +43,34 @@ RUN_UP = 0.05
 """Share of the speed by which it must change to be an axis."""
 
 
+def figure_of(picture: str, record: WaveformRecord, found: Vectors) -> Figure:
+    """Draw "tacho", "waterfall" of the first sensor, or "orbit" of the first two where their 1× is largest.
+
+    Raises
+    ------
+    ValueError
+        For an orbit of one sensor, and as `figure_orbit`.
+    """
+    tacho = found.tacho
+    if picture == "tacho":
+        assert record.tacho is not None
+        return figure_tacho(record.tacho, record.rate, tacho)
+    if picture == "waterfall":
+        return figure_waterfall(record, found.sensors[0], tacho, orders=sorted({1, 2, *found.orders}))
+    if len(found.sensors) < 2:
+        raise ValueError(f"{record.source}: an orbit needs two sensors; there is only {found.sensors[0]!r}")
+    largest = found.times[np.argmax(np.linalg.norm(found.vectors[:, :2, 0], axis=1))]
+    latest = np.interp(tacho.turns[-1] - TURNS - 1, tacho.turns, tacho.times)
+    return figure_orbit(record, found.sensors[:2], tacho, min(largest, latest))
+
+
 def figure_orbit(
     record: WaveformRecord,
-    pair: tuple[str, str],
+    pair: Sequence[str],
     tacho: Tacho,
     at: float,
     *,
-    turns: int = 4,
+    turns: int = TURNS,
     angles: tuple[float, float] | None = None,
     clockwise: bool = False,
 ) -> Figure:
@@ -101,12 +124,14 @@ def figure_orbit(
     axes["0"].tick_params(labelbottom=False)
     axes["1"].set_xlabel("turns")
     _draw_plane(axes["orbit"], pair, on_paper(looking), on_paper(weights @ first), clockwise=clockwise)
-    axes["orbit"].set_title(
-        _whirl(weights @ vectors, weights.conj() @ vectors) + unit.replace(",", ""), fontsize=TEXT
-    )
-    along = pair if angles is None else ("along 0°", f"along {270 if clockwise else 90}°")
+    way, size = _whirl(weights @ vectors, weights.conj() @ vectors)
+    along = ("along 0°", f"along {270 if clockwise else 90}°")
+    if angles is None:
+        size = f"if {pair[1]} stands 90° after {pair[0]}; {size}"
+        along = (pair[0], f"{'−' if clockwise else ''}{pair[1]}")
+    axes["orbit"].set_title(f"1×: {way}\n{size}{unit.replace(',', '')}", fontsize=TEXT)
     axes["orbit"].set(xlabel=along[0] + unit, ylabel=along[1] + unit)
-    said = f"angles not known: {pair[1]} is taken to stand 90° after {pair[0]}, with the rotation"
+    said = f"angles not known: drawn as if {pair[1]} stood 90° after {pair[0]}, with the rotation"
     legend_below(figure, [axes["orbit"]], 3, title=said if angles is None else None)
     return figure
 
@@ -162,12 +187,12 @@ def _draw_plane(
     ax.text(0.1, 0.87, "rotation", color=DARK, fontsize=TEXT, ha="center", transform=ax.transAxes)
 
 
-def _whirl(forward: ComplexArray, backward: ComplexArray) -> str:
-    """1× in words, of twice its parts with the rotation and against it, ()."""
+def _whirl(forward: ComplexArray, backward: ComplexArray) -> tuple[str, str]:
+    """Way and size of 1× in words, of twice its parts with the rotation and against it, ()."""
     long, short = (float(np.abs(forward) + sign * np.abs(backward)) / 2 for sign in (1, -1))
     way = "forward whirl, with the rotation" if short > 0 else "backward whirl, against the rotation"
     way = "nearly along a line" if abs(short) < A_LINE * long else way
-    return f"1×: {way}\nsemi-axes {long:.3g} × {abs(short):.3g}"
+    return way, f"semi-axes {long:.3g} × {abs(short):.3g}"
 
 
 def figure_waterfall(
@@ -209,7 +234,9 @@ def figure_waterfall(
     bar = step * max(m for m in (1, 2, 5) if m * step <= largest)
     side, top = ax.get_yaxis_transform(), place[0] + bar * tall
     ax.plot([1.02, 1.02], [place[0], top], color=DARK, linewidth=2, transform=side, clip_on=False)
-    ax.text(1.03, place[0], f"{bar:g} {unit} (peak)", transform=side, rotation=90, fontsize=TEXT)
+    ax.text(
+        1.03, place[0], " ".join(f"{bar:g} {unit} (peak)".split()), transform=side, rotation=90, fontsize=TEXT
+    )
     ax.set(xlim=(0, highest), xlabel="frequency, Hz", ylabel="speed, rpm" if run_up else "time, s")
     words = f"{LINES} spectra of {n / rate:.2g} s, {FLAT_TOP * rate / n:.2g} Hz wide (flat top)"
     ax.set_title(f"{sensor}: {words}", fontsize=TEXT, pad=16)
@@ -235,6 +262,8 @@ def spectra(channel: Channel, rate: float, times: FloatArray, n: int) -> tuple[F
 
 def _instants(tacho: Tacho, rate: float) -> tuple[FloatArray, FloatArray, int]:
     """Speeds, turns a second, evenly, when they are, s, and how many samples a spectrum takes there."""
+    from scipy.fft import next_fast_len
+
     start, stop = tacho.times[0], tacho.times[-1]
     t = np.linspace(start, stop, 10 * LINES)
     speed = np.gradient(tacho.turn_at(t), t)
@@ -243,4 +272,4 @@ def _instants(tacho: Tacho, rate: float) -> tuple[FloatArray, FloatArray, int]:
     inside = (t >= start + T / 2) & (t <= stop - T / 2)
     way = np.cumsum(np.abs(np.gradient(speed[inside])) + 1e-4 * speed.max())
     times = np.interp(np.linspace(way[0], way[-1], LINES), way, t[inside])
-    return np.interp(times, t, speed), times, int(T * rate)
+    return np.interp(times, t, speed), times, next_fast_len(int(T * rate), real=True)

@@ -11,7 +11,6 @@ from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
-from rotorid.workflows.modes import ModesOfReadings, ModesOptions, modes
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
@@ -24,6 +23,11 @@ from rotorid.workflows.split import SplitOptions, SplitWeight, split
 from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
 from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
 from rotorid.workflows.unbalance import UnbalanceAtStations, UnbalanceOptions, unbalance
+from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
+from rotorid.workflows.vibration.runup import RunUpOptions, runup
+from rotorid.workflows.vibration.runup_result import RunUp
+from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
+from rotorid.workflows.vibration.vectors_result import VectorsOfRecords
 
 __all__ = [
     "Balance",
@@ -56,6 +60,8 @@ __all__ = [
     "ResponseOptions",
     "RotorInfluence",
     "RotorResponse",
+    "RunUp",
+    "RunUpOptions",
     "SimulateOptions",
     "Simulation",
     "SplitOptions",
@@ -65,6 +71,8 @@ __all__ = [
     "TrialWeights",
     "UnbalanceAtStations",
     "UnbalanceOptions",
+    "VectorsOfRecords",
+    "VectorsOptions",
     "balance",
     "bearings",
     "calibrate",
@@ -79,9 +87,11 @@ __all__ = [
     "periodic",
     "reduce",
     "response",
+    "runup",
     "simulate",
     "split",
     "tolerance",
     "trial_weight",
     "unbalance",
+    "vectors",
 ]

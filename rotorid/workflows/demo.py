@@ -20,7 +20,7 @@ from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 if TYPE_CHECKING:
     import pandas as pd
 
-COPIED = (".csv", ".toml", ".md", ".txt")
+COPIED = (".csv", ".toml", ".md", ".txt", ".wav")
 
 
 @dataclass(frozen=True)

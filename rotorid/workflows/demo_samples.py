@@ -173,6 +173,20 @@ SAMPLES = {
             ),
         ),
     ),
+    "waveforms": Sample(
+        "two planes from the waveforms of three runs, a run-up beside them",
+        ("waveforms",),
+        (
+            Step(
+                "vectors",
+                "1× of each run, and the tacho",
+                "vectors {}/waveforms/waveforms.toml --plot {}/tacho.png",
+            ),
+            Step(
+                "balance", "Weights from the records", "balance {}/waveforms/job.toml --plot {}/balance.png"
+            ),
+        ),
+    ),
     "calibration": Sample(
         "bearings of a compressor from one trial run, then weights without one",
         ("compressor", "calibration"),

@@ -162,8 +162,8 @@ def check_names(
         raise ValueError(f"{what}: the value of {listing(lost, 'and')} is missing, such as {lost[0]}=1")
 
 
-def band(given: Band | None, what: str = "--operating") -> tuple[float, float] | None:
-    """Read "9000:10500rpm" as the lowest and highest speed of a range in rad/s; None stays None."""
+def band(given: Band | None, what: str = "--operating", usual: str = "rad_s") -> tuple[float, float] | None:
+    """Read "9000:10500rpm" (without a unit: the usual) as the ends of a range in rad/s; None stays None."""
     if given is None:
         return None
     if not isinstance(given, str):
@@ -171,11 +171,13 @@ def band(given: Band | None, what: str = "--operating") -> tuple[float, float] |
     else:
         text = given.strip()
         unit = next((name for name in _SPEED_UNITS if text.endswith(name)), "")
-        factor = _SPEED_UNITS.get(unit, 1.0)
+        factor = _SPEED_UNITS[unit or usual]
         ends = [number(part) for part in text.removesuffix(unit).split(":")]
     if len(ends) != 2 or not 0 <= ends[0] < ends[1] <= FASTEST / factor:
+        others = " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != usual.replace("_", "/"))
         raise ValueError(
-            f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
+            f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in {usual.replace('_', '/')}, or with "
+            f"{others} at the end"
         )
     return ends[0] * factor, ends[1] * factor
 

@@ -1,12 +1,16 @@
 """Write the records: `python make_data.py` (needs NumPy and SciPy only, not rotorid).
 
-A drawn machine on two bearings with two modes (1,560 and 2,640 rpm, damping 3 and 2.5 %), two planes and a probe at
-each end (horizontal at the drive end, A, with its vertical neighbour V; horizontal at the free end, B). Four runs at
-a steady 1,950 rpm: as found, a trial weight of 10 g at 0° in each plane, and a run with known weights; and a run-up
-from 600 to 3,300 rpm in 24 s. Each record has a tacho (a notch of 18°, so that the pulse is low) and three probes: 1×
-of the machine, a run-out of 4 µm, some 2×, and noise of 1 µm. 16 bit; 100 mV are 25.4 µm peak to peak, as 4 mV/µm.
+A drawn machine on two bearings with two modes (1,560 and 2,640 rpm, damping 3 and 2.5 %), two planes and a
+probe at each end (horizontal at the drive end, A, with its vertical neighbour V; horizontal at the free end,
+B). Three runs at a steady 1,950 rpm: as found, and a trial weight of 10 g at 0° in each plane; and a run-up
+from 600 to 3,300 rpm in 24 s. Each record has a tacho (a notch of 18°, so that the pulse is low) and three
+probes: 1× of the machine, a run-out of 4 µm, some 2×, and noise of 1 µm. 16 bit; 100 mV are 25.4 µm peak to
+peak, as 4 mV/µm.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +26,17 @@ MASS = 60.0
 FOUND = {"left": 9e-3 * np.exp(1j * np.radians(75)), "right": 6e-3 * np.exp(1j * np.radians(200))}
 RUN_OUT = {"A": 4e-6 * np.exp(0.4j), "V": 3.5e-6 * np.exp(2.2j), "B": 4e-6 * np.exp(-1.1j)}
 VOLTS_PER_M, FULL_SCALE = 4e3, 10.0
+Array = np.ndarray
 
 
-def motion(weights, time, speed, rate):
+def motion(
+    weights: Mapping[str, complex], time: Array, speed: Callable[[float], float], rate: float
+) -> Array:
     """Complex amplitudes of the modes along a run, (2, N): speed(t) in rad/s, rate its constant change."""
     forces = [sum(RADIUS * w * PLANES[p][r] / MASS for p, w in weights.items()) for r in range(2)]
     force = np.array(forces)
 
-    def change(t, y):
+    def change(t: float, y: Array) -> Array:
         q, v = np.split(y, 2)
         w = speed(t)
         stiff = MODES**2 - w**2 + 1j * rate + 2j * DAMPING * MODES * w
@@ -45,7 +52,9 @@ def motion(weights, time, speed, rate):
     return np.array([np.interp(time, coarse, q.real) + 1j * np.interp(time, coarse, q.imag) for q in found])
 
 
-def write(name, weights, seconds, first, last, seed):
+def write(
+    name: str, weights: Mapping[str, complex], seconds: float, first: float, last: float, seed: int
+) -> None:
     """One record."""
     rng = np.random.default_rng(seed)
     t = np.arange(int(RATE * seconds)) / RATE

@@ -41,7 +41,7 @@ def formulas(text):
 
 def test_the_index_lists_every_page():
     assert sorted(PAGES) == sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
-    assert len(PAGES) == 10
+    assert len(PAGES) == 12
 
 
 def run(page):

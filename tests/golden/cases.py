@@ -127,12 +127,17 @@ influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
 influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
+vectors                     vectors sample_data/waveforms/waveforms.toml --orders 1,2 --output runs.csv
+vectors-run-up              vectors sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm --picture orbit --plot orbit.png
+runup-record                runup sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --plot bode.png
+vectors-no-tacho            vectors sample_data/waveforms/run_up.wav --unit um
 demo-list                   demo --list
 demo-misspelt               demo --sample maine
 """
 
 BALANCE_COMMANDS = f"""
 turbo                       balance {TURBO}/job.toml --plot corrections.png
+waveforms                   balance sample_data/waveforms/job.toml
 turbo-files                 balance {TURBO}/runs.csv {TURBO}/weights.csv --amplitude-error 2 --phase-error 2
 turbo-output                balance {TURBO}/job.toml --output sheet.xlsx
 turbo-output-table          balance {TURBO}/job.toml --output corrections.csv --save-influence w.csv --verbose
@@ -334,7 +339,18 @@ PRINTED_ONLY = (
     "task_8_2",
 )
 RECORDS = ("limit_cycle", "quasilinearization", "run_down", "three_masses")
-DEMOS = ("main", "balancing", "holes", "rig", "rotor", "reduction", "identification", "record", "calibration")
+DEMOS = (
+    "main",
+    "balancing",
+    "holes",
+    "rig",
+    "rotor",
+    "reduction",
+    "identification",
+    "record",
+    "calibration",
+    "waveforms",
+)
 COMMANDS = (
     *(
         "demo",

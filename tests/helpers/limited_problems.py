@@ -1,4 +1,4 @@
-"""Drawn problems of the weighted fit within limits, and a global search of their objective by SciPy."""
+"""Drawn problems of the weighted fit within limits, and a global search of their objective by SciPy; cones."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from scipy.optimize import minimize
 
 from balancing import Limits
 from balancing.solvers import likelihood
+from balancing.solvers.cone import problem as cone_problem
+from balancing.solvers.cone import solve_cone
 from balancing.solvers.correction_methods import Stack
 from balancing.solvers.effective_variance import effective_variance
 from balancing.solvers.forbidden_angles import allowed_sectors
@@ -141,3 +143,15 @@ def global_search(stack, fit, tries):
             if np.isfinite(found.fun) and kept(found.x).min(initial=0.0) >= -1e-9:
                 best = min(best, float(found.fun))
     return best
+
+
+def least_squares_cone(W, Y, **given):
+    return solve_cone(cone_problem(W, Y, **given))
+
+
+def minmax_cone(W, Y, **given):
+    return solve_cone(cone_problem(W, Y, minmax=True, **given))
+
+
+def weight_budget_cone(W, Y, budget, **given):
+    return solve_cone(cone_problem(W, Y, budget=budget, **given))

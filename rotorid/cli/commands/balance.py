@@ -26,14 +26,14 @@ from rotorid.workflows.balance import balance as work
         "best_planes": 1,
     },
     panels={
-        "Input and conventions": "phase angles amplitude_error phase_error run_error influence waveforms",
+        "Input and conventions": "phase angles amplitude_error phase_error run_error waveforms",
         "Method": "method planes speeds best_planes trade_off coefficients",
         "Limits": "max_mass limit",
         "Mounting": "split best",
         "Check run": "refine history",
         "Grade": "grade rotor_mass service_speed positions bearings centre",
         OUTPUT: "save_influence template",
-        "Expert": "model_error ridge truncate split_seconds",
+        "Expert": "influence model_error ridge truncate split_seconds",
     },
     to=(*WITH_REPORT, *EQUATIONS),
 )

@@ -9,8 +9,8 @@ import typer
 
 from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination
-from rotorid.workflows.modes import ModesOptions
-from rotorid.workflows.modes import modes as work
+from rotorid.workflows.vibration.modes import ModesOptions
+from rotorid.workflows.vibration.modes import modes as work
 
 
 @command(ModesOptions)

@@ -7,13 +7,21 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import command
+from rotorid.cli.common_options import OUTPUT, command
 from rotorid.cli.output import Destination
-from rotorid.workflows.waveforms.vectors import VectorsOptions
-from rotorid.workflows.waveforms.vectors import vectors as work
+from rotorid.workflows.vibration.vectors import VectorsOptions
+from rotorid.workflows.vibration.vectors import vectors as work
 
 
-@command(VectorsOptions)
+@command(
+    VectorsOptions,
+    panels={
+        "Input": "tacho sensors unit amplitude phase",
+        "Tacho": "pulses edge rate",
+        "Vectors": "orders speeds",
+        OUTPUT: "picture",
+    },
+)
 def vectors(
     records: Annotated[
         list[Path],
@@ -25,7 +33,7 @@ def vectors(
     options: VectorsOptions,
     to: Destination,
 ) -> None:
-    """Vectors of 1× and other orders of waveforms with a tacho, with ±: a runs table for `balance`.
+    """1× and other orders of waveforms with a tacho, with ±: the runs table of `balance`.
 
     Example: rotorid vectors sample_data/waveforms/waveforms.toml --output runs.csv
     """

@@ -35,6 +35,7 @@ def fit_modes(
     answers: Answers,
     bands: Sequence[tuple[float, float]] | None = None,
     around: Sequence[tuple[float, float]] | None = None,
+    start: FloatArray | None = None,
 ) -> FittedModes:
     """Fit modes to amplitudes around resonances.
 
@@ -51,6 +52,8 @@ def fit_modes(
         each peak, and everything counts.
     around
         The same where everything counts; None: `peak_bands`.
+    start
+        ω_r and ζ_r to begin with; None: of the circle in each.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def fit_modes(
     order = np.flatnonzero(read)[np.argsort(omega[read], kind="stable")]
     experiments, answers = experiments.take(order), answers.take(order)
     omega, Z = experiments.frequencies, experiments.table(points)
-    H = Z / answers.excitation[:, None]
+    H = (Z.T / answers.reference).T
     sections = sorted(bands or around or peak_bands(omega, H))
     if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
         raise ValueError("--bands overlap: each holds one mode")
@@ -76,7 +79,7 @@ def fit_modes(
             f"too few readings: every resonance needs 3 frequencies, and every point {len(rows) + 2} (one a "
             "mode and two for modes beyond the range), and one more for the frequencies and damping"
         )
-    q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel()
+    q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel() if start is None else start
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(rows) + 1)]
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour

@@ -23,8 +23,8 @@ class Answers(Protocol):
         """Frequencies or speeds (n,), rad/s."""
 
     @property
-    def excitation(self) -> ComplexArray:
-        """But for a factor, what a displacement far below all resonances follows, (n,)."""
+    def reference(self) -> ComplexArray | float:
+        """What amplitudes are compared to where peaks and circles are looked for, (n,)."""
 
     @property
     def damping(self) -> tuple[float, float]:
@@ -42,11 +42,19 @@ class Answers(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SteadyAnswers:
-    """g = e / (1 − (ω/ω_r)² + 2 i ζ_r ω/ω_r), e and e/ω² under an excitation e (n,) at frequencies ω (n,)."""
+    """g = e / (1 − (ω/ω_r)² + 2 i ζ_r ω/ω_r), e and e/ω² under an excitation e (n,) at frequencies ω (n,).
+
+    The excitation is, but for a factor, what a displacement far below all resonances follows.
+    """
 
     omega: FloatArray
     excitation: ComplexArray
     damping: tuple[float, float] = (-1.0, 1.0)
+
+    @property
+    def reference(self) -> ComplexArray:
+        """The excitation."""
+        return self.excitation
 
     def basis(self, q: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """See `Answers`."""
@@ -85,7 +93,7 @@ class Readings:
         return self._last[key]
 
     def point(self, p: int, q: FloatArray) -> tuple[AnyArray, ...]:
-        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariance, (k, 2, k, 2)."""
+        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariance."""
         from scipy.linalg import lapack
 
         seen = ~np.isnan(self.Z[:, p])

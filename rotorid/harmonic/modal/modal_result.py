@@ -81,7 +81,7 @@ class FittedModes(Answered):
         readings, estimate = self.readings, self.fit.estimate
 
         def sums(q: FloatArray) -> ComplexArray:
-            return columns(q) @ np.transpose(readings.each(2, q))
+            return np.asarray(columns(q) @ np.transpose(readings.each(2, q)))
 
         q = estimate.solution
         steps = 1e-6 * np.diag(np.maximum(np.abs(q), 1e-4))
@@ -128,7 +128,8 @@ class FittedModes(Answered):
         ):
             if chance[mode - 1] > RARE:
                 found.append(
-                    f"mode {mode} ({self.told_at(omega)}) is no more than noise: say in --bands where modes are"
+                    f"mode {mode} ({self.told_at(omega)}) is no more than noise: say in --bands "
+                    "where modes are"
                 )
             elif not 2 * error < high - low:
                 found.append(f"these readings do not tell frequency and damping of mode {mode}")
@@ -137,11 +138,22 @@ class FittedModes(Answered):
                     f"mode {mode} ({self.told_at(omega)}) stands on one frequency, perhaps a wild reading: "
                     "measure closer by, or say in --bands where modes are"
                 )
-            elif not low < omega < high:
+            elif not self._on_both_sides(omega, low, high):
                 found.append(f"mode {mode} ({self.told_at(omega)}) is read on one side only")
             elif zeta + 2 * other < 0:
                 found.append(f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads")
         return tuple(found)
+
+    def _on_both_sides(self, omega: float, low: float, high: float) -> bool:
+        """Whether there are readings below and above, at a peak or near: in a fast sweep it stands beside."""
+        read, more = self.readings.answers.omega, 2 * (high - low)
+        near = read[(low - more <= read) & (read <= high + more)]
+        return bool(near.min() < omega < near.max())
+
+    @property
+    def explains(self) -> bool:
+        """Whether the modes are determined and leave no more than errors."""
+        return not (self.undetermined or self._misfits)
 
     @cached_property
     def parts(self) -> tuple[FloatArray, FloatArray]:
@@ -167,12 +179,27 @@ class FittedModes(Answered):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known before the numbers are used."""
-        from scipy.special import chdtrc, ndtr
+        from scipy.special import chdtrc
 
         (along, across), (_, variances) = self.parts
         lost = (across**2).sum(axis=1) / (along**2).sum(axis=1)  # of the real parts, of second order
         chance = chdtrc(max(len(self.points) - 1, 1), (across**2 / variances).sum(axis=1))
         minded = np.maximum(EXACT, np.median(self.shape_std, axis=1) / 2)
+        return (
+            *self.undetermined,
+            *(f"{why}; or another mode is in the range (--bands)" for why in self._misfits),
+            *(
+                f"mode {mode + 1} is complex: phases scatter by {np.degrees(lost[mode] ** 0.5):.2g}°, more "
+                "than errors explain; its real shape is not exact (heavy damping, or another mode beside it)"
+                for mode in np.flatnonzero((chance < RARE) & (lost > minded))
+            ),
+        )
+
+    @property
+    def _misfits(self) -> list[str]:
+        """Why what is left is more than errors."""
+        from scipy.special import ndtr
+
         misfits, (point, omega, size) = [*misfit(self.fit.estimate)], self.worst
         if (self.fit.estimate.dof + 1) * np.exp(-(size**2) / self.unit / 2) < RARE:
             off = size / self.unit**0.5
@@ -181,15 +208,7 @@ class FittedModes(Answered):
             )
         if not self.fit.estimate.errors_stated and ndtr(-self.trend) < RARE:
             misfits.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")
-        return (
-            *self.undetermined,
-            *(f"{why}; or another mode is in the range (--bands)" for why in misfits),
-            *(
-                f"mode {mode + 1} is complex: phases scatter by {np.degrees(lost[mode] ** 0.5):.2g}°, more "
-                "than errors explain; its real shape is not exact (heavy damping, or another mode beside it)"
-                for mode in np.flatnonzero((chance < RARE) & (lost > minded))
-            ),
-        )
+        return misfits
 
     def columns(self) -> tuple[Column, ...]:
         """The table of modes that `reduce` and `identify` read, a row per mode and point."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +19,12 @@ from rotorid.harmonic.modal.swept_answers import swept_answers
 
 NOISE = 5.0
 """Standard deviations of a vector that are no peak."""
+SAME = 1e-9
+"""So much beyond its ends a speed is still one of a sweep."""
+SLOWEST = 3
+"""So many vectors of the slowest are the run-out, where peaks are looked for."""
 NEIGHBOURS = 7
-"""So many vectors around a speed lie on a parabola, where no modes explain them."""
+"""So many vectors around a speed lie on a parabola, but for what modes explain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +67,13 @@ class SweepVectors:
             vectors=self.vectors[rows],
             covariances=None if own is None else own[rows],
         )
+
+    @property
+    def mirrored(self) -> SweepVectors:
+        """With phases of the other sign."""
+        own = self.covariances
+        turned = None if own is None else own * [[1.0, -1.0], [-1.0, 1.0]]
+        return replace(self, vectors=self.vectors.conj(), covariances=turned)
 
     @property
     def experiments(self) -> Experiments:
@@ -126,22 +138,17 @@ def fit_sweep(
     ValueError
         As `fit_modes`.
     """
-    held = SteadyAnswers(sweep.speeds, sweep.speeds**2 + 0j)
+    held = SteadyAnswers(sweep.speeds, (sweep.speeds**2).astype(np.complex128))
     if steady or sweep.time is None:
         return SweepModes(_fit(sweep, held, bands), None)
     fit = _fit(sweep, swept_answers(sweep.time, sweep.speeds), bands)
-    return SweepModes(fit, fit_modes(sweep.experiments, sweep.sensors, held, bands, fit.ends))
+    beside = fit_modes(sweep.experiments, sweep.sensors, held, bands, fit.ends, fit.fit.estimate.solution)
+    return SweepModes(fit, beside)
 
 
 def _fit(sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, float]] | None) -> FittedModes:
     """Modes around the peaks, but for those that are no more than noise."""
-    around = None
-    if bands is None:
-        order = np.argsort(sweep.speeds, kind="stable")
-        square = np.abs(answers.excitation[order])[:, None]
-        around = peak_bands(
-            sweep.speeds[order], sweep.vectors[order] / square, NOISE * sweep.noise[order] / square
-        )
+    around = None if bands else _peaks(sweep)
     while True:
         fit = fit_modes(sweep.experiments, sweep.sensors, answers, bands, around)
         if not around or len(around) == 1 or fit.by_noise.max() <= RARE:
@@ -149,11 +156,19 @@ def _fit(sweep: SweepVectors, answers: Answers, bands: Sequence[tuple[float, flo
         del around[int(fit.by_noise.argmax())]
 
 
+def _peaks(sweep: SweepVectors) -> list[tuple[float, float]]:
+    """Speeds around each peak of what differs from the slowest vectors."""
+    order = np.argsort(sweep.speeds, kind="stable")
+    Z = sweep.vectors[order]
+    slow = [own[~np.isnan(own)][:SLOWEST].mean() for own in Z.T]
+    return peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise[order])
+
+
 def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
     """What no speed changes: run-out, and modes far below. Vectors (C,) and covariances of their parts."""
 
     def columns(q: FloatArray) -> ComplexArray:
-        return np.eye(q.size // 2 + 2)[-1:] * (q[0] ** 2 + 0j)
+        return np.asarray(np.eye(q.size // 2 + 2)[-1:] * q[0] ** 2, dtype=complex)
 
     vectors, covariances = fit.predicted(columns)
     return vectors[0], covariances[0]
@@ -185,31 +200,45 @@ def slow_vectors(sweep: SweepVectors, speed: float) -> tuple[ComplexArray, Float
     return mean, np.einsum("nci,ncj->cij", parts, parts) / free[:, None, None]
 
 
-def vectors_at(
-    sweep: SweepVectors, fit: FittedModes | None, speeds: FloatArray
+def vectors_when_passing(
+    sweep: SweepVectors,
+    speeds: FloatArray,
+    modes: SweepModes | None = None,
+    *,
+    steady: bool = False,
+    bands: Sequence[tuple[float, float]] = (),
 ) -> tuple[ComplexArray, FloatArray]:
     """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
 
-    Of the fit, if there is one; else of a parabola through the nearest vectors.
+    Of its modes (None: they are fitted), where these explain it and count everywhere; else what they leave
+    of the nearest vectors lies on a parabola.
 
     Raises
     ------
     ValueError
-        For a speed that the sweep does not pass.
+        For a speed that the sweep does not pass, and for too few vectors near it.
     """
-    low, high = float(sweep.speeds.min()), float(sweep.speeds.max())
-    if len(beyond := speeds[(speeds < low) | (speeds > high)]):
-        words = sweep.labels.speed_words
+    low, high, words = float(sweep.speeds.min()), float(sweep.speeds.max()), sweep.labels.speed_words
+    if len(beyond := speeds[(speeds < low * (1 - SAME)) | (speeds > high * (1 + SAME))]):
         raise ValueError(
-            f"--speeds: run {sweep.run!r} goes from {words(low)} to {words(high)} only, not to {words(beyond[0])}"
+            f"--speeds: run {sweep.run!r} goes from {words(low)} to {words(high)}, not to {words(beyond[0])}"
         )
-    if fit is not None:
+    if modes is None and not bands:
+        with suppress(ValueError):
+            modes = fit_sweep(sweep, steady=steady)
+    fit = None if modes is None or bands or modes.fit.undetermined else modes.fit
+    if fit is not None and fit.explains:
         return fit.predicted(lambda q: fit.readings.answers.at(speeds).basis(q)[0])
+    known = np.zeros((len(sweep.speeds) + len(speeds), len(sweep.sensors)), dtype=complex)
+    if fit is not None:
+        every = fit.readings.answers.at(np.concatenate((sweep.speeds, speeds)))
+        known = every.basis(q := fit.fit.estimate.solution)[0] @ np.transpose(fit.readings.each(2, q))
+    rest = replace(sweep, vectors=sweep.vectors - known[: len(sweep.speeds)])
     shape = len(speeds), len(sweep.sensors)
     vectors, covariances = np.zeros(shape, dtype=complex), np.zeros((*shape, 2, 2))
     for m, c in np.ndindex(shape):
-        vectors[m, c], covariances[m, c] = _between(sweep, c, float(speeds[m]))
-    return vectors, covariances
+        vectors[m, c], covariances[m, c] = _between(rest, c, float(speeds[m]))
+    return vectors + known[len(sweep.speeds) :], covariances
 
 
 def _between(sweep: SweepVectors, c: int, speed: float) -> tuple[complex, FloatArray]:

@@ -1,8 +1,8 @@
 """What modes answer to an unbalance while the speed changes.
 
-With the angle θ(t), Ω = θ' and s = −ζω + iω√(1 − ζ²), z'' + 2ζω z' + ω² z = ω² (Ω² − iΩ') e^{iθ} has the answer
-z = (z_s − z_s̄) / (s − s̄), where z_s' = s z_s + ω² (Ω² − iΩ') e^{iθ}; a vector is z e^{−iθ}. From step to step of
-a uniform grid z_s is exact but for a Gauss quadrature of the force. Derivation: docs/theory/run_up.md.
+With the angle θ(t), Ω = θ' and s = −ζω + iω√(1 − ζ²), z'' + 2ζω z' + ω² z = ω² (Ω² − iΩ') e^{iθ} has the
+answer z = (z_s − z_s̄) / (s − s̄), where z_s' = s z_s + ω² (Ω² − iΩ') e^{iθ}; a vector is z e^{−iθ}. From step
+to step of a uniform grid z_s is exact but for a Gauss quadrature of the force (docs/theory/run_up.md).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_GAUSS = np.polynomial.legendre.leggauss(4)
+_GAUSS = np.polynomial.legendre.leggauss(8)
 NODES, WEIGHTS = (_GAUSS[0] + 1) / 2, _GAUSS[1] / 2
-STEP = 0.5
-"""Angle of a step at the highest speed, rad: the quadrature is good to 1e-9."""
-MOST_STEPS = 5_000_000
+STEP = 2.0
+"""Angle of a step at the highest speed, rad: the quadrature is good to 1e-10."""
+MOST_STEPS = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,16 +74,12 @@ class SweptAnswers:
     speed: Speed
     time: FloatArray
     damping: tuple[float, float] = (0.0, 0.99)
+    reference: float = 1.0
 
     @cached_property
     def omega(self) -> FloatArray:
         """Speeds (n,), rad/s."""
         return np.asarray(self.speed.omega(self.time))
-
-    @cached_property
-    def excitation(self) -> ComplexArray:
-        """Ω² − iΩ', (n,)."""
-        return self.speed.growth(self.time)
 
     def take(self, rows: IntArray) -> SweptAnswers:
         """Those of some readings."""
@@ -99,10 +95,12 @@ class SweptAnswers:
         answers = [self._answer(omega, zeta) for omega, zeta in np.reshape(q, (2, -1)).T]
         own, by_omega, by_zeta = np.moveaxis(np.array(answers), 0, -1)
         constant = np.full((len(self.time), 1), q[0] ** 2)  # as it is for a steady speed
-        return np.hstack((own, self.excitation[:, None], constant)), np.hstack((by_omega, by_zeta))
+        return np.hstack((own, self.speed.growth(self.time)[:, None], constant)), np.hstack(
+            (by_omega, by_zeta)
+        )
 
     def _answer(self, omega: float, zeta: float) -> ComplexArray:
-        """g of a mode and its slopes by ω and ζ, (3, n)."""
+        """G of a mode and its slopes by ω and ζ, (3, n)."""
         root = np.sqrt(1 - zeta**2)
         s, by_zeta = omega * (-zeta + 1j * root), omega * (-1 - 1j * zeta / root)
         (z, w), (z_, w_) = self._first_order(s), self._first_order(np.conj(s))
@@ -126,21 +124,14 @@ class SweptAnswers:
         return steps, rest, self.speed.force(self.time[:, None] - rest[:, None] * (1 - NODES))
 
     def _first_order(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
-        """z of z' = s z + force, which begins as for a steady speed, at each time, and its slope by s."""
+        """Z of z' = s z + force, which begins as for a steady speed, at each time, and its slope by s."""
         from scipy.signal import lfilter
 
         h, (steps, rest, last) = self.speed.step, self._rests
         start = np.array([self.speed.first])
-        (f,), (speed,), (rate,) = (
-            self.speed.growth(start),
-            self.speed.omega(start),
-            self.speed.omega.derivative()(start),
-        )
-        p, df, dp = (
-            1j * speed - s,
-            2 * speed * rate,
-            1j * rate,
-        )  # z = f/p − (f/p)'/p to the first order of the rate
+        speed, rate = float(self.speed.omega(start)[0]), float(self.speed.omega.derivative()(start)[0])
+        f, p = speed**2 - 1j * rate, 1j * speed - s
+        df, dp = 2 * speed * rate, 1j * rate  # z = f/p − (f/p)'/p to the first order of the rate
         z0, w0 = f / p - df / p**2 + f * dp / p**3, f / p**2 - 2 * df / p**3 + 3 * f * dp / p**4
         left = h * (1 - NODES)
         kernel, decay = h * WEIGHTS * np.exp(s * left), np.exp(s * h)
@@ -176,9 +167,3 @@ def swept_answers(time: FloatArray, speeds: FloatArray) -> SweptAnswers:
             "long that its acceleration does not matter: fit it as steady, with --acceleration 0"
         )
     return SweptAnswers(speed, time)
-
-
-def constant_acceleration(speeds: FloatArray, rate: float) -> FloatArray:
-    """Times at which the speed, which changes by `rate`, rad/s², passes speeds (n,), rad/s; 0 at the first."""
-    passed = speeds / rate
-    return np.asarray(passed - passed.min())

@@ -19,6 +19,7 @@ from rotorid.tables.reader.units import one_of, ratio
 FREQUENCY_ERROR, SHAPE_ERROR = 0.005, 0.05
 """Assumed, relative, of a table of modes that states none."""
 MOST_MODES = 1000
+COUNTED = "modes count the forward critical speeds, as of any rotor on supports alike in x and y"
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": units.Unit("percent", "ratio", 1.0, 100.0)})
 COLUMNS = (
@@ -51,7 +52,8 @@ def read_frequencies(path: Path, rotor: Rotor) -> FrequencyTable:
     """Read `mode`, `critical_speed_rpm` (or another unit) or `natural_frequency_Hz`, and `std_percent`.
 
     Without `std_percent` the error is that of the digits. A table with a column `shape` is one of modes at
-    rest, see `read_modes`; 0.5 % of its frequencies and 5 % of its shapes are assumed where it states none.
+    rest (with `critical_speed_rpm`: at these), see `read_modes`; 0.5 % of its frequencies and 5 % of its
+    shapes are assumed where it states none.
 
     Raises
     ------
@@ -82,14 +84,13 @@ def read_frequencies(path: Path, rotor: Rotor) -> FrequencyTable:
     values = table.numbers(stem)
     std = values * table.numbers("std") if "std" in table else table.steps(stem) / np.sqrt(12.0)
     rest = stem == "natural_frequency"
-    counted = "modes count the forward critical speeds, as of any rotor on supports alike in x and y"
-    said = (counted,) if rotor.symmetric and not rest else ()
+    said = (COUNTED,) if rotor.symmetric and not rest else ()
     return FrequencyTable(MeasuredFrequencies(number.astype(np.int64), values, std, rest), said)
 
 
 def _modes(path: Path, rotor: Rotor) -> FrequencyTable:
     modes = read_modes(path, rotor)
-    assumed = []
+    assumed = [COUNTED] if rotor.symmetric and modes.critical else []
     relative, spread = modes.frequency_std, SHAPE_ERROR
     for name, std in (("frequency", relative), ("shape", modes.shape_std)):
         if std is not None and not std.all():
@@ -108,7 +109,7 @@ def _modes(path: Path, rotor: Rotor) -> FrequencyTable:
         np.arange(1, modes.frequencies.size + 1),
         modes.frequencies,
         relative * modes.frequencies,
-        rest=True,
+        rest=not modes.critical,
         nodes=tuple(rotor.node(node) for node in modes.nodes),
         shapes=modes.shapes,
         shape_std=spread,

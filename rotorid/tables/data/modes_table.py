@@ -39,6 +39,7 @@ MODE_COLUMNS = (
         "frequency", _SPEED, ("frequency_rad_s", "frequency_Hz", "frequency_rpm"), required=False, blank=True
     ),
     Column("speed", _SPEED, ("speed_rpm",), required=False, blank=True),
+    Column("critical_speed", _SPEED, ("critical_speed_rpm",), required=False, blank=True),
     Column("node"),
     Column("shape", ratio),
     Column("frequency_std", _PERCENT, ("frequency_std_percent",), required=False, blank=True),
@@ -69,6 +70,8 @@ class MeasuredModes:
         Relative standard deviations (0.013 = 1.3 %), shapes (k,) and (n, k); None where none are stated.
     files
         What was read.
+    critical
+        They are critical speeds, and what moves then, not of the rotor at rest.
     """
 
     nodes: tuple[Node, ...]
@@ -77,16 +80,17 @@ class MeasuredModes:
     frequency_std: FloatArray | None = None
     shape_std: FloatArray | None = None
     files: tuple[Path, ...] = ()
+    critical: bool = False
 
 
 def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     """Read a table of natural frequencies and mode shapes, a row per mode and node.
 
     Its columns are `mode` (1, 2, … from the lowest frequency, without a gap), `frequency_rad_s` (or `_Hz`,
-    `_rpm`, or `speed_rpm`; it may be blank after the first row of a mode), `node`, `shape` (relative
-    amplitude with its sign) and, optionally, `frequency_std_percent` and `shape_std_percent`, one standard
-    deviation; `damping_percent` and `damping_std_percent` may stand beside them and are not used. Every mode
-    has the same nodes, each once.
+    `_rpm`, or `speed_rpm`; or `critical_speed_rpm` of modes that were read there, not at rest; it may be
+    blank after the first row of a mode), `node`, `shape` (relative amplitude with its sign) and, optionally,
+    `frequency_std_percent` and `shape_std_percent`, one standard deviation; `damping_percent` and
+    `damping_std_percent` may stand beside them and are not used. Every mode has the same nodes, each once.
 
     Parameters
     ----------
@@ -102,8 +106,8 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     """
     problems = Problems()
     table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems, first=True))
-    expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm or speed_rpm"
-    stem = table.only(FREQUENCIES, "frequency_rad_s", expected)
+    expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm, speed_rpm or critical_speed_rpm"
+    stem = table.only((*FREQUENCIES, "critical_speed"), "frequency_rad_s", expected)
     nodes = [_node(table, "node", i, rotor) for i in range(len(table))]
     number = table.numbers("mode")
     numbered = (number >= 1) & (number == np.floor(number))
@@ -142,6 +146,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
         frequency_std=table.numbers("frequency_std")[first] if "frequency_std" in table else None,
         shape_std=table.numbers("shape_std")[index] if "shape_std" in table else None,
         files=(Path(path),),
+        critical=stem == "critical_speed",
     )
 
 

@@ -19,7 +19,6 @@ from rotorid.tables.reader.settings_keys import Quantity
 from rotorid.tables.reader.text_file import read_bytes
 from rotorid.tables.runs.instrument_export import read_runs_grid
 from rotorid.tables.runs.stated_conventions import Conventions
-from rotorid.tables.waveforms.vectors_table import read_vectors_grid
 
 _SHEET = {"influence": "influence", "weights": "weights", "check_weights": "weights"}
 """Of a workbook that a job names for a table; all others are runs tables."""
@@ -127,6 +126,8 @@ def _grids(sources: Mapping[str, Source], conventions: Conventions, problems: Pr
     for key, source in sources.items():
         sheet = _SHEET.get(key, "runs")
         if isinstance(source, Path) and source.suffix.lower() == ".toml":
+            from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
+
             found = read_vectors_grid(source, conventions.labels.phase, problems)
             grid = None if found is None else found[0]
         elif key in READINGS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from balancing.data.conventions import Labels
@@ -15,6 +14,7 @@ from rotorid.tables.job.job_keys import JOB, TABLES
 from rotorid.tables.job.job_limits import read_limits
 from rotorid.tables.job.job_model import read_model
 from rotorid.tables.job.job_planes import read_planes
+from rotorid.tables.job.job_waveforms import with_vectors
 from rotorid.tables.job.readings import read_readings
 from rotorid.tables.reader.columns import Source
 from rotorid.tables.reader.problems import Problems
@@ -51,7 +51,7 @@ def job_of(
     tables: dict[str, Source] = {**named, **sheets}
     if overrides.waveforms is not None:
         tables["runs"] = Path(overrides.waveforms)
-    overrides, records = _with_vectors(tables, overrides, said["phase"], problems)
+    overrides, records = with_vectors(tables, overrides, said["phase"], problems)
     readings = read_readings(said, tables, overrides, problems)
     labels = Labels() if readings is None else readings.conventions.labels
     model = read_model(said, folder, labels, problems)
@@ -97,22 +97,3 @@ def job_of(
             key_phasor=labels.with_rotation(phasor),
         )
     )
-
-
-def _with_vectors(
-    tables: dict[str, Source], overrides: Overrides, phase: str | None, problems: Problems
-) -> tuple[Overrides, tuple[Path, ...]]:
-    """Put vectors in place of waveforms files, in the phase convention of the job, or else of these files.
-
-    Vectors know their sign, so that nothing is assumed: a job that says nothing writes lead.
-    """
-    files: list[Path] = []
-    for key in ("runs", "check", "slow_roll"):
-        path = tables.get(key)
-        if isinstance(path, Path) and path.suffix.lower() == ".toml":
-            from rotorid.tables.waveforms.vectors_table import read_vectors_grid
-
-            grid, phase, read = problems.need(read_vectors_grid(path, overrides.phase or phase, problems))
-            tables[key], files = grid, [*files, *read]
-            overrides = replace(overrides, phase=phase)
-    return overrides, tuple(files)

@@ -14,6 +14,8 @@ from rotorid.tables.reader.columns import REMARKS
 from rotorid.tables.reader.units import UnitError, UnitReader, one_of
 
 READING = ("amplitude", "phase")
+LONGEST = 100
+"""Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
 MEASURED: dict[str, UnitReader] = {
     "speed": one_of(units.SPEED),
     "amplitude": units.vibration,
@@ -21,6 +23,8 @@ MEASURED: dict[str, UnitReader] = {
 }
 _NEEDED = {"run", "speed", "sensor", *READING}
 _TIDY = re.compile(r"(?:(speed|amplitude|phase)(?:_(.*))?|run|sensor|repeat)")
+_BESIDE = re.compile(r"(?:amplitude|phase)_std(?:_|$)|order")
+"""What `rotorid vectors` writes beside the readings."""
 _AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs"
 _ROLES = {
     stem: re.compile(rf"(?<![^\W\d_])(?:{words})(?![^\W\d_])", re.IGNORECASE)
@@ -61,8 +65,8 @@ class Heading:
     index, name
         Its place, and its name in the file.
     stem
-        Of the column of a runs table; `vector` for amplitude and phase in one cell, `note`, the order of
-        another harmonic (`2X`); empty: unknown.
+        Of the column of a runs table; `vector` for amplitude and phase in one cell, the order of another
+        harmonic (`2X`), `note` of what stays as it is; empty: unknown.
     unit
         As it is written.
     sensor
@@ -88,12 +92,15 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
         Where it is no unit of the quantity. Labels stand only in names such as `amplitude_div`.
     """
     direction, plain = "", text.strip()
+    if len(plain) > LONGEST:
+        raise UnitError(f"a unit, not {len(plain)} characters")
     if stem == "phase":
         direction = " and ".join(sorted({word.casefold() for word in _DIRECTION.findall(plain)}))
         plain = _DIRECTION.sub("", plain).strip(" ,;/")
     swing = _SWING.search(plain) if stem == "amplitude" else None
     base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_")
-    base = _SPELLINGS.get(base.casefold(), base if stem == "amplitude" else base.casefold())
+    folded = base.casefold()
+    base = _SPELLINGS.get(folded, base if stem == "amplitude" and not base.isupper() else folded)
     if not plain:
         return "", direction
     if stem != "amplitude":
@@ -129,37 +136,39 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
 
 
 def _heading(unknown: Heading, name: str, *, probes: bool) -> Heading:
+    if len(name) > LONGEST:
+        return unknown
+    if name.casefold().startswith(REMARKS) or _BESIDE.match(name):
+        return replace(unknown, stem="note")
     if (tidy := _TIDY.fullmatch(name)) is not None:
         return replace(unknown, stem=tidy[1] or tidy[0], unit=tidy[2] or "", tidy=True)
-    if name.casefold().startswith(REMARKS):
-        return replace(unknown, stem="note")
     order = None if probes else _ORDER.search(name)
-    if order is not None:
-        name = name.replace(order[0], " ")
     if order is not None and order[1] != "1":
         return replace(unknown, stem=f"{order[1]}X")
+    name = name if order is None else name.replace(order[0], " ")
     inside, outside = " ".join(_BRACKETS.findall(name)).strip(), _BRACKETS.sub(" ", name)
-    found = next(((stem, match) for stem, role in _ROLES.items() if (match := role.search(outside))), None)
-    if found is None:
-        if inside and readable("amplitude", inside):
-            return replace(unknown, unit=inside, sensor=_bare(outside))
-        return replace(unknown, sensor=unknown.name)
-    stem, match = found
-    before, after = _bare(outside[: match.start()]), _bare(outside[match.end() :])
-    if match[0].casefold() == "rpm":
-        after = f"rpm {after}".strip()
-    quantity = "amplitude" if stem == "vector" else stem
+    for stem, role in _ROLES.items():
+        if match := role.search(outside):
+            rpm = "rpm" if match[0].casefold() == "rpm" else ""
+            rest = _bare(outside[: match.start()]), f"{rpm} {_bare(outside[match.end() :])}".strip()
+            return _with_rest(replace(unknown, stem=stem), *rest, inside)
+    if inside and readable("amplitude", inside):
+        return replace(unknown, unit=inside, sensor=_bare(outside))
+    return replace(unknown, sensor=unknown.name)
+
+
+def _with_rest(heading: Heading, before: str, after: str, inside: str) -> Heading:
+    """A heading with the unit that stands after its word or in brackets; the rest is the sensor."""
+    quantity = "amplitude" if heading.stem == "vector" else heading.stem
     if quantity not in MEASURED:
         after, inside = f"{after} {inside}", ""
-    elif after and readable(quantity, after):
-        after, inside = "", f"{after} {inside}".strip()
-    words = f"{before} {after}".split()
-    if quantity in READING:
-        sensor = " ".join(word for word in words if word.casefold() not in ("vibration", "vib"))
-        return replace(unknown, stem=stem, unit=inside, sensor=sensor)
-    if any(word.casefold().strip(".#") not in _FILLERS for word in words):
-        return replace(unknown, sensor=unknown.name)
-    return replace(unknown, stem=stem, unit=inside)
+    for unit in (f"{after} {inside}", f"{inside} {after}"):  # um (pp), pp (um)
+        if after.strip() and quantity in MEASURED and readable(quantity, unit):
+            after, inside = "", unit.strip()
+    words = [word for word in f"{before} {after}".split() if word.casefold() not in ("vibration", "vib")]
+    if quantity not in READING and any(word.casefold().strip(".#") not in _FILLERS for word in words):
+        return Heading(heading.index, heading.name, sensor=heading.name)
+    return replace(heading, unit=inside, sensor=" ".join(words) if quantity in READING else "")
 
 
 def _bare(text: str) -> str:

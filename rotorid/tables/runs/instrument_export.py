@@ -20,6 +20,7 @@ from rotorid.tables.reader.grid import Cell, Grid, Row, show
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import UnitError, spelt
 from rotorid.tables.runs.column_headings import (
+    LONGEST,
     MEASURED,
     READING,
     Heading,
@@ -30,7 +31,7 @@ from rotorid.tables.runs.column_headings import (
 )
 from rotorid.tables.runs.stated_conventions import Conventions
 
-_NUMBER = r"[+-]?(?:[0-9][0-9.,]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?"
+_NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(_NUMBER)
 _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([^\s0-9].*)")
 _VECTOR = re.compile(rf"({_NUMBER}[^@<∠]*?)\s*([@<∠/])\s*({_NUMBER}[^@<∠/]*)")
@@ -105,13 +106,17 @@ def _as_runs_table(grid: Grid, named: Mapping[str, str], phase: str) -> Grid:
             raise _Unclear(f"readings at the running speed (1X) alone: {other}", heading)
     below = _units_row(grid, headings)
     rows = grid.rows[1:] if below else grid.rows
+    plain = not below and all(h in own or h.stem in ("", "note") for h in headings)
+    measured = [h.index for h in own if h.stem in MEASURED]
+    if plain and all(_PLAIN.fullmatch(show(cells[k])) for _, cells in rows for k in measured):
+        return grid
     columns = [_Column(h, h.stem, h.unit, [cells[h.index] for _, cells in rows]) for h in headings]
     found = [
         _numbers(part, below.get(part.heading.index), rows, phase) if part.stem in MEASURED else part
         for column in columns
         for part in _halves(column, headings, rows)
     ]
-    if found == columns and not below and all(h in own or h.stem in ("", "note") for h in headings):
+    if found == columns and plain:
         return grid
     return _assembled(replace(grid, rows=rows), found)
 
@@ -153,9 +158,8 @@ def _halves(column: _Column, headings: Sequence[Heading], rows: Sequence[Row]) -
 def _holds_vectors(heading: Heading, headings: Sequence[Heading], cells: Sequence[Cell]) -> bool:
     """Whether a column holds amplitude and phase in one cell."""
     others = [one for one in headings if one.stem in READING and one is not heading]
-    if _WEIGHT.search(heading.name):
-        return False
-    if heading.stem and any(one.stem == "phase" and one.sensor == heading.sensor for one in others):
+    paired = any(one.stem == "phase" and one.sensor == heading.sensor for one in others)
+    if (heading.stem and paired) or _WEIGHT.search(heading.name):
         return False
     found = [vector for cell in cells if (vector := _vector(cell)) is not None]
     return heading.stem == "vector" or any(sure for *_, sure in found) or (bool(found) and not others)
@@ -163,7 +167,7 @@ def _holds_vectors(heading: Heading, headings: Sequence[Heading], cells: Sequenc
 
 def _vector(cell: Cell) -> tuple[str, str, bool] | None:
     """Amplitude and phase of a cell such as `6.93 um @ 98°`, and whether it can be nothing else."""
-    found = _VECTOR.fullmatch(cell) if isinstance(cell, str) else None
+    found = _VECTOR.fullmatch(cell) if isinstance(cell, str) and len(cell) <= LONGEST else None
     if found is None:
         return None
     return found[1], found[3], found[2] != "/" or _PLAIN.fullmatch(found[3]) is None
@@ -227,7 +231,8 @@ def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
             continue
         sensor = heading.sensor if stem in READING and not (listed and heading.stem in ("", "vector")) else ""
         if sensor and listed:
-            raise _Unclear("either a column of the sensors' names, or columns for each sensor", heading)
+            words = f"as another column has the sensors: leave {sensor!r} out, or begin the name with note"
+            raise _Unclear(f"the {stem} alone, {words}", heading)
         other = found.setdefault(sensor, {}).setdefault(stem, column)
         if other is not column:
             words = f"and {other.heading.name!r} could be it too: begin the name of one with note"
@@ -264,8 +269,9 @@ def _assembled(grid: Grid, columns: Sequence[_Column]) -> Grid:
     wide, first = "" not in sensors, next(iter(sensors.values()))
     names = [*map(_name, first)]
     for own in sensors.values():
-        if [*map(_name, own)] != names:
-            raise _Unclear(f"the units of all sensors, {listing(names, 'and')}", own[0].heading)
+        for column, name in zip(own, names, strict=True):
+            if _name(column) != name:
+                raise _Unclear(f"the unit of all sensors, {name}", column.heading)
     rows = [
         (number, (*(c.cells[k] for c in common), *((name,) if wide else ()), *(c.cells[k] for c in own)))
         for k, (number, _) in enumerate(grid.rows)

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from balancing_data import complex_normal
-from helpers.cones import minmax_cone
+from helpers.limited_problems import minmax_cone
 
 from balancing import Labels, ReadingErrors, UndeterminedError
 from balancing.correction.best_planes import best_subsets

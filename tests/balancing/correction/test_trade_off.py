@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from balancing_data import complex_normal
-from helpers.cones import minmax_cone, weight_budget_cone
+from helpers.limited_problems import minmax_cone, weight_budget_cone
 
 from balancing import Labels, UndeterminedError
 from balancing.correction.trade_off import knee, trade_off

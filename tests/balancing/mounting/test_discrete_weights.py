@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.cones import minmax_cone
+from helpers.limited_problems import minmax_cone
 
 from balancing.data.limits import Limits
 from balancing.mounting import fewest_pieces

@@ -7,7 +7,7 @@ import minmax_problems
 import numpy as np
 import pytest
 from cases import each_of
-from helpers.cones import least_squares_cone, minmax_cone, weight_budget_cone
+from helpers.limited_problems import least_squares_cone, minmax_cone, weight_budget_cone
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -211,7 +211,7 @@ def test_lines_become_fewer(monkeypatch):
             return len(self.pauses) > 5
 
     done = Done()
-    progress._lines("fit", done)
+    progress._lines("fit", done, progress._Stage())
     assert done.pauses == [10, 20, 40, 60, 60, 60]
 
 

@@ -19,6 +19,7 @@ NUMBERS = {
     "identification": ["999.935", "Only c and b*(1 - delta) are determined"],
     "record": ["880.814", "The model leaves 3.4 % of the record"],
     "calibration": ["The model explains the data", "rms 26.2 → 2.29 µm pp"],
+    "waveforms": ["1× of 3 sensors in 3 records; phases lag.", "rms 80.1 → "],
 }
 
 
@@ -63,7 +64,9 @@ def test_the_commands_are_those_a_user_would_type(cli, tmp_path):
         assert again.out.splitlines()[0] == first
 
 
-@pytest.mark.parametrize("name", ["main", "rotor", "reduction", "identification", "record", "calibration"])
+@pytest.mark.parametrize(
+    "name", ["main", "rotor", "reduction", "identification", "record", "calibration", "waveforms"]
+)
 def test_a_demo_fits_a_terminal_and_shows_the_judgement_of_each_command(cli, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     lines = cli("demo", "d", "--sample", name).out.splitlines()

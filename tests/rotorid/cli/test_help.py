@@ -97,7 +97,7 @@ def test_rotorid_alone_shows_the_jobs_with_examples_that_run(cli, checkout):
     outcome = cli()
     lines = outcome.out.splitlines()
     assert outcome.code == 0
-    assert len(lines) <= LINES + 4  # a list of commands, and no answer
+    assert len(lines) <= LINES + 6  # a list of 23 commands, and no answer
     assert max(map(len, lines)) <= COLUMNS
     assert [line.split()[0] for line in lines if line.startswith("  ") and "rotorid " not in line] == list(
         COMMANDS

@@ -13,7 +13,7 @@ from rotorid.harmonic.modal.modal_readings import SteadyAnswers
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 from rotorid.tables.data.modes_table import read_modes
-from rotorid.workflows.modes import ModesOptions, modes
+from rotorid.workflows.vibration.modes import ModesOptions, modes
 
 M = np.diag([20.0, 20.0, 10.0])
 K = np.array([[3e4, -2e4, 0.0], [-2e4, 2.5e4, -5e3], [0.0, -5e3, 5e3]])

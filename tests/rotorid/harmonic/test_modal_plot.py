@@ -6,7 +6,7 @@ from documents import check_hygiene, legends_of
 
 from rotorid.base.plot_style import WARNING
 from rotorid.samples import sample_data
-from rotorid.workflows.modes import ModesOptions, modes
+from rotorid.workflows.vibration.modes import ModesOptions, modes
 
 M = np.diag([20.0, 20.0, 10.0])
 K = np.array([[3e4, -2e4, 0.0], [-2e4, 2.5e4, -5e3], [0.0, -5e3, 5e3]])

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rotorid.waveforms.record import Channel, WaveformRecord
 from rotorid.waveforms.tacho_picture import figure_tacho
-from rotorid.waveforms.waveform_pictures import BLANK, LINES, figure_orbit, figure_waterfall, spectra
+from rotorid.waveforms.waveform_pictures import (
+    BLANK,
+    LINES,
+    figure_of,
+    figure_orbit,
+    figure_waterfall,
+    spectra,
+)
 
 RATE = 2560.0
 
@@ -122,7 +130,7 @@ def test_a_waterfall_over_a_run_up(run_up):
 def test_a_waterfall_at_a_steady_speed_is_over_time(steady):
     ax = figure_waterfall(record(steady, {"X": {1: 3.0}}, factor=1.0, derivative=None), "X", steady).axes[0]
     assert ax.get_ylabel() == "time, s"
-    assert "2  (peak)" in [text.get_text() for text in ax.texts]
+    assert "2 (peak)" in [text.get_text() for text in ax.texts]
     assert f"{64 / 25:.2g} s" in ax.get_title()  # so many turns
 
 
@@ -183,15 +191,22 @@ def test_only_1x_is_filtered(steady):
 @pytest.mark.parametrize(
     ("x", "y", "words"),
     [
-        (30.0, -20j, "1×: forward whirl, with the rotation\nsemi-axes 30 × 20 µm"),
-        (30.0, 20j, "1×: backward whirl, against the rotation\nsemi-axes 30 × 20 µm"),
-        (30.0, 0.1j, "1×: nearly along a line\nsemi-axes 30 × 0.1 µm"),
+        (30.0, -20j, "1×: forward whirl, with the rotation\nif Y stands 90° after X; semi-axes 30 × 20 µm"),
+        (
+            30.0,
+            20j,
+            "1×: backward whirl, against the rotation\nif Y stands 90° after X; semi-axes 30 × 20 µm",
+        ),
+        (30.0, 0.1j, "1×: nearly along a line\nif Y stands 90° after X; semi-axes 30 × 0.1 µm"),
     ],
 )
 def test_which_way_it_whirls(steady, x, y, words):
     figure = figure_orbit(record(steady, {"X": {1: x}, "Y": {1: y}}), ("X", "Y"), steady, 1.0)
     assert figure.axes[0].get_title() == words
-    assert "Y is taken to stand 90° after X" in figure.legends[0].get_title().get_text()
+    turned = figure_orbit(record(steady, {"X": {1: x}, "Y": {1: y}}), ("X", "Y"), steady, 1.0, clockwise=True)
+    assert turned.axes[0].get_title() == words
+    assert (figure.axes[0].get_ylabel(), turned.axes[0].get_ylabel()) == ("Y, µm", "−Y, µm")
+    assert "drawn as if Y stood 90° after X" in figure.legends[0].get_title().get_text()
 
 
 @pytest.mark.parametrize("angles", [(0.0, 90.0), (45.0, 135.0), (-30.0, 80.0), (135.0, 45.0)])
@@ -220,6 +235,29 @@ def test_orbits_that_cannot_be_drawn(steady):
         figure_orbit(other, ("X", "Y"), steady, 1.0)
     with pytest.raises(ValueError, match=r"not 4 whole turns after 19.95 s: its pulses end at 19.96 s"):
         figure_orbit(made, ("X", "Y"), steady, 19.95)
+
+
+def test_the_picture_that_is_asked_for(run_up):
+    """The orbit is drawn where 1× is largest, and never beyond the last turn."""
+    signal = tacho_signal(run_up, 10**6)
+    made = replace(record(run_up, circle(5.0)), tacho=signal)
+    times = np.array([10.0, 30.0, 59.99])
+    for sizes, at in (((1, 3, 2), 30.0), ((1, 2, 3), 59.9)):
+        found = SimpleNamespace(
+            tacho=run_up,
+            sensors=("X", "Y"),
+            orders=(1, 3),
+            times=times,
+            vectors=np.array(sizes)[:, None, None] * np.ones((3, 2, 2)),
+        )
+        title = figure_of("orbit", made, found).axes[1].get_title()
+        assert float(title.split("at ")[1].split()[0]) == pytest.approx(at, abs=0.15)
+    texts = [text.get_text() for text in figure_of("waterfall", made, found).axes[0].texts]
+    assert texts[:3] == ["1×", "2×", "3×"]
+    assert figure_of("tacho", made, found).axes[0].get_ylabel() == "tacho, as recorded"
+    found.sensors = ("X",)
+    with pytest.raises(ValueError, match=r"file.wav: an orbit needs two sensors; there is only 'X'"):
+        figure_of("orbit", made, found)
 
 
 def tacho_signal(pulses, most):

@@ -203,7 +203,11 @@ def test_nodes_that_the_rotor_does_not_have(tmp_path, name, value, row, words):
     [
         ("frequency_rad_s", "frequency", "one of the units rpm, rad_s or Hz"),
         ("frequency_rad_s", "freqency_rad_s", "did you mean 'frequency_rad_s'?"),
-        ("frequency_rad_s", "note", "one column frequency_rad_s, frequency_Hz, frequency_rpm or speed_rpm"),
+        (
+            "frequency_rad_s",
+            "note",
+            "one column frequency_rad_s, frequency_Hz, frequency_rpm, speed_rpm or critical_speed_rpm",
+        ),
         ("shape", "shapes", "did you mean 'shape'?"),
         ("shape", "shape_mm", "a column without a unit"),
     ],

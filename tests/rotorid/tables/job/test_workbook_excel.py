@@ -234,13 +234,13 @@ def test_formulas_with_stored_values_count(tmp_path):
 
 
 def test_merged_cells_explain_themselves(tmp_path):
-    path = write_book(tmp_path / "job.xlsx", {**BOOK, "runs": [["Pump 3, June", *[None] * 4], *RUNS]})
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "weights": [["Pump 3, June", *[None] * 3], *WEIGHTS]})
     book = openpyxl.load_workbook(path)
-    book["runs"].merge_cells("A1:E1")
+    book["weights"].merge_cells("A1:D1")
     book.save(path)
     words = "the header in the first row, and it seems to be row 2"
     problem = the_only(complaints(read_job, path), "job.xlsx", 1, None, "Pump 3, June", words)
-    assert "sheet 'runs'" in problem.file
+    assert "sheet 'weights'" in problem.file
     book = openpyxl.load_workbook(write_book(path, BOOK))
     book["runs"].merge_cells("D1:E1")  # amplitude and phase under one name
     book.save(path)

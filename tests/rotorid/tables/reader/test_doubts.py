@@ -64,13 +64,13 @@ def test_prepared_sheets_with_a_header_alone_do_no_harm(tmp_path):
 
 @pytest.mark.parametrize("title", [["My rotor"], ["Rotor 7, trial of June", "", "", "7"]])
 def test_a_title_above_the_header_is_named(tmp_path, files, title):
-    path = write_book(tmp_path / "job.xlsx", {"runs": [title, *RUNS], "weights": WEIGHTS})
+    path = write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": [title, *WEIGHTS]})
     words = "the header in the first row, and it seems to be row 2"
     [problem] = complaints(read_job, path)
     assert words in problem.expected
     text = tmp_path / "titled.csv"
-    text.write_text("My rotor\n\n" + csv_text(RUNS), encoding="utf-8")
-    [problem] = complaints(read_trials, text, files[1])
+    text.write_text("My rotor\n\n" + csv_text(WEIGHTS), encoding="utf-8")
+    [problem] = complaints(read_trials, files[0], text)
     assert "it seems to be row 3" in problem.expected
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import re
+import time
+import tomllib
+from contextlib import suppress
 from dataclasses import fields
 
 import numpy as np
@@ -12,11 +15,15 @@ import pytest
 from cases import each_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
+from rotorid.base.text import listing
 from rotorid.tables import InputError, job_from_files, read_job, read_trials
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
+from rotorid.tables.runs.runs_table import COLUMNS
+from rotorid.tables.schema import schema
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase
@@ -45,7 +52,7 @@ CELLS_WITH_UNITS = """\
 Run\tSpeed\tSensor\tAmplitude\tPhase
 initial\t1000 rpm\tA\t7.2 um pp\t238°
 initial\t1000 rpm\tB\t13.5 µm p-p\t296 deg
-trial 1\t1000 rpm\tA\t4.9um_pp\t114°
+trial 1\t1000 rpm\tA\t4.9UM PP\t114°
 trial 1\t1000 rpm\tB\t9.2 um peak to peak\t347 °
 trial 2\t1000 RPM\tA\t4.0 um pp\t79 degrees
 trial 2\t1000 rpm\tB\t12.0 um pp\t292°
@@ -78,7 +85,7 @@ trial 2,1000,A,4.0 / 79
 trial 2,1000,B,12.0 / 292
 """
 HEADINGS = """\
-Phase angle [°],1X Ampl [um pp],Channel,Speed rpm,Run
+Phase angle [°],1X Ampl. pk-pk [um],Channel,Speed rpm,Run
 238,7.2,A,1000,initial
 296,13.5,B,1000,initial
 114,4.9,A,1000,trial 1
@@ -263,6 +270,8 @@ def test_a_workbook_with_results_holds_the_runs_table(tmp_path, name):
 
 
 ONE_UNIT = "expected the same unit in all cells of the column (row 2 has {}), or in its heading"
+NAMES = listing([name for column in COLUMNS for name in column.names], "and")
+KNOWN = f"a known column: {NAMES}; remarks go into 'note'"
 VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
 EXPLAINED = {
     "radians or degrees": (
@@ -275,15 +284,15 @@ EXPLAINED = {
         "6.93 @ 98°: phases so small may be radians",
     ),
     "amplitude units differ": (
-        CELLS_WITH_UNITS.replace("4.9um_pp", "4.9 mil pp"),
+        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9 mil pp"),
         f"runs.csv, row 4, column Amplitude: found '4.9 mil pp', {ONE_UNIT.format('7.2 um pp')}",
     ),
     "an amplitude without its unit": (
-        CELLS_WITH_UNITS.replace("4.9um_pp", "4.9"),
+        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9"),
         f"runs.csv, row 4, column Amplitude: found '4.9', {ONE_UNIT.format('7.2 um pp')}",
     ),
     "peak or peak to peak": (
-        CELLS_WITH_UNITS.replace("4.9um_pp", "4.9um"),
+        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9um"),
         f"runs.csv, row 4, column Amplitude: found '4.9um', {ONE_UNIT.format('7.2 um pp')}",
     ),
     "a phase without its sign": (
@@ -306,8 +315,8 @@ EXPLAINED = {
     ),
     "no run": (
         re.sub(r",[^,\n]*\n", "\n", HEADINGS),
-        "runs.csv, row 1, column run: expected a column run; the columns are Phase angle [°], 1X Ampl [um pp], "
-        "Channel and Speed rpm",
+        "runs.csv, row 1, column run: expected a column run; the columns are Phase angle [°], 1X Ampl. "
+        "pk-pk [um], Channel and Speed rpm",
     ),
     "no run beside columns for each sensor": (
         re.sub(r"(?m)^[^,]*,", "", SENSORS_1_2),
@@ -329,6 +338,10 @@ EXPLAINED = {
         VECTORS.replace("∠114°", " / 114"),
         f"runs.csv, row 4, column 1X [um pp]: found '4,9 / 114', {VECTOR}",
     ),
+    "a comma beside the sign": (
+        VECTORS.replace("@79", "@,79"),
+        f"runs.csv, row 6, column 1X [um pp]: found '4,0@,79 deg', {VECTOR}",
+    ),
     "half a vector": (
         VECTORS.replace("@79 deg", "@"),
         f"runs.csv, row 6, column 1X [um pp]: found '4,0@', {VECTOR}",
@@ -340,13 +353,13 @@ EXPLAINED = {
     ),
     "sensors in a column and in headings": (
         WIDE.replace("run,", "run,sensor,").replace("\ninitial,", "\ninitial,A,").replace("\ntrial ", "\nt,"),
-        "runs.csv, row 1, column A_amplitude_um_pp: found 'A_amplitude_um_pp', expected either a column of "
-        "the sensors' names, or columns for each sensor",
+        "runs.csv, row 1, column A_amplitude_um_pp: found 'A_amplitude_um_pp', expected the amplitude alone, "
+        "as another column has the sensors: leave 'A' out, or begin the name with note",
     ),
     "a sensor in another unit": (
         WIDE.replace("B_amplitude_um_pp", "B_amplitude_mil_pp"),
-        "runs.csv, row 1, column B_amplitude_mil_pp: found 'B_amplitude_mil_pp', expected the units of all "
-        "sensors, amplitude_um_pp and phase_deg",
+        "runs.csv, row 1, column B_amplitude_mil_pp: found 'B_amplitude_mil_pp', expected the unit of all "
+        "sensors, amplitude_um_pp",
     ),
     "a reading without its sensor": (
         WIDE.replace("B_", ""),
@@ -368,15 +381,13 @@ EXPLAINED = {
         "heading of the column says",
     ),
     "no vibration": (
-        HEADINGS.replace("[um pp]", "[G's]"),
-        "runs.csv, row 1, column 1X Ampl [G's]: found \"1X Ampl [G's]\", expected a unit of vibration, such "
-        'as um pp or mm/s rms, not "G\'s" (a label: amplitude_div)',
+        HEADINGS.replace("pk-pk [um]", "[G's]"),
+        "runs.csv, row 1, column 1X Ampl. [G's]: found \"1X Ampl. [G's]\", expected a unit of vibration, "
+        'such as um pp or mm/s rms, not "G\'s" (a label: amplitude_div)',
     ),
     "a vector of a weight": (
         WIDE_VECTORS.replace("B", "Trial weight"),
-        "runs.csv, row 1, column Trial weight: found 'Trial weight', expected a known column: run, speed_rpm, "
-        "speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, phase_deg and repeat; "
-        "remarks go into 'note'",
+        f"runs.csv, row 1, column Trial weight: found 'Trial weight', expected {KNOWN}",
     ),
     "a blank reading": (
         WIDE_VECTORS.replace("9,2 @ 347°", ""),
@@ -410,8 +421,44 @@ def test_a_phase_that_says_lag_must_be_what_the_job_says(tmp_path):
         assert read(tmp_path, text, phase=phase).conventions.labels.phase == phase
         other = {"lag": "lead", "lead": "lag"}[phase]
         assert f"expected phases that {other}, as the job says" in refused(tmp_path, text, phase=other)
+    (tmp_path / "runs.csv").write_text(DIRECTION, encoding="utf-8")
     with pytest.raises(InputError, match="expected phases that lead, as the job says or is assumed"):
         read_trials(tmp_path / "runs.csv", None)
+
+
+def keeps_to(text):
+    """Whether a job file keeps to its schema, as editors check it."""
+    return Draft202012Validator(schema("job")).is_valid(tomllib.loads(text))
+
+
+BESIDE = [
+    "amplitude_std_um_pp phase_std_deg",
+    "order2_amplitude_um_pp order2_phase_deg",
+    "overall_um_pp turns",
+]
+
+
+@each_of("beside", BESIDE)
+def test_what_vectors_writes_beside_the_readings_stays(tmp_path, beside):
+    """With degrees in its cells the table is the same as without."""
+    rows = [line.split(",") for line in tidy_text("").splitlines()]
+    plain, signs = (
+        [[*rows[0], *beside.split()], *([*row[:4], f"{row[4]}{sign}", "0.25", "1"] for row in rows[1:])]
+        for sign in ("", "°")
+    )
+    (tmp_path / "plain").mkdir()
+    assert_same(read(tmp_path, csv_text(signs)).trials, read(tmp_path / "plain", csv_text(plain)).trials)
+
+
+@each_of("piece", ["9", "9.", "9 ", "a@", " ", "1X", "(", "9/", "9um ", "Phase "])
+def test_long_cells_and_headings_take_no_time(tmp_path, piece):
+    long = piece * (200_000 // len(piece))
+    for text in (WIDE_VECTORS, UNITS_ROW, CELLS_WITH_UNITS):
+        for word in ("7,2 @ 238°", "um pp", "Phase", "deg", "13.5", "RPM"):
+            start = time.monotonic()
+            with suppress(InputError):
+                read(tmp_path, text.replace(word, long + "x", 1))
+            assert time.monotonic() - start < 5.0
 
 
 GERMAN = """\
@@ -443,6 +490,8 @@ def test_other_names_of_columns(tmp_path):
     (tmp_path / "check.csv").write_text(tidy_text("german"), encoding="utf-8")
     slow = "Lauf;Drehzahl;Messstelle;Ausschlag;Phase\nx;200;A;1,5;20\nx;200;B;2,5;30\n"
     (tmp_path / "slow.csv").write_text(slow, encoding="utf-8")
+    assert keeps_to(job_text(more=NAMED))
+    assert not keeps_to(job_text(more=NAMED.replace("speed_rpm", "speed_mph")))
     both = read(tmp_path, GERMAN, 'check = "check.csv"\nslow_roll = "slow.csv"\n' + NAMED)
     np.testing.assert_array_equal(both.check.readings, both.trials.readings)
     shown = both.trials.labels.vibration(both.slow_roll)
@@ -497,9 +546,7 @@ def test_other_names_in_a_workbook(tmp_path):
         (
             'sensor = "Messstelle"',
             "",
-            "runs.csv, row 2, column Messstelle: found 'Messstelle', expected a known column: run, speed_rpm, "
-            "speed_rad_s, speed_Hz, sensor, amplitude_um_pp, amplitude_mm_s_rms, amplitude, phase_deg and "
-            "repeat; remarks go into 'note'\n"
+            f"runs.csv, row 2, column Messstelle: found 'Messstelle', expected {KNOWN}\n"
             "runs.csv, row 2, column sensor: expected a column sensor; the columns are Lauf, Drehzahl, "
             "Messstelle, Ausschlag and Phase",
         ),
@@ -538,8 +585,7 @@ def test_an_edit_of_a_word_or_sign_changes_no_number(tmp_path, name, place, sign
     edited = text[:at] + sign + text[at if insert else at + 1 :]
     try:
         trials = read(tmp_path, edited).trials
-    except InputError as error:
-        assert str(tmp_path) in str(error)
+    except InputError:
         return
     amplitude, phase = trials.labels.vibration(trials.readings)
     if trials.labels.vibration_scale != 1 or name == "labels":
@@ -567,8 +613,7 @@ def test_a_damaged_line_is_refused_or_says_what_it_said(tmp_path, name, place, d
     expected = read(tmp_path, tidy_text(name)).trials
     try:
         found = read(tmp_path, "\n".join(lines) + "\n").trials
-    except InputError as error:
-        assert str(tmp_path) in str(error)
+    except InputError:
         return
     runs = [expected.runs.index(run) for run in found.runs]
     sensors = [expected.sensors.index(sensor) for sensor in found.sensors]

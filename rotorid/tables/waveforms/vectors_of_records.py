@@ -19,7 +19,7 @@ from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import InputError, Problems, TableWarning
 from rotorid.tables.reader.units import VIBRATION
 from rotorid.tables.runs.stated_conventions import as_phase
-from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, read_waveforms
+from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, WaveformWishes, read_waveforms
 from rotorid.waveforms.vectors import Vectors, find_vectors
 
 DIGITS = 6
@@ -123,22 +123,32 @@ def _note(end: np.bool_) -> str:
 
 
 def read_vectors_grid(
-    path: Path, phase: str | None, problems: Problems
+    path: Path,
+    phase: str | None,
+    problems: Problems,
+    given: WaveformWishes | None = None,
+    *,
+    moving: bool = False,
 ) -> tuple[Grid, Phase, tuple[Path, ...]] | None:
-    """The vectors of a waveforms file as the cells of a runs table, their phase convention, files that were
-    read. What is to be known of the records is a `TableWarning`.
+    """The vectors of a waveforms file as cells of a runs table, their phase convention, files that were read.
+
+    What is to be known of the records is a `TableWarning`.
 
     Parameters
     ----------
     path
-        Of the waveforms file.
+        Of the waveforms file, or a record.
     phase
         Convention in which phases are wanted; None: that of the file.
     problems
         Collects the complaints; then there is nothing.
+    given
+        What is said beside the file.
+    moving
+        Whether records whose speed changes need no chosen speeds.
     """
     try:
-        waveforms = read_waveforms([path])
+        waveforms = read_waveforms([path], given)
         labels = waveforms.labels if phase is None else replace(waveforms.labels, phase=as_phase(phase))
         found = find_each(waveforms)
         columns = vectors_columns(found, labels)
@@ -148,9 +158,9 @@ def read_vectors_grid(
     except ValueError as error:
         problems.add(str(path), None, None, None, f"records with vectors: {error}")
         return None
-    moving = [each.run for each in found if not each.steady]
-    if moving and waveforms.speeds is None:
-        expected = f"speeds at which {listing(map(repr, moving), 'and')} are read, whose speed is not steady"
+    swept = [each.run for each in found if not each.steady]
+    if swept and waveforms.speeds is None and not moving:
+        expected = f"speeds at which {listing(map(repr, swept), 'and')} are read, whose speed is not steady"
         problems.add(str(path), None, "speeds_rpm", None, f"{expected}, such as speeds_rpm = [900, 1200]")
         return None
     for each in found:

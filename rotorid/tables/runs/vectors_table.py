@@ -1,0 +1,174 @@
+"""Tables of vectors over speed: runs tables with times and standard deviations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from balancing.data.conventions import Labels, Phase
+from balancing.data.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.result import Column as Told
+from rotorid.harmonic.modal.run_up import SweepVectors as SweepVectors
+from rotorid.tables.reader import units
+from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.units import one_of
+from rotorid.tables.runs import runs_table
+from rotorid.tables.runs.slow_roll import make_slow_roll
+from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
+
+COLUMNS = (
+    *(column for column in runs_table.COLUMNS if column.required),
+    Column("time", one_of(units.TIME), ("time_s",), required=False),
+    Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
+    Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
+)
+_BESIDE = re.compile(r"(order\d+_|overall|gap|turns).*")
+"""Columns that say nothing about the vectors of order 1."""
+_SAME = 1e-9
+
+
+def read_vectors(source: Source, phase: Phase) -> tuple[SweepVectors, ...]:
+    """Read the vectors of each run over speed.
+
+    The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
+    `phase_deg`) and, optionally, `time_s` and, both or neither, `amplitude_std_<unit>` and `phase_std_deg`,
+    one standard deviation. Vectors of one time were read at one speed; without times a speed stands once.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    problems = Problems()
+    grid = problems.need(read_grid(source, "vectors", problems, first=True))
+    header = tuple("note" if _BESIDE.fullmatch(name) else name for name in grid.header)
+    table = problems.need(make_table(replace(grid, header=header), COLUMNS, problems))
+    table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
+    table.must_be("amplitude", table.numbers("amplitude") >= 0, "an amplitude of 0 or more")
+    allowed = np.abs(table.numbers("phase")) <= FULL_TURN
+    table.must_be("phase", allowed, "a phase from -360 to 360 degrees")
+    for stem, other in (("amplitude_std", "phase_std"), ("phase_std", "amplitude_std")):
+        table.must_be(stem, table.numbers(stem) > 0, "a standard deviation above 0: nothing is read exactly")
+        if stem in table and other not in table and not len(problems):
+            table.in_header(other, f"a column {other} with its unit, as there is {table.fields[stem].name}")
+    if "amplitude_std" in table and table.unit("amplitude_std").kind != table.unit("amplitude").kind:
+        table.in_header(table.fields["amplitude_std"].name, "a unit that converts to that of the amplitudes")
+    _complain_about_twins(table)
+    problems.stop()
+    unit = table.unit("amplitude")
+    labels = Labels(unit.name, unit.scale, phase=phase, speed_unit=table.unit("speed").name)
+    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
+    covariances = _covariances(table, vectors) if "amplitude_std" in table else None
+    runs = np.array(table.texts("run"))
+    return tuple(
+        _sweep(table, np.flatnonzero(runs == run), vectors, covariances, labels)
+        for run in dict.fromkeys(runs.tolist())
+    )
+
+
+def _instants(table: Table) -> FloatArray:
+    """What rows of a run that were read together have in common."""
+    return table.numbers("time" if "time" in table else "speed")
+
+
+def _complain_about_twins(table: Table) -> None:
+    """A sensor is read once at a time, and all at one speed."""
+    runs, sensors, instants = table.texts("run"), table.texts("sensor"), _instants(table).tolist()
+    timed = "time" in table
+    where = "time" if timed else "speed; vectors read one after the other need a column time_s"
+    once = [key if key[2] == key[2] else None for key in zip(runs, sensors, instants, strict=True)]
+    table.once("sensor", once, f"another sensor than in row {{}}, which has the same run and {where}")
+    first: dict[tuple[str, float], int] = {}
+    speeds = table.numbers("speed")
+    for row, key in enumerate(zip(runs, instants, strict=True)):
+        other = first.setdefault(key, row)
+        if abs(speeds[row] - speeds[other]) > _SAME * speeds[other]:
+            expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
+            table.complain(row, "speed", expected)
+
+
+def _covariances(table: Table, vectors: ComplexArray) -> FloatArray:
+    """Of real and imaginary parts, (rows, 2, 2)."""
+    size = np.abs(vectors)
+    along, across = table.numbers("amplitude_std") ** 2, (size * table.numbers("phase_std")) ** 2
+    u = np.where(size > 0, vectors, 1.0) / np.where(size > 0, size, 1.0)
+    across = np.where(size > 0, across, along)  # where there is nothing, no direction is another
+    turn = np.stack((np.stack((u.real, -u.imag), -1), np.stack((u.imag, u.real), -1)), -2)
+    return np.asarray(np.einsum("nij,nj,nkj->nik", turn, np.stack((along, across), -1), turn))
+
+
+def _sweep(
+    table: Table, rows: IntArray, vectors: ComplexArray, covariances: FloatArray | None, labels: Labels
+) -> SweepVectors:
+    """The rows of one run as vectors of its sensors, by rising time or, without times, speed."""
+    instants, place = np.unique(_instants(table)[rows], return_inverse=True)
+    names = np.array(table.texts("sensor"))[rows].tolist()
+    sensors = tuple(dict.fromkeys(names))
+    column = [sensors.index(name) for name in names]
+    speeds = np.zeros(len(instants))
+    speeds[place] = table.numbers("speed")[rows]
+    Z = np.full((len(instants), len(sensors)), complex(np.nan, np.nan))
+    Z[place, column] = vectors[rows]
+    stated = None
+    if covariances is not None:
+        stated = np.full((*Z.shape, 2, 2), np.nan)
+        stated[place, column] = covariances[rows]
+    timed = instants if "time" in table else None
+    return SweepVectors(table.texts("run")[rows[0]], timed, speeds, sensors, Z, stated, labels)
+
+
+def runs_columns(
+    found: Sequence[tuple[SweepVectors, FloatArray, ComplexArray, FloatArray]],
+) -> tuple[Told, ...]:
+    """A runs table with errors: of each sweep speeds (M,), vectors (M, C), covariances of their parts."""
+    labels = found[0][0].labels
+    unit, speed = f"_{labels.vibration_unit}" if labels.vibration_unit else "", units.SPEED[labels.speed_unit]
+    runs = [sweep.run for sweep, speeds, _, _ in found for _ in range(len(speeds) * len(sweep.sensors))]
+    sensors = [name for sweep, speeds, _, _ in found for _ in speeds for name in sweep.sensors]
+    every = np.concatenate([np.repeat(speeds, len(sweep.sensors)) for sweep, speeds, _, _ in found])
+    vectors = np.concatenate([Z.ravel() for _, _, Z, _ in found])
+    amplitude, phase = labels.vibration(vectors)
+    own = np.conj(vectors) / np.maximum(np.abs(vectors), np.finfo(float).tiny)
+    parts = np.concatenate([C.reshape(-1, 2, 2) for *_, C in found])
+    # along and across: real and imaginary part, turned so that the vector is real
+    turn = np.stack((np.stack((own.real, -own.imag), -1), np.stack((own.imag, own.real), -1)), -2)
+    along, across = np.sqrt(np.einsum("nij,njk,nik->in", turn, parts, turn))
+    columns = (
+        Told("run", runs),
+        Told(f"speed_{speed.name}", np.round(every * speed.scale, 9)),
+        Told("sensor", sensors),
+        Told(f"amplitude{unit}", amplitude),
+        Told("phase_deg", phase),
+    )
+    if np.isnan(along).any():
+        return columns
+    size = np.maximum(np.abs(vectors), np.finfo(float).tiny)
+    return (
+        *columns,
+        Told(f"amplitude_std{unit}", along * labels.vibration_scale),
+        Told("phase_std_deg", np.degrees(across / size)),
+    )
+
+
+def read_slow_roll(path: Path, sweep: SweepVectors) -> tuple[ComplexArray, tuple[str, ...]]:
+    """Slow-roll vectors (C,) of the sensors of a sweep, of a runs table at one speed, and warnings.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    problems, conventions = Problems(), Conventions(sweep.labels)
+    vectors = np.nan_to_num(sweep.vectors[:1])[None]
+    start = sweep.speeds.max(keepdims=True)
+    trials = Trials(
+        (sweep.run,), start, sweep.sensors, (), vectors, np.zeros((1, 0), dtype=complex), labels=sweep.labels
+    )
+    roll = problems.need(make_slow_roll(path, trials, conventions, problems))
+    return roll.at(start, sweep.sensors)[0], roll.warnings

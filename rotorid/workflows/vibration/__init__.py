@@ -1,0 +1,1 @@
+"""From measured vibration: modes and critical speeds."""

@@ -1,1 +1,0 @@
-"""From the instrument: vectors of waveforms, and what a run-up tells."""

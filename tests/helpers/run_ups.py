@@ -1,0 +1,47 @@
+"""Run-ups of drawn rotors, by the example, and their tables as people write them."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from rotorid.base.rpm import RPM
+
+PATH = Path(__file__).parents[2] / "examples" / "coverage_runup.py"
+
+
+def load_example():
+    if "coverage_runup" not in sys.modules:
+        spec = importlib.util.spec_from_file_location("coverage_runup", PATH)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["coverage_runup"] = module
+        spec.loader.exec_module(module)
+    return sys.modules["coverage_runup"]
+
+
+def drawn(seed=5, rate=100.0, noise=1e-6):
+    """A rotor and the vectors of its sweep, rate in rpm a second."""
+    example, random = load_example(), np.random.default_rng(seed)
+    rotor = example.draw_rotor(random)
+    return rotor, example.draw_sweep(random, rotor, rate / RPM, noise)
+
+
+def table(path, sweeps, *, lag=False, std=True, time=True, unit="um_pp", scale=2e6):
+    """Write a table of vectors; angles as lags where asked for."""
+    head = f"run,speed_rpm,sensor,amplitude_{unit},phase_deg"
+    head += ",time_s" if time else ""
+    head += f",amplitude_std_{unit},phase_std_deg" if std else ""
+    lines = [head + ",turns,overall_um,gap_V,order2_amplitude_um,order2_phase_deg"]
+    for sweep in sweeps:
+        for i, c in np.ndindex(sweep.vectors.shape):
+            z, sd = sweep.vectors[i, c], np.sqrt(sweep.covariances[i, c, 0, 0])
+            cells = [sweep.run, sweep.speeds[i] * RPM, sweep.sensors[c], scale * abs(z)]
+            cells.append(np.degrees(np.angle(z)) * (-1 if lag else 1))
+            cells += [sweep.time[i]] if time else []
+            cells += [scale * sd, np.degrees(sd / abs(z))] if std else []
+            lines.append(
+                ",".join(f"{x:.12g}" if isinstance(x, float) else str(x) for x in [*cells, 8, 1, 9, 1, 0])
+            )
+    path.write_text("\n".join(lines) + "\n")
+    return path
