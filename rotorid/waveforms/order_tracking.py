@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.waveforms.penalised_spline import (
     SOFTEST,
     Moments,
@@ -28,8 +28,10 @@ from rotorid.waveforms.penalised_spline import (
     weights,
 )
 
-KNOT, MOST_KNOTS = 2.0, 8000
-"""Turns between two knots; a longer record has more between."""
+KNOT, FINE, MOST_KNOTS = 2.0, 1.0, 8000
+"""Turns between two knots, and where 1× moves too fast for these; a longer record has more between."""
+VAGUE, PLACES = 0.03, 100
+"""Share of the largest vector; where its error is more at one of so many places, it may move too fast."""
 PARTS = 16
 """Of a steady record, whose means are compared."""
 PASSES = 2
@@ -110,8 +112,20 @@ class Orders:
         samples = np.median(noise / self.deviation(turns, order) ** 2, axis=1)
         return np.asarray(samples / self.density[self._around(turns)[0]])
 
+    def vague(self) -> BoolArray:
+        """Sensors whose largest 1× has a large error, (C,): of noise, or as it moves too fast."""
+        places = np.linspace(self.first, self.last, PLACES)
+        size, error = np.abs(self.at(places)[:, 1]), self.deviation(places, 1)
+        largest = size.argmax(axis=0), np.arange(size.shape[1])
+        return np.asarray(error[largest] > VAGUE * size[largest])
 
-def track_orders(parts: Parts, first: float, last: float, highest: int) -> Orders:
+    def too_fast(self) -> bool:
+        """Whether 1× may move faster than these splines: it is vague, or means are over less than a turn."""
+        places = np.linspace(self.first, self.last, PLACES)
+        return bool(self.width(places).min() < 1 or self.vague().any())
+
+
+def track_orders(parts: Parts, first: float, last: float, highest: int, knot: float = KNOT) -> Orders:
     """Fit orders 0 to `highest` to a record between two turns.
 
     Parameters
@@ -122,17 +136,20 @@ def track_orders(parts: Parts, first: float, last: float, highest: int) -> Order
         Turns.
     highest
         Order.
+    knot
+        Turns between two knots; smaller ones let more of what is between the orders through.
     """
-    n = int(np.clip(np.ceil((last - first) / KNOT), 1, MOST_KNOTS))
+    fine = knot <= FINE
+    n = int(np.clip(np.ceil((last - first) / knot), 1, MOST_KNOTS))
     knot = (last - first) / n
 
     def with_columns() -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
         for turns, samples in parts():
             yield np.clip((turns - first) / knot, 0, n), _columns(turns, highest), samples
 
-    found = moments(with_columns(), n)
-    band, right = found.band(), found.sums()
-    alone = Moments(found.gram[:, :, :1, :, :1], found.right[:, :, :1]).band()
+    sums = moments(with_columns(), n)
+    band, right = sums.band(), sums.sums()
+    alone = Moments(sums.gram[:, :, :1, :, :1], sums.right[:, :, :1]).band()
     loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
     M = 2 * highest + 1
     start = _solved(band, [loose] * M, right)
@@ -159,8 +176,9 @@ def track_orders(parts: Parts, first: float, last: float, highest: int) -> Order
         raw.append(np.stack(means, axis=-1))
     c = np.stack(coefficients, axis=-1)
     complex_ones = np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)
-    density = found.gram[:, :, 0, :, 0].sum(axis=(1, 2)) / knot
-    return Orders(first, knot, complex_ones, tuple(smoothings), density, np.stack(raw, axis=-1))
+    density = sums.gram[:, :, 0, :, 0].sum(axis=(1, 2)) / knot
+    found = Orders(first, knot, complex_ones, tuple(smoothings), density, np.stack(raw, axis=-1))
+    return found if fine or not found.too_fast() else track_orders(parts, first, last, highest, FINE)
 
 
 def _columns(turns: FloatArray, highest: int) -> FloatArray:

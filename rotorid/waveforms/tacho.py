@@ -178,8 +178,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     worn = max(0.0, (jitter / np.median(speed)) ** 2 - sharp / (12 * rate**2)) / len(begin)
     if jitter > UNEVEN + np.median(speed) / rate:
         words += (
-            f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks than "
-            f"{counted(settings.pulses, 'pulse')} a turn (pulses), or is it noise (tacho_level)?",
+            f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks "
+            f"than {counted(settings.pulses, 'pulse')} a turn (pulses), or is it noise (tacho_level)?",
         )
     words += tuple(_silent(begin, speed, len(channel.samples) / rate))
     words += _damage(len(lost), len(double), len(index))

@@ -27,8 +27,6 @@ NEAR_TOP, PILED = 0.01, 0.65
 """So many of the samples in this uppermost share of the range are equal where a channel is clipped."""
 LEAST_TURNS = 2.0
 """Over which the overall level is taken."""
-VAGUE = 0.03
-"""Of its largest size; a vector whose error is more along a run-up is worth a word."""
 MOVES = 0.1
 """A vector that moves by more, of its size, at a steady speed is worth a word."""
 TOLD = 3.0
@@ -172,9 +170,9 @@ def _found(
         wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
         rate = np.full(len(times), (last - first) * record.rate / (end - 1 - begin))
     nearby = np.stack((times, np.maximum(wide, LEAST_TURNS) / rate), axis=1)
-    vectors, deviation, gap = _before_paths(
-        record, tracked, tacho, orders, derivative, times, rate, wide, steady
-    )
+    before, after = (np.clip(times + side * wide / rate, *tacho.span) for side in (-0.5, 0.5))
+    rise = (tacho.angle.speed(after) - tacho.angle.speed(before)) / (after - before)
+    vectors, deviation, gap = _before_paths(record, tracked, orders, derivative, turns, rate, rise, steady)
     drawn = np.zeros(len(times)) if steady else tacho.angle.deviation(times)
     angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * rate)
     across = np.hypot(deviation, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None, :])
@@ -232,18 +230,14 @@ def _independent(tacho: Tacho, places: FloatArray, width: FloatArray) -> FloatAr
 def _before_paths(
     record: WaveformRecord,
     tracked: Orders,
-    tacho: Tacho,
     orders: tuple[int, ...],
     derivative: int | None,
-    times: FloatArray,
+    turns: FloatArray,
     speed: FloatArray,
-    wide: FloatArray,
+    rate: FloatArray,
     steady: bool,
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Vectors and their deviations, (P, C, K), and means (P, C), without what the channels' paths did."""
-    turns = tacho.turn_at(times)
-    before, after = (np.clip(times + side * wide / speed, *tacho.span) for side in (-0.5, 0.5))
-    rate = (tacho.angle.speed(after) - tacho.angle.speed(before)) / (after - before)
     read, change = tracked.at(turns), tracked.slope(turns) * speed[:, None, None]
     deviation = np.stack([tracked.deviation(turns, k) for k in orders], axis=2)
     if steady:
@@ -301,13 +295,15 @@ def _said(
     size, error = np.abs(vectors[:, :, 0]), deviation[:, :, 0]
     lost = [sensor.name for c, sensor in enumerate(record.sensors) if (size[:, c] < TOLD * error[:, c]).all()]
     if lost:
-        yield f"1× of {listing(map(repr, lost), 'and')} cannot be told from noise: is the sensor connected, and are the pulses a turn right?"
-    vague = np.median(error, axis=0) > VAGUE * size.max(axis=0)
-    for sensor in () if steady else itertools.compress(record.sensors, vague):
+        names = listing(map(repr, lost), "and")
+        yield (
+            f"1× of {names} cannot be told from noise: is the sensor connected, and are the pulses a turn right?"
+        )
+    for sensor in () if steady else itertools.compress(record.sensors, tracked.vague()):
         if sensor.name not in lost:
             yield (
-                f"1× of {sensor.name!r} is hardly told along the run-up: there is strong noise near it, or the "
-                "speed passes a resonance within so few turns that vectors there are too small"
+                f"1× of {sensor.name!r} is hardly told along the run-up: there is strong noise near it, or "
+                "the speed passes a resonance within so few turns that vectors there are too small"
             )
     if steady:
         places = np.linspace(tracked.first, tracked.last, 21)[1:-1]

@@ -177,7 +177,7 @@ def test_a_magnetic_pickup_is_read_where_it_is_steep(polarity, edge):
     signal = polarity * place * np.exp(-(place**2) / 2) * (12 + 2 * T)
     signal += 0.02 * np.random.default_rng(0).standard_normal(len(T))
     with pytest.raises(
-        ValueError, match="rests near .* and its pulses go both ways, as of a magnetic pickup"
+        ValueError, match=r"rests near .* and its pulses go both ways, as of a magnetic pickup"
     ):
         read(signal)
     tacho = read(signal, edge=edge)

@@ -250,8 +250,30 @@ def test_the_overall_level_is_over_whole_turns():
     assert found.overall[:, 0, 1] == pytest.approx(abs(VECTOR), rel=0.2)
 
 
-def test_a_resonance_that_is_passed_within_few_turns_is_said():
-    fast = machine(seconds=2.3)  # 2.5 turns within the half-power points
-    found = find_vectors(record(fast, 1, 2.3), TachoSettings())
-    (words,) = found.warnings
+@pytest.mark.parametrize("seconds", [2.0, 2.6, 4.0])
+def test_a_resonance_that_is_passed_within_few_turns(seconds):
+    fast = machine(seconds=seconds)  # 2.1 to 4.3 turns within the half-power points
+    found = find_vectors(record(fast, 1, seconds), TachoSettings())
+    exact = fast.vector(found.times)
+    turned = (found.vectors[:, 0, 0] - exact) * np.exp(-1j * np.angle(exact))
+    assert np.abs(turned).max() < 0.02 * np.abs(exact).max()
+    assert np.mean(np.abs(turned.real) < 1.96 * found.radial[:, 0, 0]) > 0.9
+    assert np.mean(np.abs(turned.imag) < 1.96 * found.tangential[:, 0, 0]) > 0.9
+    assert found.warnings == ()
+
+
+def test_one_that_is_passed_within_a_turn_is_said():
+    fast = machine(seconds=1.0)
+    (words,) = find_vectors(record(fast, 1, 1.0), TachoSettings()).warnings
     assert words.startswith("1× of 'A' is hardly told along the run-up")
+
+
+def test_a_half_order_beside_1x_is_no_reason_for_finer_knots(run):
+    measured = record(run, 3)
+    t = np.arange(len(measured.sensors[0].samples)) / RATE
+    half = 10e-6 * np.cos(np.pi * run.turns(t))
+    sensor = Channel("A", measured.sensors[0].samples + half)
+    found = find_vectors(replace(measured, sensors=(sensor,)), TachoSettings())
+    inside = (found.times > 2) & (found.times < 58)
+    error = np.abs(found.vectors[:, 0, 0] - run.vector(found.times))[inside]
+    assert np.sqrt(np.mean(error**2)) < 0.003 * 95e-6
