@@ -16,6 +16,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.waveforms.penalised_spline import (
+    ROUNDS,
     SOFTEST,
     Moments,
     Smoothing,
@@ -161,13 +162,13 @@ def track_orders(parts: Parts, first: float, last: float, highest: int, knot: fl
     total = times(alone, np.ones(n + 3))
     for sensor in range(right.shape[2]):
         c, b, own = start[:, :, sensor], right[:, :, sensor], list[Smoothing]()
-        for _ in range(PASSES):
+        for turn in range(PASSES):
             left, own, means = b - times(band, c.reshape(-1)).reshape(c.shape), [], []
             for k in range(highest + 1):
                 columns = slice(0, 1) if k == 0 else slice(2 * k - 1, 2 * k + 1)
                 gram = alone if k == 0 else alone / 2  # mean squares of cosine and sine
                 y = np.ascontiguousarray(left[:, columns] + times(gram, c[:, columns]))
-                own.append(smooth(gram, y)[0])
+                own.append(smooth(gram, y, rounds=1 if turn == 0 else ROUNDS)[0])
                 full = y + times(gram, trend[:, columns, sensor])
                 means.append(full @ ((1.0,) if k == 0 else (2.0, 2.0j)) / total)
             c = _solved(band, [own[(m + 1) // 2].penalty for m in range(M)], b)

@@ -157,7 +157,7 @@ def times(band: FloatArray, c: AnyArray) -> AnyArray:
 
 
 def smooth(
-    gram: FloatArray, right: AnyArray, total: float | None = None, count: int = 0
+    gram: FloatArray, right: AnyArray, total: float | None = None, count: int = 0, rounds: int = ROUNDS
 ) -> tuple[Smoothing, AnyArray]:
     """Choose the penalty of one curve by restricted maximum likelihood.
 
@@ -170,6 +170,8 @@ def smooth(
     total, count
         Sum of squares and number of the samples, whose noise is that of the curve; None: only the noise that
         splines can follow counts, the one around an order.
+    rounds
+        How often the weights of the penalty are found.
 
     Returns
     -------
@@ -202,12 +204,12 @@ def smooth(
             real.shape[1] * (2 * np.log(np.abs(factor[0])).sum() - n * log) + count * np.log(variance)
         )
 
-    for turn in range(ROUNDS):
+    for turn in range(rounds):
         best = minimize_scalar(
             likelihood, bounds=(SOFTEST, STIFFEST), method="bounded", options={"xatol": 0.2}
         )
         factor, c, variance = solved(float(best.x))
-        if turn < ROUNDS - 1:
+        if turn < rounds - 1:
             jump = (np.diff(c, 3, axis=0) ** 2).sum(axis=1)
             near = uniform_filter1d(jump, 2 * NEIGHBOURS + 1, mode="constant")
             w = 1 / (near + EVENING * near.mean() + 1e-300)

@@ -110,7 +110,7 @@ def polar_plot(sweeps: Sequence[SweepVectors], roll: ComplexArray) -> Figure:
 
     def draw(ax: Axes) -> None:
         draw_polar(every, paths, names, ax, marks=marks, unit=unit, lag=labels.phase == "lag")
-        trial = _draw_trial_vectors(ax, every, paths * unit.scale, curves)
+        trial = _draw_trial_vectors(ax, every, np.asarray(paths * unit.scale, dtype=complex), curves)
         ax.set_title(f"{ax.get_title()}\nless the slow roll{words}{trial}", fontsize=TEXT)
 
     return on_figure(draw, height=7.4, projection="polar")
