@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from balancing.data.conventions import Labels, Phase
+from balancing.data.reading_errors import turned
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.result import Column as Told
@@ -97,10 +98,8 @@ def _covariances(table: Table, vectors: ComplexArray) -> FloatArray:
     """Of real and imaginary parts, (rows, 2, 2)."""
     size = np.abs(vectors)
     along, across = table.numbers("amplitude_std") ** 2, (size * table.numbers("phase_std")) ** 2
-    u = np.where(size > 0, vectors, 1.0) / np.where(size > 0, size, 1.0)
-    across = np.where(size > 0, across, along)  # where there is nothing, no direction is another
-    turn = np.stack((np.stack((u.real, -u.imag), -1), np.stack((u.imag, u.real), -1)), -2)
-    return np.asarray(np.einsum("nij,nj,nkj->nik", turn, np.stack((along, across), -1), turn))
+    # where there is nothing, no direction is another
+    return turned(vectors, along, np.where(size > 0, across, along))
 
 
 def _sweep(
