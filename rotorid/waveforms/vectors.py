@@ -242,10 +242,10 @@ def _before_paths(
     deviation = np.stack([tracked.deviation(turns, k) for k in orders], axis=2)
     if steady:
         means, deviations = tracked.mean()
-        read = np.repeat(means[None], len(times), 0)
-        deviation = np.repeat(deviations[None, list(orders)].swapaxes(1, 2), len(times), 0)
+        read = np.repeat(means[None], len(turns), 0)
+        deviation = np.repeat(deviations[None, list(orders)].swapaxes(1, 2), len(turns), 0)
         change, rate = 0 * read, 0 * rate
-    vectors = np.empty((len(times), len(record.sensors), len(orders)), dtype=complex)
+    vectors = np.empty((len(turns), len(record.sensors), len(orders)), dtype=complex)
     errors, gap = np.empty(vectors.shape), read[:, 0].real.copy()
     for c, sensor in enumerate(record.sensors):
         more = 0 if derivative is None or sensor.derivative is None else sensor.derivative - derivative
@@ -297,7 +297,8 @@ def _said(
     if lost:
         names = listing(map(repr, lost), "and")
         yield (
-            f"1× of {names} cannot be told from noise: is the sensor connected, and are the pulses a turn right?"
+            f"1× of {names} cannot be told from noise: is the sensor connected, and are the pulses a turn "
+            "right?"
         )
     for sensor in () if steady else itertools.compress(record.sensors, tracked.vague()):
         if sensor.name not in lost:
