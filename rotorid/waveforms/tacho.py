@@ -174,8 +174,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     speed = angle.speed(begin)
     apart = ((turns - angle.turns(begin)) / speed)[index % settings.pulses == 0]
     seen = float(np.ptp(np.percentile(apart, EXTREMES)))
-    offset = max(0.0, 1 / rate - seen) / np.sqrt(12) if sharp else 0.0
     worn = max(0.0, (jitter / np.median(speed)) ** 2 - sharp / (12 * rate**2)) / len(begin)
+    offset = float(np.hypot(sharp * max(0.0, 1 / rate - seen) / np.sqrt(12), np.sqrt(worn)))
     if jitter > UNEVEN + np.median(speed) / rate:
         words += (
             f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks "
@@ -189,17 +189,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
             f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared",
         )
     return Tacho(
-        begin,
-        turns,
-        lost / settings.pulses,
-        double,
-        level,
-        band,
-        360 * jitter,
-        float(np.hypot(offset, np.sqrt(worn))),
-        words,
-        angle,
-        indexed,
+        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, offset, words, angle, indexed
     )
 
 
