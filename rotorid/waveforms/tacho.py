@@ -32,7 +32,7 @@ UNEVEN = 0.015
 """Turns, and a sample; pulses that scatter by more are of several marks, or of no mark."""
 RESTING = 0.5
 """Share of the samples that are within the band where the level is no edge but where the signal rests."""
-LEAST_PULSES = 8
+LEAST_PULSES, LEAST_TURNS = 8, 2
 WINDOW = 25
 """The median of so many intervals between pulses is the usual one there."""
 SKIPPED, OFF = 4, 0.25
@@ -158,10 +158,11 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     level, band, rests = _levels(channel, settings)
     rising, falling, sharp = _edges(channel.samples, level, band)
     rising, falling = rising / rate, falling / rate
-    if min(len(rising), len(falling)) < LEAST_PULSES:
+    least = max(LEAST_PULSES, LEAST_TURNS * settings.pulses + 1)
+    if min(len(rising), len(falling)) < least:
         raise ValueError(
             f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: "
-            f"at least {LEAST_PULSES} are needed (is this the tacho's channel, and the level right?)"
+            f"at least {least} are needed (is this the tacho's channel, and the level right?)"
         )
     begin, end, words = _marks(rising, falling, settings.edge, rests)
     kept, index = _counted(begin, settings.pulses, channel.name)
