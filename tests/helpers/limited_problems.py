@@ -1,4 +1,4 @@
-"""Drawn problems of the weighted fit within limits, and a global search of their objective by SciPy; cones."""
+"""Drawn problems of the weighted fit within limits, a global search of their objective by SciPy; cones."""
 
 from __future__ import annotations
 

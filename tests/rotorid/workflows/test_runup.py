@@ -207,4 +207,6 @@ def test_arrows_lead_from_the_first_run_to_the_trial_run_at_the_same_speed():
     assert len(arrows) == 6 * len(sweep.sensors)
     for arrow in arrows:
         (a, r), (b, s) = arrow.xyann, arrow.xy
-        assert s * np.exp(1j * b) - r * np.exp(1j * a) == pytest.approx(5e-6 * sweep.labels.vibration_scale, rel=1e-6)
+        assert s * np.exp(1j * b) - r * np.exp(1j * a) == pytest.approx(
+            5e-6 * sweep.labels.vibration_scale, rel=1e-6
+        )
