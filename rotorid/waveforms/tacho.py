@@ -32,7 +32,7 @@ UNEVEN = 0.015
 """Turns, and a sample; pulses that scatter by more are of several marks, or of no mark."""
 RESTING = 0.5
 """Share of the samples that are within the band where the level is no edge but where the signal rests."""
-LEAST_PULSES = 8
+LEAST_PULSES, LEAST_TURNS = 8, 2
 WINDOW = 25
 """The median of so many intervals between pulses is the usual one there."""
 SKIPPED, OFF = 4, 0.25
@@ -158,10 +158,11 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     level, band, rests = _levels(channel, settings)
     rising, falling, sharp = _edges(channel.samples, level, band)
     rising, falling = rising / rate, falling / rate
-    if min(len(rising), len(falling)) < LEAST_PULSES:
+    least = max(LEAST_PULSES, LEAST_TURNS * settings.pulses + 1)
+    if min(len(rising), len(falling)) < least:
         raise ValueError(
             f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: "
-            f"at least {LEAST_PULSES} are needed (is this the tacho's channel, and the level right?)"
+            f"at least {least} are needed (is this the tacho's channel, and the level right?)"
         )
     begin, end, words = _marks(rising, falling, settings.edge, rests)
     kept, index = _counted(begin, settings.pulses, channel.name)
@@ -174,8 +175,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     speed = angle.speed(begin)
     apart = ((turns - angle.turns(begin)) / speed)[index % settings.pulses == 0]
     seen = float(np.ptp(np.percentile(apart, EXTREMES)))
-    offset = max(0.0, 1 / rate - seen) / np.sqrt(12) if sharp else 0.0
     worn = max(0.0, (jitter / np.median(speed)) ** 2 - sharp / (12 * rate**2)) / len(begin)
+    offset = float(np.hypot(sharp * max(0.0, 1 / rate - seen) / np.sqrt(12), np.sqrt(worn)))
     if jitter > UNEVEN + np.median(speed) / rate:
         words += (
             f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks "
@@ -189,17 +190,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
             f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared",
         )
     return Tacho(
-        begin,
-        turns,
-        lost / settings.pulses,
-        double,
-        level,
-        band,
-        360 * jitter,
-        float(np.hypot(offset, np.sqrt(worn))),
-        words,
-        angle,
-        indexed,
+        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, offset, words, angle, indexed
     )
 
 

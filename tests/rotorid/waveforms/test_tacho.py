@@ -116,6 +116,13 @@ def test_even_pulses_leave_the_turn_open_and_uneven_ones_do_not():
     assert np.abs(offsets(uneven)).max() * 360 < 0.2  # the gap from 0.4 to 1 is the longest
 
 
+def test_less_than_two_turns_of_a_wheel_are_refused():
+    teeth = 5.0 * (TURNS * 60 % 1 < 0.5)
+    some = teeth[: int(np.searchsorted(TURNS, START + 1.5))]
+    with pytest.raises(ValueError, match="at least 121 are needed"):
+        read_tacho(Channel("KEY", some), RATE, TachoSettings(pulses=60, edge="rising"))
+
+
 def test_a_wheel_that_lacks_a_tooth():
     teeth = 5.0 * ((TURNS * 12 % 1 < 0.5) & (TURNS % 1 < 11 / 12))
     tacho = read(teeth, pulses=12, edge="rising")
