@@ -45,6 +45,8 @@ ANSWERS = (
         "fit-run_down",
         "simulate-lesson-5",
         "modes-chain",
+        "vectors",
+        "runup-record",
         "calibrate",
         "validate",
         "demo-main",

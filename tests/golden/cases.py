@@ -130,6 +130,7 @@ influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --spee
 vectors                     vectors sample_data/waveforms/waveforms.toml --orders 1,2 --output runs.csv
 vectors-run-up              vectors sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm --picture orbit --plot orbit.png
 runup-record                runup sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --plot bode.png
+vectors-slow-roll           vectors sample_data/waveforms/slow_roll.toml
 vectors-no-tacho            vectors sample_data/waveforms/run_up.wav --unit um
 demo-list                   demo --list
 demo-misspelt               demo --sample maine
