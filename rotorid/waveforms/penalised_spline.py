@@ -18,17 +18,21 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
-from scipy.optimize import minimize_scalar
 
 from rotorid.base.arrays import AnyArray, FloatArray, IntArray
 
-TRACE, SOFTEST, STIFFEST = -22.0, -10.0, 30.0
+TRACE, SOFTEST, STEP = -22.0, -10.0, 0.28
 """log λ, relative to the samples between two knots: what keeps knots solvable between which there are none,
-and the ends of what is chosen."""
+and the first and the step of the values among which one is chosen."""
+FIBONACCI = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89)
+"""The last two add up to the number of these values."""
+LEAST_GAIN = 0.01
+"""Twice the gain in log likelihood, for 1 of log λ, at which the search still goes for more."""
 ROUNDS, NEIGHBOURS = 3, 12
 """The weights of the penalty are found again so often, each from so many knots on either side."""
-EVENING = 0.1
-"""Share of the mean jump that is added to each, so that the weights stay finite."""
+EVENING, FEW = 0.1, 0.1
+"""Share of the mean jump that is added to each, so that the weights stay finite, and share of the jump that
+is likely for λ: of a curve that hardly bends the weights are even, and not those of rounding."""
 
 
 def weights(f: FloatArray) -> FloatArray:
@@ -200,19 +204,34 @@ def smooth(
 
     def likelihood(log: float) -> float:
         factor, _, variance = solved(log)
-        return float(
+        return LEAST_GAIN * log + float(
             real.shape[1] * (2 * np.log(np.abs(factor[0])).sum() - n * log) + count * np.log(variance)
         )
 
     for turn in range(rounds):
-        best = minimize_scalar(
-            likelihood, bounds=(SOFTEST, STIFFEST), method="bounded", options={"xatol": 0.2}
-        )
-        factor, c, variance = solved(float(best.x))
+        log = _stiffness(likelihood)
+        factor, c, variance = solved(log)
         if turn < rounds - 1:
             jump = (np.diff(c, 3, axis=0) ** 2).sum(axis=1)
             near = uniform_filter1d(jump, 2 * NEIGHBOURS + 1, mode="constant")
-            w = 1 / (near + EVENING * near.mean() + 1e-300)
+            likely = (2 * NEIGHBOURS + 1) * real.shape[1] * variance / (per * np.exp(log))
+            w = 1 / (near + EVENING * (near.mean() + FEW * likely) + 1e-300)
             w /= np.exp(np.log(w).mean())
     coefficients = np.ascontiguousarray(c).view(right.dtype)[:, 0]
-    return Smoothing(per * np.exp(float(best.x)) * w, variance, factor), coefficients
+    return Smoothing(per * np.exp(log) * w, variance, factor), coefficients
+
+
+def _stiffness(likelihood: Callable[[float], float]) -> float:
+    """Fibonacci's search for log λ among fixed values: another machine's rounding chooses the same one."""
+    values: dict[int, float] = {}
+
+    def at(place: int) -> float:
+        if place not in values:
+            values[place] = likelihood(SOFTEST + STEP * place)
+        return values[place]
+
+    low = 0
+    for step, further in reversed([*pairwise(FIBONACCI)]):
+        if at(low + step) > at(low + further):
+            low += step
+    return SOFTEST + STEP * min(values, key=lambda place: (values[place], place))

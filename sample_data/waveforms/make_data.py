@@ -4,8 +4,8 @@ A drawn machine on two bearings with two modes (1,560 and 2,640 rpm, damping 3 a
 probe at each end (horizontal at the drive end, A, with its vertical neighbour V; horizontal at the free end,
 B). Three runs at a steady 1,950 rpm: as found, and a trial weight of 10 g at 0° in each plane; and a run-up
 from 600 to 3,300 rpm in 24 s. Each record has a tacho (a notch of 18°, so that the pulse is low) and three
-probes: 1× of the machine, a run-out of 4 µm, some 2×, and noise of 1 µm. 16 bit; 100 mV are 25.4 µm peak to
-peak, as 4 mV/µm.
+probes: 1× of the machine, a run-out of 4 µm, some 2×, and noise of 1 µm, around a gap of 1 mm. 16 bit; 100 mV
+are 25.4 µm peak to peak, as 4 mV/µm.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MODES = np.array([1560.0, 2640.0]) * np.pi / 30
 DAMPING = np.array([0.03, 0.025])
 SHAPES = {"A": (0.9, 0.7), "V": (-0.9j, -0.7j), "B": (0.8, -0.75)}
 PLANES = {"left": (0.8, 0.6), "right": (0.75, -0.7)}
-MASS = 60.0
+MASS, GAP = 60.0, 1e-3
 FOUND = {"left": 9e-3 * np.exp(1j * np.radians(75)), "right": 6e-3 * np.exp(1j * np.radians(200))}
 RUN_OUT = {"A": 4e-6 * np.exp(0.4j), "V": 3.5e-6 * np.exp(2.2j), "B": 4e-6 * np.exp(-1.1j)}
 VOLTS_PER_M, FULL_SCALE = 4e3, 10.0
@@ -69,7 +69,7 @@ def write(
     volts = [-1.0 - 7.0 * inside]
     for sensor, shape in SHAPES.items():
         z = (np.array(shape) @ q + RUN_OUT[sensor]) * np.exp(1j * angle)
-        x = z.real + 1.2e-6 * np.cos(2 * angle + 1.0) + 1e-6 * rng.standard_normal(len(t))
+        x = GAP + z.real + 1.2e-6 * np.cos(2 * angle + 1.0) + 1e-6 * rng.standard_normal(len(t))
         volts.append(VOLTS_PER_M * x)
     counts = np.round(np.transpose(volts) / FULL_SCALE * 2**15).astype(np.int16)
     wavfile.write(Path(__file__).with_name(f"{name}.wav"), RATE, counts)

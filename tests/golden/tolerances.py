@@ -35,6 +35,8 @@ _CONSTRAINED = "what an active limit counts follows from the last multipliers of
 _CERTIFICATE = "the gap at which the solver stops is rounding, divided by what it began with"
 _EXACT = "the data have no errors: residuals, and the deviations that follow from them, are rounding"
 
+_CHOSEN = "the penalty of a stiff filter is chosen where its likelihood is flat; all far below the errors"
+
 TOLERANCES: tuple[Tolerance, ...] = (
     # rounding residues
     Tolerance("identify-*-exact", "*", _EXACT, absolute=1e-9),
@@ -67,6 +69,10 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("turbo-max-mass", "*", "the same, along limits that χ² hardly tells apart", relative=1e-5),
     Tolerance("turbo-trade-off", "trade_off.points.*", "a conic solver, along a flat optimum", relative=1e-4),
     Tolerance("calibrate*", "*", "a search stops where a step no longer helps", relative=1e-6),
+    *(Tolerance(case, "*", _CHOSEN, relative=2e-5) for case in ("vectors*", "runup-record", "*waveforms")),
+    Tolerance("*waveforms", "*after*", _CHOSEN + ", and nearly nothing is left", relative=2e-4),
+    Tolerance("*waveforms", "*chi_square*", _CHOSEN, relative=5e-4),
+    Tolerance("runup-record", "*chi_square*", _CHOSEN, relative=5e-4),
     # covariances
     Tolerance("*minmax*", "corrections.*std*", _CONSTRAINED, relative=5e-4),
     Tolerance("*minmax*", "corrections.covariance", _CONSTRAINED, relative=5e-4),
