@@ -85,11 +85,11 @@ def corrections(c: Correction, ax: Axes | None = None, trials: Trials | None = N
         tip = np.deg2rad([angle[p], angle[p]]), [0, mass[p]]
         polar.plot(*tip, **of_plane(p), lw=2.0, markevery=[1], ms=6, zorder=4, label=label)
         if regions is not None:
-            around = _vectors(c.labels.weight, regions[p])
+            around = on_paper(c.labels.weight, regions[p])
             polar.plot(*around, color=COLORS[p % len(COLORS)], ls=STYLES[p % len(STYLES)], lw=1.2, zorder=5)
     reach = float(mass.max()) or np.finfo(float).tiny
     for _, p, weight in _trial_runs(c, trials):
-        polar.plot(*_vectors(c.labels.weight, weight), **of_plane(p), mfc="none", ls="none", ms=8, zorder=5)
+        polar.plot(*on_paper(c.labels.weight, weight), **of_plane(p), mfc="none", ls="none", ms=8, zorder=5)
         reach = max(reach, abs(weight) * c.labels.weight_scale)
     if _trial_runs(c, trials):
         polar.plot([], [], "o", color=QUIET, mfc="none", ms=8, label="hollow: trial weights, runs with them")
@@ -99,7 +99,7 @@ def corrections(c: Correction, ax: Axes | None = None, trials: Trials | None = N
         reach = max(reach, min(float(np.abs(regions).max()) * c.labels.weight_scale, 2.5 * reach))
     _largest_weights(polar, c, reach)
     polar.set_rlim(0, 1.15 * reach)
-    _quiet_radii(polar, angle, mass)
+    quiet_radii(polar, angle, mass)
     polar.set_title(f"Weights on the bare rotor, {c.labels.weight_in}", fontsize="medium", pad=10)
     return polar
 
@@ -109,7 +109,7 @@ def of_plane(p: int) -> dict[str, Any]:
     return {"color": COLORS[p % len(COLORS)], "marker": MARKERS[p % len(MARKERS)]}
 
 
-def _vectors(
+def on_paper(
     shown: Callable[[ComplexArray], tuple[FloatArray, FloatArray]], z: ComplexArray | complex
 ) -> tuple[FloatArray, FloatArray]:
     """Angles, rad, and radii of vectors as `Labels.weight` or `Labels.vibration` writes them."""
@@ -137,7 +137,7 @@ def _largest_weights(polar: PolarAxes, c: Correction, reach: float) -> None:
     for p, arcs in enumerate(c.limits.forbidden):
         for start, width in arcs:
             along = np.exp(1j * np.linspace(start, start + width, 91))
-            theta, _ = _vectors(c.labels.weight, along)
+            theta, _ = on_paper(c.labels.weight, along)
             radius = np.full(91, (1.03 + 0.03 * p) * reach)
             polar.plot(theta, radius, color=COLORS[p % len(COLORS)], lw=4, solid_capstyle="butt", label=label)
             label = "_"
@@ -162,16 +162,16 @@ def vectors(c: Correction, ax: Axes | None = None, trials: Trials | None = None)
     for readings, p, _ in _trial_runs(c, trials):
         assert trials is not None
         at = int(np.argmin(np.abs(trials.speeds - c.speeds[s]))), trials.sensors.index(c.sensors[k])
-        theta, size = _vectors(c.labels.vibration, np.array([start, readings[at]]))
+        theta, size = on_paper(c.labels.vibration, np.array([start, readings[at]]))
         polar.plot(theta, size, **of_plane(p), mfc="none", ls=":", lw=1.4, markevery=[1], ms=8, zorder=5)
-    theta, size = _vectors(c.labels.vibration, np.array([0, start]))
+    theta, size = on_paper(c.labels.vibration, np.array([0, start]))
     polar.plot(theta[[1, 1]], size, "s-", color="0.7", mec="0.3", lw=2.2, markevery=[1], ms=7, zorder=3)
     if c.after_covariance is not None:
         around = region_edge(c.after[s, k], c.after_covariance[s, k], c.dof, 180)
-        polar.plot(*_vectors(c.labels.vibration, around), color="black", lw=1.0)
-    polar.plot(*_vectors(c.labels.vibration, c.after[s, k]), "o", color="black", ms=5, zorder=4)
+        polar.plot(*on_paper(c.labels.vibration, around), color="black", lw=1.0)
+    polar.plot(*on_paper(c.labels.vibration, c.after[s, k]), "o", color="black", ms=5, zorder=4)
     polar.set_rlim(bottom=0)
-    _quiet_radii(polar, np.rad2deg(theta[1:]), size[1:])
+    quiet_radii(polar, np.rad2deg(theta[1:]), size[1:])
     where = f"{c.sensors[k]} at {c.labels.speed_words(c.speeds[s])}{unit(c.labels)}"
     polar.set_title(f"{where}\nphase as {c.labels.phase}", fontsize="medium", pad=10)
     return polar
@@ -210,7 +210,7 @@ def polar_axes(ax: Axes | None, sign: int, what: str, height: float = 5) -> Pola
     return polar
 
 
-def _quiet_radii(ax: PolarAxes, angle: FloatArray, size: FloatArray) -> None:
+def quiet_radii(ax: PolarAxes, angle: FloatArray, size: FloatArray) -> None:
     """Put the numbers of the radii where no vector of note points."""
     from matplotlib.ticker import MaxNLocator
 

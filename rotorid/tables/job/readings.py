@@ -66,8 +66,6 @@ def read_readings(
         Collects the complaints.
     """
     _complain_about_tables(said, tables)
-    phase = cast("Phase | None", overrides.phase or said["phase"])
-    angles, clock = _angles(said, overrides)
     errors, others = said["errors"], overriding_errors(overrides)
     if others:
         errors = replace(errors or StatedErrors(), **others)
@@ -78,17 +76,9 @@ def read_readings(
     found, name = None, ""
     if "influence" in tables:
         name = source_name(tables["influence"])
-        found = load_influence(tables["influence"], phase, angles, own)
-    words = {} if found is None else found.said
-    labels = Labels(
-        phase=phase or as_phase(words.get("phase", "lead")),
-        angles=angles or as_angles(words.get("angles", "with rotation")),
-        rotation=cast("Rotation | None", said["rotation"]),
-        view=cast("View | None", said["view"] if said["rotation"] else None),
-        clock=clock,
-    )
-    unstated = tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None)
-    conventions = Conventions(labels, said["speed_tolerance_percent"], unstated, said["columns"])
+        phase = cast("Phase | None", overrides.phase or said["phase"])
+        found = load_influence(tables["influence"], phase, _angles(said, overrides)[0], own)
+    conventions = conventions_of(said, overrides, {} if found is None else found.said)
     trials = make_trials(tables["runs"], tables.get("weights"), conventions, errors, own)
     influence = None
     if found is not None and trials is not None:
@@ -107,6 +97,21 @@ def read_readings(
     if roll is not None:
         trials = subtract_slow_roll(trials, roll)
     return Readings(trials, influence, conventions, errors, roll)
+
+
+def conventions_of(said: Said, overrides: Overrides, stored: Mapping[str, str]) -> Conventions:
+    """What the numbers of the tables mean: as the caller says, or the job, or the stored coefficients."""
+    phase = cast("Phase | None", overrides.phase or said["phase"])
+    angles, clock = _angles(said, overrides)
+    labels = Labels(
+        phase=phase or as_phase(stored.get("phase", "lead")),
+        angles=angles or as_angles(stored.get("angles", "with rotation")),
+        rotation=cast("Rotation | None", said["rotation"]),
+        view=cast("View | None", said["view"] if said["rotation"] else None),
+        clock=clock,
+    )
+    unstated = tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None)
+    return Conventions(labels, said["speed_tolerance_percent"], unstated, said["columns"])
 
 
 def _complain_about_tables(said: Said, tables: Mapping[str, Source]) -> None:

@@ -6,7 +6,7 @@ import errno
 import hashlib
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -17,13 +17,15 @@ _read: ContextVar[dict[Path, bytes] | None] = ContextVar("read", default=None)
 
 
 @contextmanager
-def each_file_once() -> Iterator[None]:
+def each_file_once(held: Mapping[Path, bytes] | None = None) -> Iterator[None]:
     """While a command runs, a file that was read is not read again, and `-` is standard input.
 
-    Inside another one what that has read counts.
+    Inside another one what that has read counts; `held` is what is known of files beforehand.
     """
     seen = _read.get()
-    token = _read.set({} if seen is None else seen)
+    known = {} if seen is None else seen
+    known.update(held or {})
+    token = _read.set(known)
     try:
         yield
     finally:

@@ -1,0 +1,169 @@
+"""What the worksheet shows, computed by workflows in a process of its own: one JSON line a request.
+
+    python -m rotorid.worksheet.calculation
+
+Each line of standard input is {"do": NAME, …arguments}; its answer is {"value": …}, or {"refused": sentence},
+or {"problems": […]} of files. The page computes nothing, and neither does this: it calls what the command
+line calls.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rotorid.workflows.balance import Balance
+    from rotorid.workflows.result_provenance import Outcome
+
+KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
+"""Balances of one job, by the options of `rotorid balance`."""
+_kept: dict[str, tuple[int, Balance]] = {}
+"""The newest of each kind, with the version of the files: pictures and sheets are made of it."""
+
+
+def main() -> None:
+    """Answer requests until standard input ends."""
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    sys.stdout = sys.stderr  # nothing that is printed may come between the answers
+    for line in sys.stdin:
+        request = json.loads(line)
+        print(json.dumps(_answered(request.pop("do"), request)), file=answers, flush=True)
+
+
+def _answered(name: str, request: dict[str, Any]) -> dict[str, Any]:
+    from rotorid.tables.reader.problems import InputError
+
+    try:
+        return {"value": REQUESTS[name](**request)}
+    except InputError as error:
+        return {"problems": [{**vars(one), "text": str(one)} for one in error.problems]}
+    except (ValueError, OSError, ArithmeticError) as error:
+        return {"refused": str(error)}
+
+
+def _balance(job: str, version: int, kind: str) -> Balance:
+    """The job as it is now, balanced; once for each version of its files."""
+    from rotorid.workflows import BalanceOptions, balance
+
+    known = _kept.get(kind)
+    if known is None or known[0] != version:
+        known = _kept[kind] = version, balance(Path(job), BalanceOptions(**KINDS[kind]))
+    return known[1]
+
+
+def told(outcome: Outcome) -> dict[str, Any]:
+    """The document of `--json`, and what a person reads."""
+    answer = outcome.answer
+    words = {"judgement": answer.judgement, "found": answer.found}
+    return {
+        **words,
+        "warnings": list(answer.warnings),
+        "notes": list(answer.notes),
+        "document": outcome.document,
+    }
+
+
+def balanced(job: str, version: int, kind: str) -> dict[str, Any]:
+    """Weights, pieces in holes, or a trim; what was warned of when the files were read stands first."""
+    from rotorid.base.answer import kinds
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = told(_balance(job, version, kind))
+    said = kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
+    return {**found, "warnings": [*said, *found["warnings"]]}
+
+
+def so_far(job: str, version: int) -> dict[str, Any]:
+    """What the finished rows of a job say."""
+    from rotorid.workflows.vibration.runs_so_far import runs_so_far
+
+    return runs_so_far(Path(job)).to_dict()
+
+
+def channel(job: str, version: int, speed: str, sensor: str) -> str:
+    """Polar picture of the runs of one sensor at one speed."""
+    from rotorid.workflows.vibration.runs_so_far import runs_so_far
+
+    return _svg(runs_so_far(Path(job)).figure(speed, sensor), f"Runs of {sensor} at {speed}")
+
+
+def picture(job: str, version: int, kind: str) -> str:
+    """Weights and readings before and after, or discs with pieces in their holes."""
+    found = _balance(job, version, kind)
+    return _svg(found.figure(), found.answer.judgement)
+
+
+def _svg(figure: Figure, title: str) -> str:
+    from rotorid.report.page import inline_svg
+
+    return str(inline_svg(figure, title))
+
+
+def sheet(job: str, version: int, kind: str) -> str:
+    """The balancing sheet."""
+    return _balance(job, version, kind).sheet().decode()
+
+
+def whole(job: str, version: int, kind: str) -> str:
+    """All tables."""
+    return _balance(job, version, kind).answer.whole()
+
+
+def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, Any]:
+    """A first trial weight, with the job's coefficients or from the load alone."""
+    from rotorid.workflows import TrialWeightOptions, trial_weight
+
+    found = trial_weight(None if job is None else Path(job), TrialWeightOptions(**options))
+    return {**told(found), "picture": _svg(found.figure(), found.answer.judgement)}
+
+
+def convention(phase: str, angles: str) -> str:
+    """Two drawings: how the angles of weights count, and what a phase is."""
+    from balancing.data.conventions import Labels
+    from rotorid.report import conventions_explained as explained
+    from rotorid.tables.runs.stated_conventions import as_angles, as_phase
+
+    labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
+    turning = _svg(explained.rotor_figure(labels), f"Angles of weights {angles}")
+    return turning + _svg(explained.phase_figure(labels), f"A phase of 60° as {phase}")
+
+
+def rows(name: str, data: str) -> dict[str, Any]:
+    """Header and rows of a runs table that is no file of the job, also as an instrument exports it."""
+    from rotorid.tables.reader.grid import show
+    from rotorid.tables.reader.input_file import each_file_once
+    from rotorid.tables.reader.problems import Problems
+    from rotorid.tables.runs.instrument_export import read_runs_grid
+    from rotorid.tables.runs.stated_conventions import Conventions
+
+    problems, path = Problems(), Path(name)
+    with each_file_once({path: base64.b64decode(data)}):
+        grid = problems.need(read_runs_grid(path, Conventions(), problems))
+    problems.stop()
+    return {"header": list(grid.header), "rows": [[show(cell) for cell in cells] for _, cells in grid.rows]}
+
+
+REQUESTS: Mapping[str, Callable[..., Any]] = {
+    "so_far": so_far,
+    "balanced": balanced,
+    "channel": channel,
+    "picture": picture,
+    "sheet": sheet,
+    "whole": whole,
+    "trial": trial,
+    "convention": convention,
+    "rows": rows,
+}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,192 @@
+"""One job in the worksheet: its files, what is computed of them, and who waits for news."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from typing import Any
+
+from rotorid.tables.job.job_keys import TABLES
+from rotorid.worksheet.job_files import JobFiles
+from rotorid.worksheet.workers import Refused, Worker
+
+LOOK = 0.25
+"""Seconds between two looks at the files."""
+_NOTHING: dict[str, Any] = {
+    "busy": "",
+    "runs": None,
+    "problems": [],
+    "refused": "",
+    "answer": None,
+    "pieces": None,
+    "trim": None,
+    "pictures": {},
+}
+
+
+class Session:
+    """State that all windows of one job share.
+
+    Attributes
+    ----------
+    files
+        The job on disk.
+    version
+        Grows with every change that a window should see.
+    front, aside
+        What answers at once, and what may take its time.
+    """
+
+    def __init__(self, files: JobFiles) -> None:
+        self.files = files
+        self.version = 1
+        self.front, self.aside = Worker(), Worker()
+        self._of_files = 1
+        self._notice = ""
+        self._results = dict(_NOTHING)
+        self._news = asyncio.Condition()
+        self._computing: asyncio.Task[None] | None = None
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Compute, and look for changes from outside, until the page is closed."""
+        await self.front.start()
+        await self.aside.start()
+        await self.changed()
+        watching = asyncio.ensure_future(self._watch())
+        yield
+        for task in (watching, self._computing):
+            if task is not None:
+                task.cancel()
+        await asyncio.gather(self.front.stop(), self.aside.stop())
+
+    def state(self) -> dict[str, Any]:
+        """All that a window shows."""
+        return {
+            "version": self.version,
+            **self.files.state(),
+            "notice": self._notice,
+            "results": self._results,
+        }
+
+    async def after(self, version: int, seconds: float = 20.0) -> dict[str, Any]:
+        """The state, as soon as it is newer, or after so many seconds."""
+        async with self._news:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait_for(lambda: self.version > version), seconds)
+        return self.state()
+
+    async def changed(self, notice: str = "") -> int:
+        """Say that the files are others, and compute them anew; what is being computed is given up."""
+        self._notice = notice
+        self._of_files = self.version + 1
+        if self._computing is not None:
+            self._computing.cancel()
+        await self._publish(pieces=None, trim=None, pictures={}, busy="computing")
+        self._computing = asyncio.ensure_future(self._compute())
+        return self.version
+
+    @property
+    def best(self) -> str:
+        """What is printed: the pieces in holes where there are some."""
+        return "answer" if self._results["pieces"] is None else "pieces"
+
+    def about(self) -> dict[str, Any]:
+        """What a request to a worker says of the job."""
+        return {"job": str(self.files.job), "version": self._of_files}
+
+    async def picture(self, name: str) -> str:
+        """One of the pictures, as SVG."""
+        kind = {"overview": "answer", "discs": "pieces", "trim": "trim"}[name]
+        return str(await self.aside.ask("picture", **self.about(), kind=kind))
+
+    async def append(self, name: str, data: str, run: str) -> list[str | None]:
+        """Add the rows of another runs table to that of the job, all as one run where it is named.
+
+        Raises
+        ------
+        ValueError
+            If it is none, or in other units than the job.
+        """
+        read = await self.front.ask("rows", name=name, data=data)
+        tables = self.files.state()["tables"]
+        own = tables["runs"]["header"] if "runs" in tables else []
+        names = [column if column in own else "" for column in read["header"]]
+        if lost := [column for column in own[:5] if column not in names and not (column == "run" and run)]:
+            raise ValueError(
+                f"{name}: a column {lost[0]} as in the runs of the job; it has {', '.join(read['header'])}"
+            )
+        kept = [dict(zip(names, cells, strict=True)) for cells in read["rows"]]
+        for cells in kept:
+            cells.pop("", None)
+            cells.update({"run": run} if run else {})
+        return self.files.apply([{"table": "runs", "after": None, "cells": cells} for cells in kept])
+
+    async def _publish(self, **results: object) -> None:
+        async with self._news:
+            self._results = {**self._results, **results}
+            self.version += 1
+            self._news.notify_all()
+
+    async def _watch(self) -> None:
+        while True:
+            await asyncio.sleep(LOOK)
+            if names := self.files.look():
+                verb = "was" if len(names) == 1 else "were"
+                await self.changed(f"{' and '.join(names)} {verb} changed by another program")
+
+    async def _compute(self) -> None:
+        """Runs, then the answer at once; pictures, trim and pieces aside."""
+        about, state = self.about(), self.files.state()
+        if not state["exists"]:
+            await self._publish(**_NOTHING)
+            return
+        if outside := self._outside(state["settings"]):
+            await self._publish(**{**_NOTHING, "refused": outside})
+            return
+        await self._part("runs", self.front.ask("so_far", **about))
+        if not await self._part("answer", self.front.ask("balanced", **about, kind="answer")):
+            await self._publish(busy="")
+            return
+        await self._publish(pictures={"overview": str(self.version)})
+        if "check" in state["tables"]:
+            await self._publish(busy="computing the trim")
+            await self._part("trim", self.aside.ask("balanced", **about, kind="trim"))
+        if any(_holes(plane) for plane in state["settings"].get("planes", {}).values()):
+            await self._publish(busy="choosing pieces for the holes")
+            if await self._part("pieces", self.aside.ask("balanced", **about, kind="pieces")):
+                pictures = {"overview": str(self.version), "discs": str(self.version)}
+                await self._publish(pictures=pictures)
+        await self._publish(busy="")
+
+    async def _part(self, name: str, asked: Any) -> bool:  # noqa: ANN401 - a coroutine of `ask`
+        """Publish one part, or why there is none; whether there is one."""
+        try:
+            found = await asked
+        except Refused as error:
+            told = {"problems": [self._problem(one) for one in error.problems], "refused": str(error)}
+            await self._publish(**{name: None}, **(told if name == "answer" else {}))
+            return False
+        await self._publish(**{name: found}, **({"problems": [], "refused": ""} if name == "answer" else {}))
+        return True
+
+    def _problem(self, problem: dict[str, Any]) -> dict[str, Any]:
+        """A problem of a file, with the cell of the page."""
+        row = problem["row"]
+        table, place = (row and self.files.place(problem["file"], row)) or (None, None)
+        words = {key: problem[key] for key in ("column", "text")}
+        return {"table": table, "row": place, **words, "missing": not problem["value"]}
+
+    def _outside(self, settings: dict[str, Any]) -> str:
+        """What the job names outside of its folder; the worksheet reads nothing there."""
+        folder = self.files.job.parent.resolve()
+        for key in (*TABLES, "rotor"):
+            name = settings.get(key)
+            if isinstance(name, str) and not (folder / name).resolve().is_relative_to(folder):
+                return f"{key} = {name!r} is outside the folder of the job, where the worksheet reads nothing"
+        return ""
+
+
+def _holes(plane: object) -> bool:
+    return isinstance(plane, dict) and any(str(key).startswith("holes") for key in plane)
