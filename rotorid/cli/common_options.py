@@ -63,7 +63,7 @@ def command(
         told: list[inspect.Parameter] = []
         for name, parameter in inspect.signature(function).parameters.items():
             expanded = {"options": own, "to": where}.get(name)
-            told += expanded or [parameter.replace(annotation=hints[name])]
+            told += [parameter.replace(annotation=hints[name])] if expanded is None else expanded
 
         @functools.wraps(function)
         def wrapper(**given: Any) -> None:  # noqa: ANN401 - what typer has read

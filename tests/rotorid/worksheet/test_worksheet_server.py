@@ -1,0 +1,292 @@
+"""The worksheet over HTTP: who may use it, its numbers, two windows, edits that survive, long work."""
+
+import json
+import shutil
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from worksheet.served import Served
+
+from rotorid.samples import sample_data
+
+pytest.importorskip("starlette", reason="without the extra rotorid[worksheet]")
+pytest.importorskip("uvicorn", reason="without the extra rotorid[worksheet]")
+pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
+
+
+@pytest.fixture
+def serve():
+    running = []
+
+    def start(job, *options):
+        running.append(Served(job, *options))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.close()
+
+
+def copy(tmp_path, sample="turbo_job"):
+    folder = tmp_path / sample
+    shutil.copytree(sample_data() / sample, folder)
+    return folder
+
+
+def command(job, *options):
+    """The document of `rotorid balance --json`, without what each run has of its own."""
+    done = subprocess.run(
+        [sys.executable, "-m", "rotorid", "balance", str(job), "--json", *options],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return plain(json.loads(done.stdout))
+
+
+def plain(document):
+    document["provenance"].pop("date")
+    return document
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "options"),
+    [
+        ("job.toml", "answer", ()),
+        ("holes.toml", "pieces", ("--split",)),
+        ("checked.toml", "answer", ()),
+        ("checked.toml", "trim", ("--refine",)),
+    ],
+)
+def test_every_number_is_that_of_the_command(tmp_path, serve, name, kind, options):
+    job = copy(tmp_path) / name
+    found = serve(job).settled()["results"][kind]
+    document = plain(found["document"])
+    expected = command(job, *options)
+    for one in (document, expected):
+        one["provenance"].pop("options")
+        one.get("mounting", {}).pop("seconds", None)
+    assert document == expected
+
+
+def test_an_edit_changes_one_line_and_every_number_follows(tmp_path, serve):
+    job = copy(tmp_path) / "job.toml"
+    before = (job.parent / "runs.csv").read_text()
+    served = serve(job)
+    state = served.settled()
+    row = state["tables"]["runs"]["rows"][0]
+    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": "89", "new": "95"}
+    status, answer = served.edit(edit)
+    assert status == 200, answer
+    after = (job.parent / "runs.csv").read_text()
+    changed = [
+        k for k, (a, b) in enumerate(zip(before.splitlines(), after.splitlines(), strict=True)) if a != b
+    ]
+    assert changed == [1]
+    found = served.settled()["results"]["answer"]["document"]
+    assert plain(found)["corrections"] == command(job)["corrections"]
+    assert found["corrections"] != state["results"]["answer"]["document"]["corrections"]
+    assert served.ask("/undo", {})[0] == 200
+    assert (job.parent / "runs.csv").read_text() == before
+    assert served.ask("/redo", {})[0] == 200
+    assert (job.parent / "runs.csv").read_text() == after
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"X_Rotorid_Token": None},
+        {"X_Rotorid_Token": "another"},
+        {"Host": "rebound.example:80"},
+        {"Host": "127.0.0.1"},
+        {"Origin": "http://other.example"},
+        {"Origin": "null"},
+    ],
+)
+@pytest.mark.parametrize(("path", "body"), [("/state", None), ("/edit", {"edits": []}), ("/sheet", None)])
+def test_who_has_no_token_or_comes_from_elsewhere_is_refused(tmp_path, serve, headers, path, body):
+    served = serve(copy(tmp_path) / "job.toml")
+    status, answer = served.ask(path, body, **headers)
+    assert status == 403
+    assert set(answer) == {"error"}
+    own = {"Origin": f"http://127.0.0.1:{served.port}"}
+    assert served.ask(path, body, **own)[0] == 200
+
+
+def test_the_page_alone_needs_no_token_and_says_nothing_of_the_job(tmp_path, serve):
+    served = serve(copy(tmp_path) / "job.toml")
+    for path in ("/", "/worksheet.js", "/worksheet.css"):
+        status, text = served.ask(path, X_Rotorid_Token=None)
+        assert status == 200
+        assert served.token not in text
+        assert "turbo_job" not in text
+
+
+def test_what_a_page_should_not_ask_for_is_one_sentence(tmp_path, serve):
+    served = serve(copy(tmp_path) / "job.toml")
+    served.settled()
+    asked = [
+        ("/edit", {"edits": [{"table": "runs", "row": "no such", "column": "run", "old": "", "new": "x"}]}),
+        ("/edit", {"edits": [{"table": "nothing", "after": None, "cells": {}}]}),
+        ("/edit", {"edits": [{"key": ["runs"], "old": "runs.csv", "new": "../other.csv"}]}),
+        ("/edit", {}),
+        ("/import", {"name": "x.csv", "data": "bm90aGluZw==", "run": ""}),
+        ("/picture/none", None),
+        ("/picture/runs?speed=1&sensor=2", None),
+        ("/convention/up-down", None),
+        ("/trial", {"options": {"no_such": 1}}),
+    ]
+    for path, body in asked:
+        status, answer = served.ask(path, body)
+        assert status in (400, 409), (path, answer)
+        assert answer["error"], path
+        assert "Traceback" not in answer["error"]
+    assert served.state()["results"]["answer"] is not None
+
+
+def test_nothing_outside_the_folder_is_read(tmp_path, serve):
+    folder = copy(tmp_path)
+    shutil.copy(folder / "runs.csv", tmp_path / "outside.csv")
+    job = folder / "job.toml"
+    job.write_text(job.read_text().replace('"runs.csv"', '"../outside.csv"'))
+    results = serve(job).settled()["results"]
+    assert results["answer"] is None
+    assert "outside the folder" in results["refused"]
+
+
+def test_two_windows_see_each_other_and_lose_nothing(tmp_path, serve):
+    served = serve(copy(tmp_path) / "job.toml")
+    state = served.settled()
+    first, second = (row["id"] for row in state["tables"]["runs"]["rows"][:2])
+    seen = []
+
+    def wait():
+        seen.append((served.state(state["version"]), time.perf_counter()))
+
+    waiting = threading.Thread(target=wait)
+    waiting.start()
+    time.sleep(0.3)
+    sent = time.perf_counter()
+    one = {"table": "runs", "row": first, "column": "phase_deg", "old": "89", "new": "90"}
+    assert served.edit(one)[0] == 200
+    waiting.join(5)
+    other, at = seen[0]
+    assert at - sent < 1.0
+    assert other["tables"]["runs"]["rows"][0]["cells"][-1] == "90"
+    # the other window wrote another cell, and the same one
+    assert (
+        served.edit({"table": "runs", "row": second, "column": "phase_deg", "old": "92", "new": "93"})[0]
+        == 200
+    )
+    status, answer = served.edit({**one, "new": "91"})
+    assert (status, answer["now"]) == (409, "90")
+    assert [row["cells"][-1] for row in served.state()["tables"]["runs"]["rows"][:2]] == ["90", "93"]
+
+
+def test_kill_loses_no_finished_cell(tmp_path, serve):
+    job = copy(tmp_path) / "job.toml"
+    served = serve(job)
+    rows = served.state()["tables"]["runs"]["rows"]
+    for k, row in enumerate(rows[:12]):
+        edit = {
+            "table": "runs",
+            "row": row["id"],
+            "column": "phase_deg",
+            "old": row["cells"][-1],
+            "new": str(k),
+        }
+        assert served.edit(edit)[0] == 200
+    served.kill()
+    lines = (job.parent / "runs.csv").read_text().splitlines()[1:13]
+    assert [line.split(",")[-1] for line in lines] == [str(k) for k in range(12)]
+    assert not [path for path in job.parent.iterdir() if path.name.endswith(".tmp")]
+    again = serve(job).settled()
+    assert again["results"]["answer"] is not None
+
+
+def test_changes_from_outside_are_noticed(tmp_path, serve):
+    job = copy(tmp_path) / "job.toml"
+    served = serve(job)
+    state = served.settled()
+    runs = job.parent / "runs.csv"
+    runs.write_text(runs.read_text().replace("3.36,89", "3.36,95"))
+    while not state["notice"]:
+        state = served.state(state["version"])
+    assert "runs.csv was changed by another program" in state["notice"]
+    assert state["tables"]["runs"]["rows"][0]["cells"][-1] == "95"
+    found = served.settled()["results"]["answer"]["document"]
+    assert found["corrections"] == command(job)["corrections"]
+
+
+def test_long_work_runs_aside_and_is_given_up_when_the_input_changes(tmp_path, serve):
+    folder = copy(tmp_path)
+    job = folder / "holes.toml"
+    text = job.read_text().replace("available_g_mm = [150]", "available_g_mm = [5, 7, 11, 13, 17, 19, 23]")
+    job.write_text(text.replace("stock = [5]\n", "").replace("holes = 12", "holes = 24"))
+    served = serve(job)
+    state = served.state()
+    while "pieces" not in state["results"]["busy"]:
+        state = served.state(state["version"])
+    assert state["results"]["answer"] is not None
+    row = state["tables"]["runs"]["rows"][0]
+    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": row["cells"][-1], "new": "97"}
+    begun = time.perf_counter()
+    assert served.edit(edit)[0] == 200
+    state = served.state()
+    while "pieces" not in state["results"]["busy"]:
+        assert state["results"]["pieces"] is None
+        state = served.state(state["version"])
+    assert time.perf_counter() - begun < 3
+    found = state["results"]["answer"]["document"]
+    assert found["corrections"] == command(job)["corrections"]
+
+
+def test_a_file_of_an_instrument_is_taken_over(tmp_path, serve):
+    import base64
+
+    folder = copy(tmp_path, "bk_two_plane")
+    served = serve(folder / "job.toml")
+    served.settled()
+    text = "speed_rpm;sensor;amplitude;phase_deg\n3000;1;3,1;80\n3000;2;2,9;75,5\n"
+    data = base64.b64encode(text.encode()).decode()
+    status, answer = served.ask("/import", {"name": "third.csv", "data": data, "run": "once more"})
+    assert status == 200, answer
+    assert (folder / "runs.csv").read_text().splitlines()[-2:] == [
+        "once more,3000,1,3.1,80",
+        "once more,3000,2,2.9,75.5",
+    ]
+    assert served.settled()["results"]["answer"] is not None
+
+
+def test_what_there_is_to_look_at_and_to_print(tmp_path, serve):
+    served = serve(copy(tmp_path) / "holes.toml")
+    state = served.settled()
+    assert set(state["results"]["pictures"]) == {"overview", "discs"}
+    for path in ("/picture/overview", "/picture/discs", "/picture/runs?speed=1220&sensor=probe%201"):
+        status, text = served.ask(path)
+        assert (status, text[:4]) == (200, "<svg"), path
+    for name in ("lead-with", "lead-against", "lag-with", "lag-against"):
+        status, text = served.ask(f"/convention/{name}")
+        assert (status, text.count("<svg")) == (200, 2)
+    assert "2 × 150" in served.ask("/sheet")[1]
+    assert "hole 10" in served.ask("/whole")[1]
+    effects = {one["run"]: one for one in state["results"]["runs"]["runs"]}
+    assert state["results"]["runs"]["baseline"] == "baseline"
+    assert {one["level"] for one in effects.values()} == {"good"}
+
+
+def test_a_trial_weight_with_and_without_the_coefficients(tmp_path, serve):
+    served = serve(copy(tmp_path) / "job.toml")
+    load = {"rotor_mass": "50kg", "carried_by": 2, "speed": "3000rpm", "radius": "100mm"}
+    status, answer = served.ask("/trial", {"options": load})
+    assert status == 200, answer
+    # 10 % of the static load: 0.1 · 25 kg · 9.81 m/s² / (ω² · 0.1 m)
+    omega = 3000 * 3.141592653589793 / 30
+    assert answer["document"]["trial_weights"][0]["mass"] == pytest.approx(
+        0.1 * 25 * 9.80665 / (omega**2 * 0.1) * 1e3, rel=1e-3
+    )
+    status, answer = served.ask("/trial", {"options": {"with_job": True, "plane": "left"}})
+    assert (status, answer["picture"][:4]) == (200, "<svg")
