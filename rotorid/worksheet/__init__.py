@@ -1,1 +1,1 @@
-"""The worksheet: a local page for a whole balancing job, over the files and workflows of the command line."""
+"""The worksheet: a page of this computer on which a whole balancing job is edited in its own files."""

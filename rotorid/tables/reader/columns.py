@@ -277,7 +277,7 @@ def sheet_source(path: Path, title: str) -> str:
 
 def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Table | None:
     """Give the columns of a grid their meaning; every complaint goes to `problems`."""
-    if not any(_column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
+    if not any(column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
         _complain_about_header(grid, columns, problems)
         return None
     found = _match(grid, columns, problems)
@@ -312,7 +312,7 @@ def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[st
     for index, name in enumerate(grid.header):
         if not name or name.casefold().startswith(REMARKS):
             continue
-        column = _column_of(name, columns)
+        column = column_of(name, columns)
         if column is None:
             near = nearest(name, columns)
             hint = f" (did you mean {near!r}?)" if near else f": {_known(columns)}; remarks go into 'note'"
@@ -353,13 +353,13 @@ def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
     """The row that names most of the required columns, if it is not the first one."""
     needed = {column.stem for column in columns if column.required}
     for number, cells in grid.first_rows[1:]:
-        names = [_column_of(show(cell), columns) for cell in cells]
+        names = [column_of(show(cell), columns) for cell in cells]
         if len(needed & {column.stem for column in names if column is not None}) > len(needed) / 2:
             return number
     return None
 
 
-def _column_of(name: str, columns: Sequence[Column]) -> Column | None:
+def column_of(name: str, columns: Sequence[Column]) -> Column | None:
     fitting = [
         column
         for column in columns
@@ -388,8 +388,8 @@ def _known(columns: Sequence[Column]) -> str:
 def _misspelt(grid: Grid, columns: Sequence[Column]) -> frozenset[str]:
     """Stems of the columns that unknown ones were probably meant to be."""
     names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
-    near = [nearest(name, columns) for name in names if _column_of(name, columns) is None]
-    close = [_column_of(name, columns) for name in near if name]
+    near = [nearest(name, columns) for name in names if column_of(name, columns) is None]
+    close = [column_of(name, columns) for name in near if name]
     return frozenset(column.stem for column in close if column is not None)
 
 

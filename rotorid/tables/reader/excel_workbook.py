@@ -38,8 +38,11 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
     Formulas count with the values that the spreadsheet program stored.
     """
     data = read_bytes(path, problems)
-    if data is None:
-        return None
+    return None if data is None else sheets_in(path, data, problems)
+
+
+def sheets_in(path: Path, data: bytes, problems: Problems) -> dict[str, list[Row]] | None:
+    """What `read_workbook` gives, of a workbook that has been read; `path` is for messages."""
     if not data.startswith(b"PK"):
         problems.add(str(path), None, None, None, "an Excel workbook, as the name says; this is none")
         return None

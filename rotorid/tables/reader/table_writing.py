@@ -7,7 +7,7 @@ import math
 import os
 import re
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,13 +65,15 @@ def write_bytes(path: Path, data: bytes) -> None:
     write_files({path: data})
 
 
-def write_files(files: Mapping[Path, bytes]) -> None:
+def write_files(files: Mapping[Path, bytes], last_look: Callable[[], None] | None = None) -> None:
     """Write several files that belong together: all are complete on disk before the first is replaced.
 
     Parameters
     ----------
     files
         What to write where, in the order in which old files are replaced.
+    last_look
+        Called when all are complete beside the old ones; what it raises leaves these as they are.
 
     Raises
     ------
@@ -102,6 +104,8 @@ def write_files(files: Mapping[Path, bytes]) -> None:
                     waiting[path].chmod(stat.S_IMODE(targets[path].stat().st_mode))
                 stream.flush()
                 os.fsync(stream.fileno())
+        if last_look is not None:
+            last_look()
         for path, temporary in waiting.items():
             temporary.replace(targets[path])
     except OSError as error:
@@ -137,12 +141,13 @@ def _csv_cell(value: Value) -> str:
         return "true" if value else "false"
     if isinstance(value, (int, float)):
         return repr(value)
-    text = "" if value is None else _text(value)
+    text = "" if value is None else guarded(value)
     # any sign that could separate columns: a reader looks for one in the header
     return '"' + text.replace('"', '""') + '"' if re.search('[,;\t"]|^#', text) else text
 
 
-def _text(text: str) -> str:
+def guarded(text: str) -> str:
+    """Text of one line that no spreadsheet takes for a formula; readers drop the blank before it."""
     text = _one_line(text)
     return f" {text}" if text.startswith(("=", "+", "-", "@")) else text
 

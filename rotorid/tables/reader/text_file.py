@@ -24,9 +24,10 @@ from rotorid.tables.reader.grid import (
 from rotorid.tables.reader.input_file import file_content
 from rotorid.tables.reader.problems import Problems, TableWarning
 
-_SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
+SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
 _BLANK = ';,\t" \xa0\ufeff\r\n'
 _WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")
+_WIDE = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 _NAMES = {";": "semicolon", ",": "comma", "\t": "tab"}
 
 
@@ -53,19 +54,29 @@ def decode(source: str, data: bytes, problems: Problems) -> str | None:
 
     An encoding that had to be guessed (cp1251, cp1252) is named in a `TableWarning`.
     """
-    if not data.strip():
-        problems.add(source, None, None, None, "a table with a header row; the file is empty")
+    found = decode_as(source, data, problems)
+    if found is None:
         return None
-    text = _decode(source, data, problems)
-    if text is None:
-        return None
-    if re.search(r"[\x00-\x08\x0b\x0e-\x1f\x7f-\x84\x86-\x9f\ufffe\uffff]", text):
-        problems.add(source, None, None, None, "a text file (CSV) or a workbook (.xlsx); this one is binary")
-        return None
+    text, encoding = found
+    if encoding.startswith("cp"):
+        message = f"{source}: not UTF-8, read as {encoding}; check the names in it"
+        warnings.warn(message, TableWarning, stacklevel=2)
     return text
 
 
-def _decode(source: str, data: bytes, problems: Problems) -> str | None:
+def decode_as(source: str, data: bytes, problems: Problems) -> tuple[str, str] | None:
+    """Text of a file and the encoding that it has; of UTF-16 and utf-8-sig it begins with a byte-order mark."""
+    if not data.strip():
+        problems.add(source, None, None, None, "a table with a header row; the file is empty")
+        return None
+    found = _decode(source, data, problems)
+    if found is not None and re.search(r"[\x00-\x08\x0b\x0e-\x1f\x7f-\x84\x86-\x9f\ufffe\uffff]", found[0]):
+        problems.add(source, None, None, None, "a text file (CSV) or a workbook (.xlsx); this one is binary")
+        return None
+    return found
+
+
+def _decode(source: str, data: bytes, problems: Problems) -> tuple[str, str] | None:
     if data.startswith(b"PK\x03\x04"):
         expected = "a text file; this is a workbook or an archive: name it .xlsx, or save it as CSV"
     elif data.startswith(b"\xd0\xcf\x11\xe0"):
@@ -73,31 +84,24 @@ def _decode(source: str, data: bytes, problems: Problems) -> str | None:
     else:
         expected = "a text file (CSV) or a workbook (.xlsx); this one is neither"
         try:
-            if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-                return data.decode("utf-16")
+            for mark, encoding in _WIDE.items():
+                if data.startswith(mark):
+                    return data[len(mark) :].decode(encoding), encoding
             if b"\x00" not in data:
-                return _decode_bytes(source, data)
+                return _decode_bytes(data)
         except UnicodeDecodeError:
             pass
     problems.add(source, None, None, None, expected)
     return None
 
 
-def _decode_bytes(source: str, data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        pass
-    order = ["cp1251", "cp1252"] if _looks_cyrillic(data) else ["cp1252", "cp1251"]
-    for encoding in order:
-        try:
-            text = data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        message = f"{source}: not UTF-8, read as {encoding}; check the names in it"
-        warnings.warn(message, TableWarning, stacklevel=2)
-        return text
-    return data.decode("utf-8")
+def _decode_bytes(data: bytes) -> tuple[str, str]:
+    with suppress(UnicodeDecodeError):
+        return data.decode("utf-8-sig"), "utf-8-sig" if data.startswith(codecs.BOM_UTF8) else "utf-8"
+    for encoding in ["cp1251", "cp1252"] if _looks_cyrillic(data) else ["cp1252", "cp1251"]:
+        with suppress(UnicodeDecodeError):
+            return data.decode(encoding), encoding
+    return data.decode("utf-8"), "utf-8"
 
 
 def _looks_cyrillic(data: bytes) -> bool:
@@ -116,7 +120,7 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
     """Rows of cells of a text table, or None and problems; `may_be_empty` as in `make_grid`."""
     lines = re.split(r"\r\n|\n|\r", text)
     separator = ""
-    declared = _SEP_LINE.fullmatch(lines[0].strip(" \ufeff"))
+    declared = SEP_LINE.fullmatch(lines[0].strip(" \ufeff"))
     if declared:
         # A spreadsheet takes this line as an instruction and does not show it: rows count from the next.
         separator = declared.group(1)
