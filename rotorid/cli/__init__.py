@@ -37,10 +37,10 @@ from rotorid.cli.commands import (
     unbalance,
     validate,
     vectors,
-    worksheet,
 )
 from rotorid.cli.terminal import markup_mode
 from rotorid.cli.verbose import verbosely
+from rotorid.cli.worksheet import worksheet
 
 app = typer.Typer(
     name="rotorid",
@@ -53,7 +53,7 @@ app = typer.Typer(
 _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Balance rotors": {
         "balance": balance.balance,
-        "worksheet": worksheet.worksheet,
+        "worksheet": worksheet,
         "vectors": vectors.vectors,
         "trial-weight": trial_weight.trial_weight,
         "split": split.split,

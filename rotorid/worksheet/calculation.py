@@ -123,8 +123,9 @@ def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, A
     """A first trial weight, with the job's coefficients or from the load alone."""
     from rotorid.workflows import TrialWeightOptions, trial_weight
 
-    found = trial_weight(None if job is None else Path(job), TrialWeightOptions(**options))
-    return {**told(found), "picture": _svg(found.figure(), found.answer.judgement)}
+    found = told(made := trial_weight(None if job is None else Path(job), TrialWeightOptions(**options)))
+    to_draw = all(one["angle_deg"] is not None for one in found["document"]["trial_weights"])
+    return {**found, "picture": _svg(made.figure(), found["judgement"]) if to_draw else ""}
 
 
 def convention(phase: str, angles: str) -> str:

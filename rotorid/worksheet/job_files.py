@@ -15,7 +15,7 @@ from rotorid.base.text import listing
 from rotorid.tables.job.job_keys import TABLES
 from rotorid.tables.reader.excel_workbook import SUFFIXES, is_workbook
 from rotorid.tables.reader.grid import clean
-from rotorid.tables.reader.input_file import file_content
+from rotorid.tables.reader.input_file import MOST_BYTES, file_content, first_bytes
 from rotorid.tables.reader.problems import InputError
 from rotorid.tables.reader.table_writing import write_files
 from rotorid.worksheet.settings_cells import changed, setting, settings_in
@@ -279,7 +279,7 @@ class JobFiles:
 
     def _read(self, path: Path) -> bytes | None:
         try:
-            return file_content(path)
+            return first_bytes(path, MOST_BYTES + 1)  # as it is now, whatever was read before
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:

@@ -131,7 +131,6 @@ def test_what_a_page_should_not_ask_for_is_one_sentence(tmp_path, serve):
     asked = [
         ("/edit", {"edits": [{"table": "runs", "row": "no such", "column": "run", "old": "", "new": "x"}]}),
         ("/edit", {"edits": [{"table": "nothing", "after": None, "cells": {}}]}),
-        ("/edit", {"edits": [{"key": ["runs"], "old": "runs.csv", "new": "../other.csv"}]}),
         ("/edit", {}),
         ("/import", {"name": "x.csv", "data": "bm90aGluZw==", "run": ""}),
         ("/picture/none", None),
@@ -250,13 +249,13 @@ def test_a_file_of_an_instrument_is_taken_over(tmp_path, serve):
     folder = copy(tmp_path, "bk_two_plane")
     served = serve(folder / "job.toml")
     served.settled()
-    text = "speed_rpm;sensor;amplitude;phase_deg\n3000;1;3,1;80\n3000;2;2,9;75,5\n"
+    text = "speed_rpm;sensor;amplitude;phase_deg\n3000;1;7,1;238,5\n3000;2;13,4;296\n"
     data = base64.b64encode(text.encode()).decode()
     status, answer = served.ask("/import", {"name": "third.csv", "data": data, "run": "once more"})
     assert status == 200, answer
     assert (folder / "runs.csv").read_text().splitlines()[-2:] == [
-        "once more,3000,1,3.1,80",
-        "once more,3000,2,2.9,75.5",
+        "once more,3000,1,7.1,238.5",
+        "once more,3000,2,13.4,296",
     ]
     assert served.settled()["results"]["answer"] is not None
 

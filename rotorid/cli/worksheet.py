@@ -21,7 +21,7 @@ def worksheet(
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
     to: Destination,
 ) -> None:
-    """A page on this computer to type, balance, check and print a job; nothing leaves the machine.
+    """A local page to type, balance, check and print a job; nothing leaves the machine.
 
     Example: rotorid worksheet sample_data/turbo_job/job.toml
 
