@@ -19,10 +19,9 @@ from rotorid.tables.reader.input_file import MOST_BYTES, file_content, first_byt
 from rotorid.tables.reader.problems import InputError
 from rotorid.tables.reader.table_writing import write_files
 from rotorid.worksheet.settings_cells import changed, setting, settings_in
-from rotorid.worksheet.text_cells import Cells, TextCells, kept_ids
+from rotorid.worksheet.text_cells import KEYS, Cells, TextCells, kept_ids
+from rotorid.worksheet.workbook_cells import WorkbookVersion
 
-KEYS = ("runs", "weights", "check", "check_weights")
-"""Tables that are shown."""
 MOST_STEPS = 200
 MOST_TRIES = 5
 FRESH = 2.0
@@ -129,6 +128,9 @@ class FilesVersion:
         return {} if list(changed_files) == [self.job] and self._text == b"" else changed_files
 
 
+Version = FilesVersion | WorkbookVersion
+
+
 class JobFiles:
     """The job that a worksheet shows: its files are read and edited in place.
 
@@ -188,7 +190,8 @@ class JobFiles:
     def place(self, file: str, row: int) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
-            if file in (str(self._now.paths.get(key)), table.name) or file.endswith(f"/{table.name}"):
+            folder = self._now.paths.get(key, self.job).resolve().parent
+            if Path(file).name == table.name and Path(file).resolve().parent == folder:
                 for index, (number, _) in table.rows.items():
                     if number == row:
                         return key, table.ids[index]
@@ -285,10 +288,8 @@ class JobFiles:
         except OSError as error:
             raise ValueError(f"{path.name} cannot be read ({error.strerror or error})") from error
 
-    def _version(
-        self, read: Callable[[Path], bytes | None], ids: Mapping[str, Sequence[str]]
-    ) -> FilesVersion:
-        version = FilesVersion(self.job, read)
+    def _version(self, read: Callable[[Path], bytes | None], ids: Mapping[str, Sequence[str]]) -> Version:
+        version = (WorkbookVersion if is_workbook(self.job) else FilesVersion)(self.job, read)
         for key, table in version.tables.items():
             given = ids.get(key, ())
             fits = len(given) == len(table.lines) and all(given)
@@ -298,7 +299,7 @@ class JobFiles:
     def _new_id(self) -> str:
         return str(next(self._ids))
 
-    def _take(self, version: FilesVersion) -> None:
+    def _take(self, version: Version) -> None:
         self._now = version
         self._known |= version.tables
 
@@ -330,7 +331,7 @@ class JobFiles:
             for path in files:
                 self._stamps.pop(path, None)
 
-    def _edit(self, version: FilesVersion, edit: Mapping[str, Any]) -> str | None:
+    def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:
             raise ValueError(version.read_only)
         if "key" in edit:
@@ -363,7 +364,7 @@ class JobFiles:
             return row_id
         return None
 
-    def _set(self, version: FilesVersion, key: Sequence[str], edit: Mapping[str, Any]) -> None:
+    def _set(self, version: Version, key: Sequence[str], edit: Mapping[str, Any]) -> None:
         now, new = setting(version.settings, key), edit["new"]
         if now == new:
             return

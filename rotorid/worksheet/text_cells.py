@@ -23,6 +23,8 @@ from rotorid.tables.runs.column_headings import looks_like_header
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
 _MARKS = {"utf-16-le": codecs.BOM_UTF16_LE, "utf-16-be": codecs.BOM_UTF16_BE}
+KEYS = ("runs", "weights", "check", "check_weights")
+"""Tables that are shown."""
 IS_HEADER = partial(looks_like_header, named={})
 
 

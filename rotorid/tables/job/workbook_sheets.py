@@ -89,14 +89,15 @@ def table_lines(grid: Grid) -> list[Line]:
     for _, cells in grid.rows:
         lines.append(
             tuple(
-                show(cell) if text else _number(cell, grid.separator, comma=comma)
+                show(cell) if text else number_cell(cell, grid.separator, comma=comma)
                 for cell, text in zip(cells, texts, strict=True)
             )
         )
     return lines
 
 
-def _number(cell: Cell, separator: str, *, comma: bool) -> Cell:
+def number_cell(cell: Cell, separator: str, *, comma: bool) -> Cell:
+    """A number with the digits in which it is written; NotANumber for a text that is none."""
     if not isinstance(cell, str) or not cell:
         return cell
     value = parse_number(cell, comma=comma, separator=separator)
@@ -132,7 +133,7 @@ def _named(job: JobTables, table: str, key: str, names: Sequence[str]) -> list[L
     lines: list[Line] = [(*first, key, *columns, *remarks)]
     for item, note in zip(items, notes, strict=True):
         section = said.get(item, {})
-        cells = [_plane_setting(column, section[column]) if column in section else "" for column in columns]
+        cells = [setting_cell(column, section[column]) if column in section else "" for column in columns]
         lines.append((*("" for _ in first), item, *cells, *(note.get(column, "") for column in remarks)))
     return lines
 
@@ -144,7 +145,7 @@ def _settings(job: JobTables, settings: Mapping[str, Any]) -> list[Line]:
     remarks = list(dict.fromkeys(column for note in notes for column in note))
     lines: list[Line] = [("key", "value", *remarks)]
     for (parts, value), note in zip(rows, notes, strict=True):
-        lines.append((_key(parts), _setting(value), *(note.get(column, "") for column in remarks)))
+        lines.append((dotted_key(parts), _setting(value), *(note.get(column, "") for column in remarks)))
     return lines
 
 
@@ -164,14 +165,14 @@ def _flat(settings: Mapping[str, Any], above: tuple[str, ...]) -> Iterable[tuple
             yield (*above, key), value
 
 
-def _key(parts: Sequence[str]) -> str:
+def dotted_key(parts: Sequence[str]) -> str:
     """A dotted key; where a part could be misread, parts stand in quotes, as in a job file."""
     if all(part and part == part.strip() and not re.search(r"[.\"'\\#]", part) for part in parts):
         return ".".join(parts)
     return ".".join(part if _BARE.fullmatch(part) else json.dumps(part, ensure_ascii=False) for part in parts)
 
 
-def _plane_setting(column: str, value: Any) -> Cell:  # noqa: ANN401
+def setting_cell(column: str, value: Any) -> Cell:  # noqa: ANN401
     """A value about a plane or sensor; one pair of angles may stand without a list around it."""
     alone = FORBIDDEN.accepts(column) and isinstance(value, list) and not isinstance(value[0], list)
     return _setting([value] if alone else value)

@@ -360,6 +360,7 @@ def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
 
 
 def column_of(name: str, columns: Sequence[Column]) -> Column | None:
+    """The column that a heading names."""
     fitting = [
         column
         for column in columns

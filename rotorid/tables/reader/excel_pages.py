@@ -105,7 +105,7 @@ def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no typ
         for place, value in enumerate(cells, start=1):
             if value is not None and value != "":
                 cell = sheet.cell(number, place)
-                _put(cell, value, page.title)
+                put(cell, value, page.title)
                 if isinstance(value, str):
                     cell.number_format = "@"
     for place in range(1, max((len(line) for line in page.lines), default=0) + 1):
@@ -129,7 +129,8 @@ def _width(lines: Sequence[Line], place: int) -> float:
     return min(max(_NARROWEST, *map(len, texts), 0) + 2, _WIDEST)
 
 
-def _put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
+def put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
+    """Give a cell a value: numbers with all digits, text never as a formula."""
     if isinstance(value, BadCell):
         value = value.value
     if isinstance(value, float):
@@ -161,8 +162,12 @@ def _number_format(text: str) -> str:
 def _comment(text: str) -> Any:  # noqa: ANN401
     from openpyxl.comments import Comment
 
-    comment = Comment(text, "rotorid")
-    comment.width, comment.height = 320, 24 + 20 * (1 + len(text) // 45)
+    return sized(Comment(text, "rotorid"))
+
+
+def sized(comment: Any) -> Any:  # noqa: ANN401
+    """A comment as large as its text."""
+    comment.width, comment.height = 320, 24 + 20 * (1 + len(comment.text) // 45)
     return comment
 
 

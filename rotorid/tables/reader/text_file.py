@@ -65,7 +65,7 @@ def decode(source: str, data: bytes, problems: Problems) -> str | None:
 
 
 def decode_as(source: str, data: bytes, problems: Problems) -> tuple[str, str] | None:
-    """Text of a file and the encoding that it has; of UTF-16 and utf-8-sig it begins with a byte-order mark."""
+    """Text of a file and the encoding; a file in UTF-16 or utf-8-sig begins with a byte-order mark."""
     if not data.strip():
         problems.add(source, None, None, None, "a table with a header row; the file is empty")
         return None
