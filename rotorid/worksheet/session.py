@@ -41,7 +41,7 @@ class Session:
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.aside = Worker(), Worker()
+        self.front, self.aside = (Worker(files.job.absolute().parent) for _ in range(2))
         self._of_files = 1
         self._notice = ""
         self._results = dict(_NOTHING)
@@ -94,7 +94,7 @@ class Session:
 
     def about(self) -> dict[str, Any]:
         """What a request to a worker says of the job."""
-        return {"job": str(self.files.job), "version": self._of_files}
+        return {"job": self.files.job.name, "version": self._of_files}
 
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""

@@ -39,7 +39,8 @@ def copy(tmp_path, sample="turbo_job"):
 def command(job, *options):
     """The document of `rotorid balance --json`, without what each run has of its own."""
     done = subprocess.run(
-        [sys.executable, "-m", "rotorid", "balance", str(job), "--json", *options],
+        [sys.executable, "-m", "rotorid", "balance", job.name, "--json", *options],
+        cwd=job.parent,
         capture_output=True,
         text=True,
         check=True,
