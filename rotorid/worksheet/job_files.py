@@ -85,7 +85,7 @@ class FilesVersion:
                 raise ValueError(
                     f"{path.name} is no text table: it is read as it is, edit it where it comes from"
                 )
-            if key in KEYS and (data := self.data[path]) is not None:
+            if key in KEYS and (data := self.data[path]):
                 self.tables[key] = TextCells(path, data, key)
         except ValueError as error:
             if key in KEYS:
@@ -109,7 +109,8 @@ class FilesVersion:
         # with a mark, because Excel takes a file without it for its own 8-bit encoding
         line = (separators or [","])[0].join(header)
         self.tables[key] = TextCells(path, f"{line}\n".encode("utf-8-sig"), key)
-        self.paths[key], self.data[path] = path, None
+        self.paths[key] = path
+        self.data.setdefault(path, None)
         if self.tables[key].read_only:
             raise ValueError(self.tables[key].read_only)
 
@@ -201,7 +202,7 @@ class JobFiles:
             )
             try:
                 made = [self._edit(version, edit) for edit in edits]
-            except (KeyError, TypeError, AttributeError) as error:
+            except (LookupError, TypeError, AttributeError) as error:
                 raise ValueError(f"an edit of an unknown form: {error}") from error
             after = _Step(version.written(), {key: table.ids for key, table in version.tables.items()})
             try:

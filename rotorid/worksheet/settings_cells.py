@@ -50,7 +50,7 @@ def changed(data: bytes, key: Sequence[str], new: Any) -> bytes:  # noqa: ANN401
         try:
             found = way(plain, key, new)
             good = _loads(found) == with_setting(_loads(text), key, new)
-        except (ValueError, TypeError, AttributeError, KeyError):  # tomlkit stumbles over unusual files
+        except (ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over unusual files
             continue
         if good:
             found = found.replace("\n", "\r\n") if returns else found
