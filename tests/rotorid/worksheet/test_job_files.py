@@ -433,3 +433,64 @@ def test_edits_of_unknown_forms_are_refused(turbo, edit):
     with pytest.raises(ValueError, match=r"edit|table"):
         job.apply([edit])
     assert contents(turbo) == before
+
+
+@pytest.mark.parametrize("last", ["", "\r\n"])
+def test_rows_come_and_go_at_the_end_of_a_file_as_it_ends(tmp_path, last):
+    text = "run;speed_rpm;sensor;amplitude;phase_deg;;\r\na;1200;s;1,5 ;3\r\n# end"
+    job = plain_job(tmp_path, text.removesuffix("\r\n# end") + last)
+    (made,) = job.apply([{"table": "runs", "after": None, "cells": {"run": "b", "amplitude": "2.25"}}])
+    start = text.removesuffix("# end")
+    assert (tmp_path / "runs.csv").read_bytes().decode() == f"{start}b;;;2,25;;;{last}"
+    job.apply([cell(job, 0, "amplitude", "2.5")])
+    assert (tmp_path / "runs.csv").read_bytes().decode() == f"{start}b;;;2,25;;;{last}".replace(
+        "1,5 ", "2,5 "
+    )
+    job.apply([{"table": "runs", "delete": made}])
+    assert (tmp_path / "runs.csv").read_bytes().decode() == start.rstrip().replace("1,5 ", "2,5 ") + last
+
+
+def test_a_step_that_made_a_file_is_not_undone_over_a_change_in_it(tmp_path):
+    job = JobFiles(tmp_path)
+    job.apply([{"create": "runs", "header": HEADER}])
+    (tmp_path / "runs.csv").write_text(",".join(HEADER) + "\na,1,b,2,3\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"runs\.csv was changed by another program"):
+        job.undo()
+    assert sorted(contents(tmp_path)) == ["job.toml", "runs.csv"]
+    assert JobFiles(tmp_path).state()["tables"]["runs"]["rows"][0]["cells"][0] == "a"
+
+
+def test_a_change_that_leaves_time_and_size_is_seen(turbo):
+    job, path = JobFiles(turbo), turbo / "runs.csv"
+    assert job.look() == []
+    found = path.stat()
+    path.write_bytes(path.read_bytes().replace(b"3.36", b"3.37"))
+    os.utime(path, ns=(found.st_atime_ns, found.st_mtime_ns))
+    assert job.look() == ["runs.csv"]
+    assert rows(job)[0]["cells"][3] == "3.37"
+
+
+def test_no_file_is_changed_where_one_cannot_be(turbo, monkeypatch):
+    job, before, real, seen = JobFiles(turbo), contents(turbo), Path.replace, []
+
+    def replace(self, target):
+        seen.append(target)
+        if len(seen) == 2:
+            raise PermissionError(13, "in use")
+        return real(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(ValueError, match="is open in Excel"):
+        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}, cell(job)])
+    assert len(seen) == 3
+    assert contents(turbo) == before
+    assert job.look() == []
+
+
+def test_an_empty_table_is_begun_in_place(tmp_path):
+    job = plain_job(tmp_path, "")
+    assert job.state()["tables"] == {}
+    job.apply([{"create": "runs", "header": HEADER}])
+    assert job.state()["tables"]["runs"]["file"] == "runs.csv"
+    job.undo()
+    assert contents(tmp_path)["runs.csv"] == b""

@@ -84,6 +84,9 @@ def test_a_template_is_filled_in_and_read(tmp_path):
     book = opened(path.read_bytes())
     assert [book["runs"].cell(2, k).value for k in range(1, 6)] == ["first", 3000, "1", 4.5, 12]
     assert book["planes"]["A2"].value == "1"
+    drawings = {name: part for name, part in sheet_parts(before).items() if "omments" in name}
+    assert len(drawings) > 5
+    assert drawings.items() <= sheet_parts(path.read_bytes()).items()
     for sheet in opened(before):
         if sheet.title == "planes":  # it got a column
             continue
