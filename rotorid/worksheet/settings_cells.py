@@ -7,6 +7,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 _MARK = "\ue000"
@@ -46,15 +47,12 @@ def changed(data: bytes, key: Sequence[str], new: Any) -> bytes:  # noqa: ANN401
     text = data.decode("utf-8-sig")
     returns = "\r\n" in text and text.count("\n") == text.count("\r\n")
     plain = text.replace("\r\n", "\n") if returns else text
-    for way in (_removed,) if new is None else (_added, _replaced):
-        try:
+    for way in (_removed,) if new is None else (_put, _append):
+        with suppress(ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over odd files
             found = way(plain, key, new)
-            good = _loads(found) == with_setting(_loads(text), key, new)
-        except (ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over unusual files
-            continue
-        if good:
-            found = found.replace("\n", "\r\n") if returns else found
-            return found.encode("utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else "utf-8")
+            if _loads(found) == with_setting(_loads(text), key, new):
+                found = found.replace("\n", "\r\n") if returns else found
+                return found.encode("utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else "utf-8")
     raise ValueError(f"{'.'.join(key)} cannot be changed here: change it in the job file itself")
 
 
@@ -72,42 +70,26 @@ def _item(value: Any) -> Any:  # noqa: ANN401
     return table
 
 
-def _replaced(text: str, key: Sequence[str], new: Any) -> str:  # noqa: ANN401
+def _put(text: str, key: Sequence[str], new: Any) -> str:  # noqa: ANN401
+    """With a value; comments above what follows a new line or table stay there."""
     import tomlkit
 
-    return tomlkit.dumps(with_setting(tomlkit.parse(text), key, _item(new)))
+    found = tomlkit.dumps(with_setting(tomlkit.parse(text), key, _item(new)))
+    old, lines = text.split("\n"), found.split("\n")
+    at = next((i for i, pair in enumerate(zip(old, lines, strict=False)) if pair[0] != pair[1]), len(old))
+    end = at + len(lines) - len(old)
+    block = [line for line in lines[at:end] if line]
+    if not block or lines[end:] != old[at:]:
+        return found
+    while at and re.match(r"\s*(#|$)", old[at - 1]):
+        at -= 1
+    return "\n".join([*old[:at], *([""] if at and block[0][0] == "[" else []), *block, *old[at:]])
 
 
-def _added(text: str, key: Sequence[str], new: Any) -> str:  # noqa: ANN401
-    """A line for a new key below the others of its table, or a new table below those beside it."""
+def _append(text: str, key: Sequence[str], new: Any) -> str:  # noqa: ANN401
     import tomlkit
-    from tomlkit.items import InlineTable, SingleKey, Table
 
-    document: Any = tomlkit.parse(text)
-    inner, last, depth = document, None, 0
-    while depth < len(key) - 1 and key[depth] in inner:
-        inner, depth = inner[key[depth]], depth + 1
-    if key[-1] in inner or isinstance(inner, InlineTable):
-        raise ValueError("there is a place for it")
-    names = [SingleKey(part).as_string() for part in key]
-    line = f"{names[-1]} = {_item(new).as_string()}"
-    there = depth == len(key) - 1 and not (depth and inner.is_super_table())
-    if there and depth:
-        last = inner
-    elif not there:
-        line = f"\n[{'.'.join(names[:-1])}]\n{line}"
-    while inner is document or isinstance(inner, Table):  # else one that is written in several places
-        items = [(k, v) for k, v in (inner if inner is document else inner.value).body if k is not None]
-        if there:
-            items = [(k, v) for k, v in items if not isinstance(v, Table) or k.is_dotted()]
-        if not items or (inner is document and not there):
-            break
-        inner = last = items[-1][1]
-    if last is None:
-        return f"{line}\n{text}" if there else f"{text.rstrip()}\n{line}\n".lstrip("\n")
-    last.trivia.trail = _MARK + last.trivia.trail
-    head, tail = tomlkit.dumps(document).split(_MARK)
-    return f"{head}\n{line}{tail}"
+    return f"{text.rstrip()}\n\n{tomlkit.dumps(with_setting({}, key, _item(new)))}"
 
 
 def _removed(text: str, key: Sequence[str], _: object = None) -> str:
