@@ -290,8 +290,6 @@ class JobFiles:
             if isinstance(error.__cause__ or error, PermissionError):
                 raise ValueError(_is_open(next(iter(files)), "Excel", " or protected")) from error
             raise
-        finally:
-            self._stamps.clear()
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:

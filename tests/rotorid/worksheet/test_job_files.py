@@ -151,6 +151,7 @@ def test_comments_and_order_of_settings_stay(turbo):
     assert [line for line in old if line not in new] == ['phase = "lead"']
     expected = ['phase = "lag"', 'view = "driven end"', "floor = 0.5", "[planes.left]", "taken = {3 = 10}"]
     assert [line for line in new if line and line not in old] == expected
+    assert new[new.index('view = "driven end"') - 1] == 'angles = "with rotation"'
     assert [line for line in new if line in old and line] == [line for line in old if line in new and line]
     job.apply([{"key": ["planes", "left", "taken"], "old": {"3": 10}, "new": None}])
     assert "planes" not in job.state()["settings"]
@@ -450,6 +451,13 @@ def test_rows_come_and_go_at_the_end_of_a_file_as_it_ends(tmp_path, last):
     assert (tmp_path / "runs.csv").read_bytes().decode() == start.rstrip().replace("1,5 ", "2,5 ") + last
 
 
+def test_a_new_row_ends_as_the_one_above(tmp_path):
+    job = plain_job(tmp_path, b"run,speed_rpm,sensor,amplitude,phase_deg\na,1,s,1,3\r\nb,1,s,1,3\n")
+    job.apply([{"table": "runs", "after": rows(job)[0]["id"], "cells": {"run": "c"}}])
+    assert (tmp_path / "runs.csv").read_bytes().splitlines(keepends=True)[2] == b"c,,,,\r\n"
+    assert (tmp_path / "runs.csv").read_bytes().splitlines(keepends=True)[1] == b"a,1,s,1,3\r\n"
+
+
 def test_a_step_that_made_a_file_is_not_undone_over_a_change_in_it(tmp_path):
     job = JobFiles(tmp_path)
     job.apply([{"create": "runs", "header": HEADER}])
@@ -468,6 +476,15 @@ def test_a_change_that_leaves_time_and_size_is_seen(turbo):
     os.utime(path, ns=(found.st_atime_ns, found.st_mtime_ns))
     assert job.look() == ["runs.csv"]
     assert rows(job)[0]["cells"][3] == "3.37"
+    for k in range(40):  # faster than the clock of a file system
+        path.write_bytes(
+            path.read_bytes().replace(b"baseline,1220,probe 1,3.37", b"baseline,1220,probe 1,3.38")
+        )
+        assert job.look() == ["runs.csv"], k
+        path.write_bytes(
+            path.read_bytes().replace(b"baseline,1220,probe 1,3.38", b"baseline,1220,probe 1,3.37")
+        )
+        assert job.look() == ["runs.csv"], k
 
 
 def test_no_file_is_changed_where_one_cannot_be(turbo, monkeypatch):
