@@ -78,7 +78,8 @@ class FilesVersion:
                 raise ValueError(
                     f"{path.name} is not in the folder of the job: copy it there to edit it here"
                 )
-            self.data[path], self.paths[key] = self._read(path), path
+            self.data[path], self.paths[key] = None, path  # while it cannot be read
+            self.data[path] = self._read(path)
             if others:
                 raise ValueError(f"{path.name} is the table of {others[0]}, too: edit it there")
             if path.suffix.lower() in (".toml", *SUFFIXES):
@@ -143,7 +144,7 @@ class JobFiles:
         self._done: list[tuple[_Step, _Step]] = []
         self._undone: list[tuple[_Step, _Step]] = []
         self._now = self._version()
-        self._known |= self._now.tables
+        self._known = dict(self._now.tables)
 
     def files(self) -> list[Path]:
         """The job and its tables that exist."""
@@ -258,7 +259,7 @@ class JobFiles:
         """Take what is on disk, where `files` replaced `known`; notice what another program has changed."""
         was = self._now.data
         self._now = self._version(files, ids)
-        self._known |= self._now.tables
+        self._known |= {key: table for key, table in self._now.tables.items() if table.lines}
         expected = {**self._now.data, **was, **known, **files}
         outside = [path for path, data in known.items() if data != was.get(path, data)]
         outside += [path for path, data in self._now.data.items() if data != expected[path]]

@@ -93,7 +93,11 @@ class Cells:
 def kept_ids(old: Cells | None, lines: Sequence[str], new_ids: Iterable[int]) -> list[str]:
     """Ids of lines that another program may have changed: those of equal and of replaced ones stay."""
     ids, before = [""] * len(lines), Cells("") if old is None else old
-    for kind, a, b, c, d in SequenceMatcher(None, before.lines, lines, autojunk=False).get_opcodes():
+    if before.lines == lines:
+        return list(before.ids)
+    # thousands of equal blank rows, as Excel leaves them, would take the square of their number
+    found = SequenceMatcher(lambda line: not line.strip("[]'\" ,;\t"), before.lines, lines, autojunk=False)
+    for kind, a, b, c, d in found.get_opcodes():
         if kind == "equal" or b - a == d - c:
             ids[c:d] = before.ids[a:b]
     return [one or str(next(iter(new_ids))) for one in ids]

@@ -4,6 +4,7 @@ import codecs
 import itertools
 import os
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from rotorid.tables import read_job
 from rotorid.tables.reader import table_writing
 from rotorid.tables.reader.columns import read_grid
 from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.worksheet import job_files
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
 TURBO = Path(__file__).resolve().parents[3] / "sample_data" / "turbo_job"
@@ -449,6 +451,38 @@ def test_rows_come_and_go_at_the_end_of_a_file_as_it_ends(tmp_path, last):
     )
     job.apply([{"table": "runs", "delete": made}])
     assert (tmp_path / "runs.csv").read_bytes().decode() == start.rstrip().replace("1,5 ", "2,5 ") + last
+
+
+def test_blank_rows_of_a_spreadsheet_take_no_time_and_keep_ids(tmp_path):
+    rest = "".join(f"r{k};{k};s;1;3\n" for k in range(1, 500)) + ";;;;\n" * 20000
+    job = plain_job(tmp_path, "run;speed_rpm;sensor;amplitude;phase_deg\n" + rest)
+    ids = [row["id"] for row in rows(job)]
+    (tmp_path / "runs.csv").write_text(
+        "run;speed_rpm;sensor;amplitude;phase_deg\nnew;1;s;2;3\n" + rest, "utf-8"
+    )
+    start = time.monotonic()
+    assert job.look() == ["runs.csv"]
+    assert time.monotonic() - start < 10
+    assert [row["id"] for row in rows(job)][1:] == ids
+
+
+def test_a_table_that_cannot_be_read_for_a_while_comes_back(turbo, monkeypatch):
+    job, ids = JobFiles(turbo), [row["id"] for row in rows(JobFiles(turbo))]
+    real = job_files.file_content
+
+    def refuse(path):
+        if path.name == "runs.csv":
+            raise PermissionError(13, "in use")
+        return real(path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(job_files, "file_content", refuse)
+        with pytest.raises(ValueError, match=r"runs\.csv cannot be read \(in use\)"):
+            job.apply([cell(job)])
+        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}])
+        assert "cannot be read" in job.state()["tables"]["runs"]["read_only"]
+    assert "runs.csv" in job.look()
+    assert [row["id"] for row in rows(job)] == ids
 
 
 def test_a_new_row_ends_as_the_one_above(tmp_path):
