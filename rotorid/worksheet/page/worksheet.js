@@ -1,11 +1,11 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
 
-For tests: data-cell="runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; "|2" behind it: its second repeat),
+For tests: data-cell="runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": its second repeat),
 "weights|ROWID|COLUMN" of a weight ("check_weights|…"); data-key of an input: key of the job file,
 "planes.left.radius_mm"; data-key of a .value: path in the document, "corrections.0.mass", its number in
-data-value, the document in data-doc around it (answer, pieces, trim). data-run: card of a run, .gauge[data-run] its
-effect; data-type, data-remove, data-add, data-import: its buttons; data-keep, data-write: buttons at a refused
-cell. Ids: those of index.html, and convention-lead-with (…), add-check, check-others, missing, drop-empty. */
+data-value, the document in data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge;
+data-type, data-remove, data-add, data-import: its buttons; data-keep, data-write: buttons at a refused cell.
+Ids: those of index.html, and convention-lead-with (…), add-check, check-others, missing, drop-empty. */
 
 const $ = (id) => document.getElementById(id);
 const token = location.hash.slice(1);
@@ -17,7 +17,6 @@ let online = true;
 let said = "all is saved";
 
 /* Elements: `h` describes one, `patch` makes children so; focus and what is being typed stay. */
-
 const h = (tag, props, ...children) => ({ tag, props, children: children.flat(4).filter((one) => one) });
 
 function patch(parent, nodes) {
@@ -28,35 +27,28 @@ function patch(parent, nodes) {
     const child = kept.get(keys[i]) || (node.tag ? document.createElement(node.tag) : new Text());
     child.vKey = keys[i];
     if (parent.childNodes[i] !== child) parent.insertBefore(child, parent.childNodes[i] || null);
-    if (node.tag) update(child, node);
-    else if (child.data !== node) child.data = node;
+    if (!node.tag && child.data !== node) child.data = node;
+    if (node.tag && !node.props.own) patch(child, node.children); // others fill an `own` one
+    for (const [name, value] of Object.entries(node.props || {})) put(child, name, value);
   });
 }
 
-function update(element, { props, children }) {
-  if (!props?.own) patch(element, children); // others fill an `own` one
-  for (const [name, value] of Object.entries(props || {})) {
-    if (name === "cell" || name === "onclick") element[name] = value;
-    else if (name === "value") setValue(element, value);
-    else if (value === null || value === undefined) element.removeAttribute(name);
-    else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
-  }
-}
-
-function setValue(element, value) {
-  if (element.saved !== undefined && element.value !== element.saved) return; // somebody is typing here
-  if (element.value !== value) element.value = value;
-  element.saved = value;
+function put(element, name, value) {
+  const busy = element.saved !== undefined && element.value !== element.saved; // somebody is typing here
+  if (name === "value" && !busy) element.value = element.saved = value;
+  else if (name === "cell" || name === "onclick") element[name] = value;
+  else if (value === null || value === undefined) element.removeAttribute(name);
+  else if (name !== "value" && element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
 }
 
 const show = (id, ...nodes) => patch($(id), h("", {}, nodes).children);
 const tell = (text) => show("message", text && h("p", {}, text.message || text));
 const button = (text, onclick, props) => h("button", { type: "button", onclick, ...props }, text);
-const table = (heads, rows) => h("div", { class: "scroll" }, h("table", {}, h("thead", {}, heads.map((line) =>
-  h("tr", {}, line.map(([text, colspan]) => h("th", { colspan }, text || "\u00a0"))))), h("tbody", {}, rows)));
+const heading = (line) => h("tr", {}, line.map(([text, colspan]) => h("th", { colspan }, text || "\u00a0")));
+const table = (heads, rows) => h("div", { class: "scroll" },
+  h("table", {}, h("thead", {}, heads.map(heading)), h("tbody", {}, rows)));
 
 /* The server. What changes the job is sent one after the other, and again when the program was away. */
-
 async function ask(path, body) {
   const headers = { "X-Rotorid-Token": token, "Content-Type": "application/json" };
   const answer = await fetch(path, { headers, ...(body && { method: "POST", body: JSON.stringify(body) }) });
@@ -74,11 +66,10 @@ async function refresh(after) {
   render();
 }
 
-async function away(problem) {
+async function away({ status }) {
   online = false;
   renderHeader();
-  const why = token ? "This page belongs to a program that has ended." : "This address lacks its token.";
-  if (problem.status === 403) tell(`${why} Open the address that “rotorid worksheet” shows now.`);
+  if (status === 403) tell("This address is of no running worksheet: open the one that the program shows now.");
   await new Promise((resolve) => setTimeout(resolve, 1000));
 }
 
@@ -112,15 +103,13 @@ function save(changes) {
   const edits = changes.map(({ cell: { path, table: name, row, column }, old, text }) => path
     ? { key: path, old: jsonOf(path, old), new: jsonOf(path, text) }
     : { table: name, row, column, old, new: text });
-  for (const change of changes) typed.set(change.cell.key, change);
-  const forget = () => changes.filter(({ cell }) => changes.includes(typed.get(cell.key)))
-    .forEach(({ cell }) => typed.delete(cell.key));
-  const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes });
+  const forget = () => changes.forEach((one) => typed.get(one.cell.key) === one && typed.delete(one.cell.key));
+  const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes, forget });
+  changes.forEach((one) => typed.set(one.cell.key, one));
   send("/edit", { edits }).then(forget, refuse).then(render);
 }
 
 /* The tables of the job. */
-
 const number = (text) => Number(String(text).trim().replace(",", "."));
 const each = (values) => [...new Set(values)].filter((value) => value);
 const listOf = (text, by = /[,;]/) => each(text.split(by).map((one) => one.trim()));
@@ -133,9 +122,8 @@ function read({ header, rows, read_only: closed }) {
   const named = (cells) => Object.fromEntries(header.map((name, i) => [whatOf(name), cells[i] || ""]));
   const found = rows.map(({ id, cells }) => {
     const row = { ...named(cells), id, cells };
-    const place = `${row.run}|${row.speed}|${row.sensor}`;
-    times[place] = (times[place] || 0) + 1;
-    return { ...row, time: times[place] };
+    const time = (times[`${row.run}|${row.speed}|${row.sensor}`] ||= []).push(id);
+    return { ...row, place: time > 1 ? `${row.speed} (${time})` : row.speed };
   });
   return { header, rows: found, closed, names: named(header) };
 }
@@ -148,22 +136,20 @@ const runs = () => valuesOf("run", "runs", "weights");
 const planes = () => each([...Object.keys(state.settings.planes || {}), ...valuesOf("plane", "weights")]);
 const baseline = () =>
   state.results.runs?.baseline || runs().find((run) => !rowsOf("weights", run).length) || "baseline";
-const usual = () => rowsOf("runs", baseline()).filter((row) => row.time === 1);
+const usual = () => rowsOf("runs", baseline()).filter((row) => row.place === row.speed);
 const remove = (name, rows) => rows.map((row) => ({ table: name, delete: row.id, old: row.cells }));
 const add = (name, cells, after = null) => ({ table: name, after, cells });
-const addRows = (name, run, places, speedName = data.runs?.names.speed) =>
+const addRows = (name, run, places, speedName = data.runs.names.speed) =>
   places.map(({ speed, sensor }) => add(name, { run, [speedName]: speed, sensor }));
 
 function cellOf(name, row, what, more) {
   const column = data[name].names[what];
-  const place = row.sensor ? [row.run, row.speed, row.sensor, column] : [row.id, column];
-  const key = [name, ...place, ...(row.sensor && row.time > 1 ? [row.time] : [])].join("|");
+  const key = [name, ...(row.sensor ? [row.run, row.place, row.sensor] : [row.id]), column].join("|");
   return { key, table: name, row: row.id, what, column, text: row[what], label: `${what}, ${row.run}, ${more}` };
 }
 
 /* Values of the job file: numbers, words, lists "5; 10", values by speed "3000: 20; 4500: 30". */
-
-const settingOf = (path) => path.reduce((one, key) => one?.[key], state.settings);
+const at = (doc, path) => path.reduce((one, key) => one?.[key], doc);
 
 function textOf(value) {
   if (value === null || typeof value !== "object") return String(value ?? "");
@@ -171,25 +157,25 @@ function textOf(value) {
 }
 
 function jsonOf(path, text) {
+  const now = at(state.settings, path);
   const one = (word) => (Number.isNaN(number(word)) ? word.trim() : number(word));
   const parts = listOf(text, /;/);
-  if (text === textOf(settingOf(path))) return settingOf(path) ?? null;
+  if (text === textOf(now)) return now ?? null;
   if (text.includes(":")) return Object.fromEntries(parts.map((part) => part.split(":").map(one)));
   if (parts.length > 1 || (text && /^(available|stock|holes_)/.test(path.at(-1)))) return parts.map(one);
   return text ? one(text) : null;
 }
 
 function setting(above, begin, usualName, label) {
-  const name = Object.keys(settingOf(above) || {}).find((key) => key.startsWith(begin)) || usualName;
-  const path = [...above, name];
-  return { key: path.join("."), path, text: textOf(settingOf(path)), label: `${label}, ${above[1]}` };
+  const known = Object.keys(at(state.settings, above) || {}).find((key) => key.startsWith(begin));
+  const path = [...above, known || usualName];
+  return { key: path.join("."), path, text: textOf(at(state.settings, path)), label: `${label}, ${above[1]}` };
 }
 
 /* Cells to type in. */
-
 const problems = (missing) => state.results.problems.filter((one) => one.missing === missing);
 const idOf = (cell) => encodeURIComponent(cell.key);
-const textNow = (cell) => cell.path ? textOf(settingOf(cell.path))
+const textNow = (cell) => cell.path ? textOf(at(state.settings, cell.path))
   : allRows(cell.table).find((row) => row.id === cell.row)?.[cell.what] ?? "";
 const whyOf = ({ key, table: name, row, column }) => typed.get(key)?.why || (row && problems(false).find((one) =>
   one.table === name && one.row === row && (one.column || column) === column)?.text);
@@ -206,17 +192,12 @@ function field(cell) {
 }
 
 function whyLine(cell) {
-  const { changes, now, text = "" } = typed.get(cell.key) || {};
-  const quoted = (word) => word || "nothing";
-  const keep = () => {
-    changes.forEach((change) => typed.delete(change.cell.key));
-    render();
-  };
+  const { changes, now, forget, text } = typed.get(cell.key) || {};
   const write = () => save(changes.map((one) => ({ cell: one.cell, text: one.text, old: textNow(one.cell) })));
   return h("p", { key: cell.key, class: "why", id: `why-${idOf(cell)}` }, `${cell.label}: `, now === undefined
-    ? whyOf(cell) : `another window (or program) wrote ${quoted(now)} here; you typed ${quoted(text)}. `,
-  changes && [button(`Keep ${quoted(textNow(cell))}`, keep, { "data-keep": cell.key }),
-    button(`Write ${quoted(text)}`, write, { "data-write": cell.key })]);
+    ? whyOf(cell) : `another window (or program) wrote ${now || "nothing"} here; you typed ${text || "nothing"}. `,
+  changes && button(`Keep ${textNow(cell) || "nothing"}`, () => render(forget()), { "data-keep": cell.key }),
+  changes && button(`Write ${text || "nothing"}`, write, { "data-write": cell.key }));
 }
 
 /* A table of cells; each line is [heading, cells, what stands behind them]. */
@@ -225,35 +206,32 @@ function cellTable(heads, lines) {
     h("th", { scope: "row" }, head), cells.map((cell) => h("td", {}, cell ? field(cell) : "–")),
     behind && h("td", {}, behind)));
   const wrong = lines.flatMap((line) => line[1]).filter((cell) => cell && whyOf(cell));
-  return h("div", { key: lines[0]?.[1][0]?.key }, table(heads, rows), wrong.map(whyLine));
+  return lines.length > 0 && h("div", {}, table(heads, rows), wrong.map(whyLine));
 }
 
 function grid(name, run) {
-  const { amplitude, speed: speedName } = data[name].names;
-  const own = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed) || a.time - b.time);
-  const lines = each(own.map(({ speed, time }) => `${speed}|${time}`)).map((place) => {
-    const [speed, time] = place.split("|");
-    const label = `${speed} ${unitOf(speedName)}${time > 1 ? `, repeat ${time}` : ""}`;
-    return [speed, sensors().flatMap((sensor) => {
-      const row = own.find((one) => one.sensor === sensor && `${one.speed}|${one.time}` === place);
-      return ["amplitude", "phase"].map((what) => row && cellOf(name, row, what, `${sensor}, ${label}`));
-    })];
-  });
+  const { amplitude, speed } = data[name].names;
+  const own = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed));
+  const lines = each(own.map((row) => row.place)).map((place) => [place, sensors().flatMap((sensor) => {
+    const row = own.find((one) => one.sensor === sensor && one.place === place);
+    const label = `${sensor}, ${place} ${unitOf(speed)}`;
+    return ["amplitude", "phase"].map((what) => row && cellOf(name, row, what, label));
+  })]);
   const units = sensors().flatMap(() => [[unitOf(amplitude)], ["°"]]);
-  return cellTable([[[unitOf(speedName)], ...sensors().map((sensor) => [sensor, 2])], [[""], ...units]], lines);
+  return cellTable([[[unitOf(speed)], ...sensors().map((sensor) => [sensor, 2])], [[""], ...units]], lines);
 }
 
 function weights(name, run) {
   const own = rowsOf(name, run);
   const lines = own.map((row, i) => {
-    const cells = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, `weight ${i + 1}`));
-    cells[0].list = "planes";
+    const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, `weight ${i + 1}`));
     const label = { "aria-label": `Remove weight ${i + 1} of ${run}` };
-    return [`${i + 1}`, cells, button("Remove", () => edit(...remove(name, [row])), label)];
+    const drop = button("Remove", () => edit(...remove(name, [row])), label);
+    return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more], drop];
   });
-  const heads = [["Mounted"], ["plane"], [unitOf(data[name].names.weight)], ["at °"], [""]];
-  return [own.length > 0 && cellTable([heads], lines),
-    button("Add a weight", () => edit(add(name, { run }, own.at(-1)?.id)), { "data-add": run })];
+  const heads = [["mounted"], ["plane"], [unitOf(data[name].names.weight)], ["at °"], [""]];
+  const another = () => edit(add(name, { run }, own.at(-1)?.id));
+  return [cellTable([heads], lines), button("Add a weight", another, { "data-add": run })];
 }
 
 function card(name, run) {
@@ -261,17 +239,16 @@ function card(name, run) {
   const free = run === baseline();
   const all = () => [...remove(name, rowsOf(name, run)), ...remove(mounted, rowsOf(mounted, run))];
   const drop = () => confirm(`Remove ${run} with its readings and weights?`) && edit(...all());
+  const type = () => edit(...addRows(name, run, usual()));
   return h("article", { key: run, "data-run": run }, !free && h("h3", {}, run),
     !free && data[mounted] && weights(mounted, run),
-    rowsOf(name, run).length ? grid(name, run)
-      : button("Type its readings", () => edit(...addRows(name, run, usual())), { "data-type": run }),
+    grid(name, run) || button("Type its readings", type, { "data-type": run }),
     name === "runs" && h("label", { class: "button" }, "Take from a file…",
       h("input", { type: "file", class: "unseen", "data-import": run })),
     !free && button("Remove this run", drop, { "data-remove": run }));
 }
 
 /* The steps. */
-
 function renderMachine() {
   const column = data.weights?.names.weight || $("setup-weight-unit").value;
   const unit = unitOf(column);
@@ -280,22 +257,23 @@ function renderMachine() {
     ["available", column.replace(/mass|unbalance/, "available"), `pieces, ${unit}`], ["stock", "stock", "stock"]];
   const lines = planes().map((plane) => [plane, keys.map((key) => setting(["planes", plane], ...key))]);
   const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest amplitude"));
-  const closed = [state.read_only, ...Object.values(data).map((one) => one.closed)];
+  const closed = each([state.read_only, ...Object.values(data).map((one) => one.closed)]);
   $("setup").open ||= !data.runs;
   $("new-unit").hidden = Boolean(data.weights);
   show("planes", planes().map((plane) => h("option", { value: plane })));
-  show("machine", each(closed).map((text) => h("p", { class: "why" }, text)),
-    lines.length > 0 && cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
-    limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
+  show("machine", closed.map((text) => h("p", { class: "why" }, text)),
+    cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
+    data.runs && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
 }
 
 function renderConventions() {
   const { phase, angles } = state.settings;
   const four = [["lead", "with"], ["lead", "against"], ["lag", "with"], ["lag", "against"]];
-  show("convention-said", phase && angles ? `The job says: phase ${phase}, angles ${angles}.`
+  $("choice").open ||= !(phase && angles);
+  show("convention-said", phase && angles ? `The job says: phase ${phase}, angles ${angles}`
     : "Not chosen yet. Until then the answer assumes that phase leads and angles count with rotation.");
   show("conventions", four.map(([way, side]) => button(
-    [h("b", {}, `Phase ${way}s, angles ${side} rotation`), h("div", { id: `drawing-${way}-${side}`, own: "" })],
+    [h("b", {}, `Phase ${way}s, angles ${side} rotation`), h("span", { id: `drawing-${way}-${side}`, own: "" })],
     () => edit({ key: ["phase"], old: phase ?? null, new: way },
       { key: ["angles"], old: angles ?? null, new: `${side} rotation` }),
     { id: `convention-${way}-${side}`, "aria-pressed": phase === way && angles === `${side} rotation` })));
@@ -308,10 +286,10 @@ function renderRuns() {
   const create = () => edit({ create: "check", header: data.runs.header }, ...addRows("check", "check", usual()));
   const others = () => edit({ create: "check_weights", header: data.weights.header },
     ...planes().map((plane) => add("check_weights", { run: checks[0], plane })));
+  $("new-run").hidden = !data.runs;
+  put($("new-name"), "value", `trial ${trials.length + 1}`);
   show("baseline", data.runs ? card("runs", baseline()) : "First make the table, in step 1.");
   show("runs", trials.map((run) => card("runs", run)));
-  $("new-run").hidden = !data.runs;
-  setValue($("new-name"), `trial ${trials.length + 1}`);
   show("check", checks.map((run) => card("check", run)),
     data.runs && !data.check && button("Add a check run", create, { id: "add-check" }),
     data.check && data.weights && !data.check_weights && h("p", {}, "Were the proposed weights mounted? If not: ",
@@ -319,23 +297,20 @@ function renderRuns() {
 }
 
 /* The answer: every number of a document stands with its path. */
-
-const at = (doc, path) => path.split(".").reduce((one, key) => one?.[key], doc);
-
 function value(doc, path, std) {
-  const raw = at(doc, path);
+  const raw = at(doc, path.split("."));
   const size = Math.floor(Math.log10(Math.abs(std || raw) || 1));
-  const text = typeof raw === "number" ? raw.toFixed(Math.min(Math.max((std ? 1 : 2) - size, 0), 6)) : raw ?? "–";
-  return h("span", { class: "value", "data-key": path, "data-value": raw, title: `${path}: ${raw}` }, String(text));
+  const text = typeof raw === "number" ? Number(raw.toFixed(Math.min(Math.max((std ? 1 : 2) - size, 0), 6))) : raw;
+  return h("span", { class: "value", "data-key": path, "data-value": raw, title: `${path}: ${raw}` }, `${text ?? "–"}`);
 }
 
 /* Rows of a list in a document; a column is [heading, key, key of its ±]. */
-function listing(doc, path, heads, order = Object.keys(at(doc, path))) {
-  const rows = order.map((i) => h("tr", {}, heads.map(([, key, std]) => {
-    const error = at(doc, `${path}.${i}`)[std];
-    return h("td", {}, value(doc, `${path}.${i}.${key}`, error), error && [" ± ", value(doc, `${path}.${i}.${std}`, error)]);
-  })));
-  return table([heads.map((head) => [head[0]])], rows);
+function listing(doc, path, heads, order = Object.keys(at(doc, path.split(".")))) {
+  return table([heads], order.map((i) => h("tr", {}, heads.map(([, key, std]) => {
+    const error = at(doc, [...path.split("."), i, std]);
+    const more = error && [" ± ", value(doc, `${path}.${i}.${std}`, error)];
+    return h("td", {}, value(doc, `${path}.${i}.${key}`, error), more);
+  }))));
 }
 
 function answer(name, title, { document: doc, judgement, warnings, notes }) {
@@ -344,27 +319,25 @@ function answer(name, title, { document: doc, judgement, warnings, notes }) {
   const list = name === "trim" ? "add_to_mounted" : holes ? "mounting.holes" : "corrections";
   const what = holes ? [["hole", "hole"], [weight, "pieces"]] : [[weight, "mass", "mass_std"]];
   const left = doc.mounting ? "mounting.residuals" : "residuals";
-  const after = (i) => at(doc, left)[i].after;
-  const largest = Object.keys(at(doc, left)).sort((a, b) => after(b) - after(a)).slice(0, 5);
+  const after = at(doc, left.split(".")).map((one) => one.after);
+  const largest = Object.keys(after).sort((a, b) => after[b] - after[a]).slice(0, 5);
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), h("p", {}, judgement),
     listing(doc, list, [["plane", "plane"], ["", "action"], ...what, ["at °", "angle_deg", "angle_std_deg"]]),
     listing(doc, left, [["largest left", "sensor"], ["rpm", "speed_rpm"], [vibration, "after"]], largest),
-    doc.check && h("p", { class: "verdict" }, "Check run: ", value(doc, "check.verdict"), "; rms ",
-      value(doc, "check.rms_before"), " → ", value(doc, "check.rms_achieved"),
-      ", predicted ", value(doc, "check.rms_predicted")),
+    doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"), "; rms ", value(doc, "check.rms_before"),
+      " → ", value(doc, "check.rms_achieved"), ", predicted ", value(doc, "check.rms_predicted")),
     warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)), notes.map((one) => h("p", {}, `Note: ${one}`)));
 }
 
-/* What is not typed yet, counted for each run: "3 phases of trial 2". */
+/* What is not typed yet, counted for each run. */
 function missing() {
-  const groups = {};
+  const counts = {};
   for (const one of problems(true)) {
     const row = allRows(one.table).find(({ id }) => id === one.row);
-    const text = row ? [whatOf(one.column || "reading"), `of ${row.run}`] : [one.text];
-    (groups[text] ||= { ...one, words: text, count: 0 }).count += 1;
+    const text = row ? `${whatOf(one.column || "reading")} of ${row.run}` : one.text;
+    counts[text] = { ...one, ...counts[text], count: (counts[text]?.count || 0) + 1 };
   }
-  return Object.values(groups).map((one) => ({ ...one, text: one.words.length === 1 ? one.words[0]
-    : `${one.count} ${one.words[0]}${one.count > 1 ? "s" : ""} ${one.words[1]}` }));
+  return Object.entries(counts).map(([text, one]) => ({ ...one, text: one.row ? `${one.count} × ${text}` : text }));
 }
 
 function renderNow() {
@@ -376,15 +349,16 @@ function renderNow() {
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
   const [wrong, left] = [[...problems(false), ...refusals], missing()];
   const empty = allRows("runs").filter((row) => !row.amplitude && !row.phase);
+  const drop = () => edit(...remove("runs", empty));
   show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
     wrong.length > 0 && h("div", { class: "why", key: "wrong" }, list(wrong)), refused && h("p", {}, refused),
-    left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left), empty.length > 0
-      && button("Not measured: remove the empty rows", () => edit(...remove("runs", empty)), { id: "drop-empty" })));
+    left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
+    empty.length > 0 && button("Not measured: remove the empty rows", drop, { id: "drop-empty" }));
 }
 
 function renderAnswer() {
   const { runs: found, pictures, ...documents } = state.results;
-  const titles = { answer: "Weights", pieces: "Pieces in the holes", trim: "Trim after the check run" };
+  const titles = { trim: "Trim after the check run", pieces: "Pieces in the holes", answer: "Weights" };
   const channels = found?.channels || [];
   for (const key of ["speed", "sensor"]) {
     show(`channel-${key}`, each(channels.map((one) => one[key])).map((one) => h("option", { key: one }, one)));
@@ -394,9 +368,8 @@ function renderAnswer() {
   draw("polar", channels.length && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
   show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
-    h("div", { role: "meter", "aria-label": `effect of ${run}, percent`, "aria-valuenow": Math.min(share, 100) },
-      h("div", { style: `width: ${Math.min(share, 100)}%` })))));
-  show("answer", Object.entries(titles).map(([name, title]) => documents[name] && answer(name, title, documents[name])));
+    h("meter", { "aria-label": `effect of ${run}, percent`, max: 100, value: Math.min(share, 100) }))));
+  show("answer", Object.keys(titles).map((name) => documents[name] && answer(name, titles[name], documents[name])));
   for (const name of ["discs", "overview"]) draw(name, pictures[name] && `/picture/${name}?v=${pictures[name]}`);
 }
 
@@ -425,7 +398,6 @@ function render() {
 }
 
 /* What a person does. */
-
 document.addEventListener("change", ({ target }) => {
   if (target.files) take(target);
   if (target.id.startsWith("channel")) renderAnswer();
@@ -434,7 +406,6 @@ document.addEventListener("change", ({ target }) => {
   target.saved = target.value;
   save([{ cell: target.cell, old, text: target.value.trim() }]);
 });
-
 document.addEventListener("keydown", (event) => {
   const { target, key } = event;
   const step = { Enter: 1, ArrowDown: 1, ArrowUp: -1 }[key];
@@ -450,15 +421,11 @@ document.addEventListener("keydown", (event) => {
     send(event.shiftKey ? "/redo" : "/undo", {}).catch(tell);
   }
 });
-
 document.addEventListener("focusin", ({ target }) => {
-  const [name, , speed, sensor] = target.dataset.cell?.split("|") || [];
-  if ($("live").hidden || !["runs", "check"].includes(name)) return;
-  $("channel-speed").value = speed;
-  $("channel-sensor").value = sensor;
+  if ($("live").hidden || !/^(runs|check)\|/.test(target.dataset.cell)) return;
+  [, , $("channel-speed").value, $("channel-sensor").value] = target.dataset.cell.split("|");
   renderAnswer();
 });
-
 document.addEventListener("paste", (event) => {
   const { target } = event;
   const text = event.clipboardData.getData("text").replace(/[\r\n]+$/, "");
@@ -484,8 +451,8 @@ async function take(input) {
 
 function makeRows() {
   const header = ["run", $("setup-speed-unit").value, "sensor", $("setup-amplitude-unit").value, "phase_deg"];
-  const places = listOf($("setup-speeds").value).flatMap((speed) =>
-    listOf($("setup-sensors").value).map((sensor) => ({ speed, sensor })));
+  const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => listOf($(id).value));
+  const places = speeds.flatMap((speed) => names.map((sensor) => ({ speed, sensor })));
   if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));
   else edit({ create: "runs", header }, ...addRows("runs", "baseline", places, header[1]));
 }
