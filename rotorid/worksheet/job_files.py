@@ -169,7 +169,7 @@ class JobFiles:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
             folder = self._now.paths.get(key, self.job).resolve().parent
-            if Path(file).name == table.name and Path(file).resolve().parent == folder:
+            if Path(file).name == table.name and (self.job.parent / file).resolve().parent == folder:
                 return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
@@ -367,7 +367,9 @@ def _stamp(path: Path) -> object:
 
 
 def _job_in(given: Path) -> Path:
-    """The file that is given, or the only job of a folder, or one to be made there."""
+    """The file that is given, or the only job of a folder, or one to be made there, and the folder, too."""
+    if not given.suffix and not given.exists() and given.parent.is_dir():
+        given.mkdir()
     if not given.is_dir():
         there = given.is_file() or (given.suffix.lower() == ".toml" and given.parent.is_dir())
         if given.suffix.lower() not in (".toml", *SUFFIXES) or not there:

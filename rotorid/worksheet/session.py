@@ -175,8 +175,10 @@ class Session:
         """A problem of a file, with the cell of the page."""
         row = problem["row"]
         table, place = (row and self.files.place(problem["file"], row)) or (None, None)
-        words = {key: problem[key] for key in ("column", "text")}
-        return {"table": table, "row": place, **words, "missing": not problem["value"]}
+        column, text = problem["column"], problem["text"]
+        if (row, column) == (None, "weights"):
+            text = "no trial run yet"
+        return {"table": table, "row": place, "column": column, "text": text, "missing": not problem["value"]}
 
     def _outside(self, settings: dict[str, Any]) -> str:
         """What the job names outside of its folder; the worksheet reads nothing there."""

@@ -468,15 +468,15 @@ def test_blank_rows_of_a_spreadsheet_take_no_time_and_keep_ids(tmp_path):
 
 def test_a_table_that_cannot_be_read_for_a_while_comes_back(turbo, monkeypatch):
     job, ids = JobFiles(turbo), [row["id"] for row in rows(JobFiles(turbo))]
-    real = job_files.file_content
+    real = job_files.first_bytes
 
-    def refuse(path):
+    def refuse(path, most):
         if path.name == "runs.csv":
             raise PermissionError(13, "in use")
-        return real(path)
+        return real(path, most)
 
     with monkeypatch.context() as patch:
-        patch.setattr(job_files, "file_content", refuse)
+        patch.setattr(job_files, "first_bytes", refuse)
         with pytest.raises(ValueError, match=r"runs\.csv cannot be read \(in use\)"):
             job.apply([cell(job)])
         job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}])
