@@ -18,6 +18,8 @@ from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.worksheet import job_files
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
+pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
+
 TURBO = Path(__file__).resolve().parents[3] / "sample_data" / "turbo_job"
 FILES = ("checked.toml", "runs.csv", "weights.csv", "check.csv", "check_weights.csv")
 HEADER = ["run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg"]

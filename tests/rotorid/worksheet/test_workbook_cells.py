@@ -14,6 +14,8 @@ from rotorid.tables import read_job
 from rotorid.tables.job.workbook_template import template_bytes
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
+pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
+
 TURBO = Path(__file__).resolve().parents[3] / "sample_data" / "turbo_job"
 RUNS = [
     ("first", "3000", "1", "4,5", "12"),
