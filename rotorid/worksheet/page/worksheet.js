@@ -1,11 +1,11 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
 
-For tests: data-cell="runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": its second repeat),
-"weights|ROWID|COLUMN" of a weight ("check_weights|…"); data-key of an input: key of the job file,
-"planes.left.radius_mm"; data-key of a .value: path in the document, "corrections.0.mass", its number in
-data-value, the document in data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge;
-data-type, data-remove, data-add, data-import: its buttons; data-keep, data-write: buttons at a refused cell.
-Ids: those of index.html, and convention-lead-with (…), add-check, check-others, missing, drop-empty. */
+For tests: data-cell="runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": second repeat),
+"weights|ROWID|COLUMN" of a weight ("check_weights|…"); data-key of an input: key of the job file, "errors.floor";
+data-key of a .value: path in the document, "corrections.0.mass", its number in data-value, which document in
+data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge; data-type, data-remove, data-add,
+data-import: its buttons; data-keep, data-write: buttons at a refused cell. More ids than those of index.html:
+convention-lead-with (…), add-check, check-others, missing, drop-empty. */
 
 const $ = (id) => document.getElementById(id);
 const token = location.hash.slice(1);
@@ -34,13 +34,12 @@ function patch(parent, nodes) {
 }
 
 function put(element, name, value) {
-  const busy = element.saved !== undefined && element.value !== element.saved; // somebody is typing here
-  if (name === "value" && !busy) element.value = element.saved = value;
+  if (name === "value" && element.value !== (element.saved ?? element.value)) return; // somebody types here
+  if (name === "value") element.value = element.saved = value;
   else if (name === "cell" || name === "onclick") element[name] = value;
   else if (value === null || value === undefined) element.removeAttribute(name);
-  else if (name !== "value" && element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
+  else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
 }
-
 const show = (id, ...nodes) => patch($(id), h("", {}, nodes).children);
 const tell = (text) => show("message", text && h("p", {}, text.message || text));
 const button = (text, onclick, props) => h("button", { type: "button", onclick, ...props }, text);
@@ -69,16 +68,15 @@ async function refresh(after) {
 async function away({ status }) {
   online = false;
   renderHeader();
-  if (status === 403) tell("This address is of no running worksheet: open the one that the program shows now.");
+  if (status === 403) tell("This address is of no running worksheet: open the one that the program shows.");
   await new Promise((resolve) => setTimeout(resolve, 1000));
 }
 
-function send(path, body) {
+const send = (path, body) => new Promise((done, failed) => {
   tell("");
-  return new Promise((done, failed) => {
-    if (queue.push({ path, body, done, failed }) === 1) drain();
-  });
-}
+  if (queue.push({ path, body, done, failed }) === 1) drain();
+});
+const edit = (...edits) => send("/edit", { edits }).catch(tell);
 
 async function drain() {
   for (; queue.length; renderHeader()) {
@@ -96,14 +94,13 @@ async function drain() {
   }
 }
 
-const edit = (...edits) => send("/edit", { edits }).catch(tell);
-
 /* Changes {cell, old, text} of cells, as one step. */
 function save(changes) {
   const edits = changes.map(({ cell: { path, table: name, row, column }, old, text }) => path
     ? { key: path, old: jsonOf(path, old), new: jsonOf(path, text) }
     : { table: name, row, column, old, new: text });
-  const forget = () => changes.forEach((one) => typed.get(one.cell.key) === one && typed.delete(one.cell.key));
+  const newest = ({ cell }) => changes.includes(typed.get(cell.key));
+  const forget = () => changes.filter(newest).forEach(({ cell }) => typed.delete(cell.key));
   const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes, forget });
   changes.forEach((one) => typed.set(one.cell.key, one));
   send("/edit", { edits }).then(forget, refuse).then(render);
@@ -114,20 +111,19 @@ const number = (text) => Number(String(text).trim().replace(",", "."));
 const each = (values) => [...new Set(values)].filter((value) => value);
 const listOf = (text, by = /[,;]/) => each(text.split(by).map((one) => one.trim()));
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
-const unitOf = (column) => (column || "").replace(/^(amplitude|speed|mass|unbalance)_?/, "").replace("um", "µm")
-  .replace(/_(pp|rms)$/, " $1").replace(/(m|in)_s/, "$1/s").replace("_", "·");
+const unitOf = (column) => (column || "").replace(/^(amplitude|speed|mass|unbalance)_?/, "")
+  .replace("um", "µm").replace(/_(pp|rms)$/, " $1").replace(/(m|in)_s/, "$1/s").replace("_", "·");
 
 function read({ header, rows, read_only: closed }) {
   const times = {};
   const named = (cells) => Object.fromEntries(header.map((name, i) => [whatOf(name), cells[i] || ""]));
-  const found = rows.map(({ id, cells }) => {
-    const row = { ...named(cells), id, cells };
-    const time = (times[`${row.run}|${row.speed}|${row.sensor}`] ||= []).push(id);
+  const placed = (row) => {
+    const time = (times[[row.run, row.speed, row.sensor]] ||= []).push(row);
     return { ...row, place: time > 1 ? `${row.speed} (${time})` : row.speed };
-  });
-  return { header, rows: found, closed, names: named(header) };
+  };
+  const found = rows.map(({ id, cells }) => placed({ ...named(cells), id, cells }));
+  return { header, closed, names: named(header), rows: found };
 }
-
 const allRows = (...tables) => tables.flatMap((name) => data[name]?.rows || []);
 const rowsOf = (name, run) => allRows(name).filter((row) => row.run === run);
 const valuesOf = (what, ...tables) => each(allRows(...tables).map((row) => row[what]));
@@ -139,22 +135,21 @@ const baseline = () =>
 const usual = () => rowsOf("runs", baseline()).filter((row) => row.place === row.speed);
 const remove = (name, rows) => rows.map((row) => ({ table: name, delete: row.id, old: row.cells }));
 const add = (name, cells, after = null) => ({ table: name, after, cells });
+const create = (name, { header }) => ({ create: name, header });
 const addRows = (name, run, places, speedName = data.runs.names.speed) =>
   places.map(({ speed, sensor }) => add(name, { run, [speedName]: speed, sensor }));
 
 function cellOf(name, row, what, more) {
   const column = data[name].names[what];
   const key = [name, ...(row.sensor ? [row.run, row.place, row.sensor] : [row.id]), column].join("|");
-  return { key, table: name, row: row.id, what, column, text: row[what], label: `${what}, ${row.run}, ${more}` };
+  const label = `${what}, ${row.run}, ${more}`;
+  return { key, table: name, row: row.id, what, column, text: row[what], label };
 }
 
 /* Values of the job file: numbers, words, lists "5; 10", values by speed "3000: 20; 4500: 30". */
 const at = (doc, path) => path.reduce((one, key) => one?.[key], doc);
-
-function textOf(value) {
-  if (value === null || typeof value !== "object") return String(value ?? "");
-  return (Array.isArray(value) ? value : Object.entries(value).map((pair) => pair.join(": "))).join("; ");
-}
+const textOf = (value) => value === null || typeof value !== "object" ? String(value ?? "")
+  : (Array.isArray(value) ? value : Object.entries(value).map((pair) => pair.join(": "))).join("; ");
 
 function jsonOf(path, text) {
   const now = at(state.settings, path);
@@ -169,7 +164,8 @@ function jsonOf(path, text) {
 function setting(above, begin, usualName, label) {
   const known = Object.keys(at(state.settings, above) || {}).find((key) => key.startsWith(begin));
   const path = [...above, known || usualName];
-  return { key: path.join("."), path, text: textOf(at(state.settings, path)), label: `${label}, ${above[1]}` };
+  const text = textOf(at(state.settings, path));
+  return { key: path.join("."), path, text, label: `${label}, ${above[1]}` };
 }
 
 /* Cells to type in. */
@@ -177,27 +173,26 @@ const problems = (missing) => state.results.problems.filter((one) => one.missing
 const idOf = (cell) => encodeURIComponent(cell.key);
 const textNow = (cell) => cell.path ? textOf(at(state.settings, cell.path))
   : allRows(cell.table).find((row) => row.id === cell.row)?.[cell.what] ?? "";
-const whyOf = ({ key, table: name, row, column }) => typed.get(key)?.why || (row && problems(false).find((one) =>
-  one.table === name && one.row === row && (one.column || column) === column)?.text);
+const isAt = (problem, { table: name, row, column }) =>
+  row && problem.table === name && problem.row === row && (problem.column || column) === column;
+const whyOf = (cell) => typed.get(cell.key)?.why || problems(false).find((one) => isAt(one, cell))?.text;
 
-function field(cell) {
-  const why = whyOf(cell);
-  return h("input", {
-    id: idOf(cell), cell, value: typed.get(cell.key)?.text ?? cell.text, "aria-label": cell.label,
-    [cell.path ? "data-key" : "data-cell"]: cell.key, "data-at": `${cell.table} ${cell.row} ${cell.column}`,
-    inputmode: cell.list ? "text" : "decimal", list: cell.list, autocomplete: "off",
-    disabled: state.read_only || data[cell.table]?.closed ? "" : null,
-    "aria-invalid": why ? "true" : null, "aria-describedby": why ? `why-${idOf(cell)}` : null,
-  });
-}
+const field = (cell, why = whyOf(cell)) => h("input", {
+  id: idOf(cell), cell, value: typed.get(cell.key)?.text ?? cell.text, "aria-label": cell.label,
+  [cell.path ? "data-key" : "data-cell"]: cell.key, "data-at": `${cell.table} ${cell.row} ${cell.column}`,
+  inputmode: cell.list ? "text" : "decimal", list: cell.list, autocomplete: "off",
+  disabled: state.read_only || data[cell.table]?.closed ? "" : null,
+  "aria-invalid": why ? "true" : null, "aria-describedby": why ? `why-${idOf(cell)}` : null,
+});
 
 function whyLine(cell) {
   const { changes, now, forget, text } = typed.get(cell.key) || {};
-  const write = () => save(changes.map((one) => ({ cell: one.cell, text: one.text, old: textNow(one.cell) })));
+  const [theirs, mine] = [textNow(cell) || "nothing", text || "nothing"];
+  const again = (change) => ({ cell: change.cell, old: textNow(change.cell), text: change.text });
   return h("p", { key: cell.key, class: "why", id: `why-${idOf(cell)}` }, `${cell.label}: `, now === undefined
-    ? whyOf(cell) : `another window (or program) wrote ${now || "nothing"} here; you typed ${text || "nothing"}. `,
-  changes && button(`Keep ${textNow(cell) || "nothing"}`, () => render(forget()), { "data-keep": cell.key }),
-  changes && button(`Write ${text || "nothing"}`, write, { "data-write": cell.key }));
+    ? whyOf(cell) : `another window (or program) wrote ${theirs} here; you typed ${mine}. `,
+  changes && button(`Keep ${theirs}`, () => render(forget()), { "data-keep": cell.key }),
+  changes && button(`Write ${mine}`, () => save(changes.map(again)), { "data-write": cell.key }));
 }
 
 /* A table of cells; each line is [heading, cells, what stands behind them]. */
@@ -224,10 +219,11 @@ function grid(name, run) {
 function weights(name, run) {
   const own = rowsOf(name, run);
   const lines = own.map((row, i) => {
-    const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, `weight ${i + 1}`));
-    const label = { "aria-label": `Remove weight ${i + 1} of ${run}` };
-    const drop = button("Remove", () => edit(...remove(name, [row])), label);
-    return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more], drop];
+    const label = `weight ${i + 1}`;
+    const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, label));
+    const drop = () => edit(...remove(name, [row]));
+    return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
+      button("Remove", drop, { "aria-label": `Remove ${label} of ${run}` })];
   });
   const heads = [["mounted"], ["plane"], [unitOf(data[name].names.weight)], ["at °"], [""]];
   const another = () => edit(add(name, { run }, own.at(-1)?.id));
@@ -252,13 +248,14 @@ function card(name, run) {
 function renderMachine() {
   const column = data.weights?.names.weight || $("setup-weight-unit").value;
   const unit = unitOf(column);
+  const pieces = column.replace(/mass|unbalance/, "available");
   const keys = [["max_", `max_${column}`, `largest, ${unit}`], ["radius_", "radius_mm", "radius, mm"],
-    ["holes", "holes", "holes"], ["first_hole", "first_hole_deg", "first hole, °"], ["per_hole", "per_hole", "per hole"],
-    ["available", column.replace(/mass|unbalance/, "available"), `pieces, ${unit}`], ["stock", "stock", "stock"]];
+    ["holes", "holes", "holes"], ["first_hole", "first_hole_deg", "first hole, °"],
+    ["available", pieces, `pieces, ${unit}`], ["per_", "per_hole", "per hole"], ["stock", "stock", "stock"]];
   const lines = planes().map((plane) => [plane, keys.map((key) => setting(["planes", plane], ...key))]);
-  const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest amplitude"));
+  const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest"));
   const closed = each([state.read_only, ...Object.values(data).map((one) => one.closed)]);
-  $("setup").open ||= !data.runs;
+  if (!data.runs && !queue.length) $("setup").open = true;
   $("new-unit").hidden = Boolean(data.weights);
   show("planes", planes().map((plane) => h("option", { value: plane })));
   show("machine", closed.map((text) => h("p", { class: "why" }, text)),
@@ -267,41 +264,44 @@ function renderMachine() {
 }
 
 function renderConventions() {
-  const { phase, angles } = state.settings;
-  const four = [["lead", "with"], ["lead", "against"], ["lag", "with"], ["lag", "against"]];
+  const { phase = null, angles = null } = state.settings;
+  const four = ["lead-with", "lead-against", "lag-with", "lag-against"];
   $("choice").open ||= !(phase && angles);
   show("convention-said", phase && angles ? `The job says: phase ${phase}, angles ${angles}`
     : "Not chosen yet. Until then the answer assumes that phase leads and angles count with rotation.");
-  show("conventions", four.map(([way, side]) => button(
-    [h("b", {}, `Phase ${way}s, angles ${side} rotation`), h("span", { id: `drawing-${way}-${side}`, own: "" })],
-    () => edit({ key: ["phase"], old: phase ?? null, new: way },
-      { key: ["angles"], old: angles ?? null, new: `${side} rotation` }),
-    { id: `convention-${way}-${side}`, "aria-pressed": phase === way && angles === `${side} rotation` })));
-  for (const [way, side] of four) draw(`drawing-${way}-${side}`, `/convention/${way}-${side}`);
+  show("conventions", four.map((name) => {
+    const [way, side] = [name.split("-")[0], `${name.split("-")[1]} rotation`];
+    const edits = [{ key: ["phase"], old: phase, new: way }, { key: ["angles"], old: angles, new: side }];
+    const words = h("b", {}, `Phase ${way}s, angles ${side}`);
+    return button([words, h("span", { id: `drawing-${name}`, own: "" })],
+      () => edit(...edits), { id: `convention-${name}`, "aria-pressed": phase === way && angles === side });
+  }));
+  four.forEach((name) => draw(`drawing-${name}`, `/convention/${name}`));
 }
 
 function renderRuns() {
   const trials = runs().filter((run) => run !== baseline());
   const checks = valuesOf("run", "check");
-  const create = () => edit({ create: "check", header: data.runs.header }, ...addRows("check", "check", usual()));
-  const others = () => edit({ create: "check_weights", header: data.weights.header },
-    ...planes().map((plane) => add("check_weights", { run: checks[0], plane })));
+  const begin = () => edit(create("check", data.runs), ...addRows("check", "check", usual()));
+  const rows = () => planes().map((plane) => add("check_weights", { run: checks[0], plane }));
+  const others = () => edit(create("check_weights", data.weights), ...rows());
   $("new-run").hidden = !data.runs;
   put($("new-name"), "value", `trial ${trials.length + 1}`);
   show("baseline", data.runs ? card("runs", baseline()) : "First make the table, in step 1.");
   show("runs", trials.map((run) => card("runs", run)));
   show("check", checks.map((run) => card("check", run)),
-    data.runs && !data.check && button("Add a check run", create, { id: "add-check" }),
-    data.check && data.weights && !data.check_weights && h("p", {}, "Were the proposed weights mounted? If not: ",
-      button("Other weights were mounted", others, { id: "check-others" })));
+    data.runs && !data.check && button("Add a check run", begin, { id: "add-check" }),
+    data.check && data.weights && !data.check_weights && h("p", {}, "Mounted as proposed? ",
+      button("No, other weights were mounted", others, { id: "check-others" })));
 }
 
 /* The answer: every number of a document stands with its path. */
 function value(doc, path, std) {
   const raw = at(doc, path.split("."));
-  const size = Math.floor(Math.log10(Math.abs(std || raw) || 1));
-  const text = typeof raw === "number" ? Number(raw.toFixed(Math.min(Math.max((std ? 1 : 2) - size, 0), 6))) : raw;
-  return h("span", { class: "value", "data-key": path, "data-value": raw, title: `${path}: ${raw}` }, `${text ?? "–"}`);
+  const places = (std ? 1 : 2) - Math.floor(Math.log10(Math.abs(std || raw) || 1));
+  const text = typeof raw === "number" ? Number(raw.toFixed(Math.min(Math.max(places, 0), 6))) : raw ?? "";
+  const props = { class: "value", "data-key": path, "data-value": raw, title: `${path}: ${raw}` };
+  return h("span", props, `${text}`);
 }
 
 /* Rows of a list in a document; a column is [heading, key, key of its ±]. */
@@ -321,37 +321,35 @@ function answer(name, title, { document: doc, judgement, warnings, notes }) {
   const left = doc.mounting ? "mounting.residuals" : "residuals";
   const after = at(doc, left.split(".")).map((one) => one.after);
   const largest = Object.keys(after).sort((a, b) => after[b] - after[a]).slice(0, 5);
+  const before = doc.mounting ? [] : [["before", "before"]];
+  const places = [["largest left", "sensor"], ["rpm", "speed_rpm"], ...before, [vibration, "after"]];
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), h("p", {}, judgement),
     listing(doc, list, [["plane", "plane"], ["", "action"], ...what, ["at °", "angle_deg", "angle_std_deg"]]),
-    listing(doc, left, [["largest left", "sensor"], ["rpm", "speed_rpm"], [vibration, "after"]], largest),
-    doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"), "; rms ", value(doc, "check.rms_before"),
-      " → ", value(doc, "check.rms_achieved"), ", predicted ", value(doc, "check.rms_predicted")),
-    warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)), notes.map((one) => h("p", {}, `Note: ${one}`)));
-}
-
-/* What is not typed yet, counted for each run. */
-function missing() {
-  const counts = {};
-  for (const one of problems(true)) {
-    const row = allRows(one.table).find(({ id }) => id === one.row);
-    const text = row ? `${whatOf(one.column || "reading")} of ${row.run}` : one.text;
-    counts[text] = { ...one, ...counts[text], count: (counts[text]?.count || 0) + 1 };
-  }
-  return Object.entries(counts).map(([text, one]) => ({ ...one, text: one.row ? `${one.count} × ${text}` : text }));
+    listing(doc, left, places, largest), doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"),
+      "; rms ", value(doc, "check.rms_before"), " → ", value(doc, "check.rms_achieved")),
+    warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)),
+    notes.map((one) => h("p", {}, `Note: ${one}`)));
 }
 
 function renderNow() {
   const { refused, pieces, trim, answer: first } = state.results;
   const best = trim || pieces || first;
-  const refusals = [...typed.values()].filter((one) => one.why).map(({ cell, why }) => ({ ...cell, text: why }));
-  const go = (one) => document.querySelector(`[data-at^="${one.table} ${one.row} ${one.column || ""}"]`).focus();
+  const refusals = [...typed.values()].map(({ cell, why: text }) => ({ ...cell, text })).filter((one) => one.text);
+  const missing = {}; // what is not typed yet, counted for each run
+  for (const one of problems(true)) {
+    const { run } = allRows(one.table).find(({ id }) => id === one.row) || {};
+    (missing[run ? `${whatOf(one.column || "reading")} of ${run}` : one.text] ||= []).push(one);
+  }
+  const left = Object.entries(missing).map(([text, those]) =>
+    ({ ...those[0], text: those[0].row ? `${those.length} × ${text}` : text }));
+  const place = (one) => `[data-at^="${one.table} ${one.row} ${one.column || ""}"]`;
+  const go = (one) => document.querySelector(place(one)).focus();
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
-  const [wrong, left] = [[...problems(false), ...refusals], missing()];
   const empty = allRows("runs").filter((row) => !row.amplitude && !row.phase);
   const drop = () => edit(...remove("runs", empty));
   show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
-    wrong.length > 0 && h("div", { class: "why", key: "wrong" }, list(wrong)), refused && h("p", {}, refused),
+    h("div", { class: "why" }, list([...problems(false), ...refusals])), refused && h("p", {}, refused),
     left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
     empty.length > 0 && button("Not measured: remove the empty rows", drop, { id: "drop-empty" }));
 }
@@ -359,18 +357,19 @@ function renderNow() {
 function renderAnswer() {
   const { runs: found, pictures, ...documents } = state.results;
   const titles = { trim: "Trim after the check run", pieces: "Pieces in the holes", answer: "Weights" };
-  const channels = found?.channels || [];
   for (const key of ["speed", "sensor"]) {
-    show(`channel-${key}`, each(channels.map((one) => one[key])).map((one) => h("option", { key: one }, one)));
+    const values = each((found?.channels || []).map((one) => one[key]));
+    show(`channel-${key}`, values.map((one) => h("option", { key: one }, one)));
   }
-  $("live").hidden = !channels.length;
   const [speed, sensor] = ["channel-speed", "channel-sensor"].map((id) => encodeURIComponent($(id).value));
-  draw("polar", channels.length && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
+  $("live").hidden = !sensor;
+  draw("polar", sensor && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
   show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
     h("meter", { "aria-label": `effect of ${run}, percent`, max: 100, value: Math.min(share, 100) }))));
-  show("answer", Object.keys(titles).map((name) => documents[name] && answer(name, titles[name], documents[name])));
-  for (const name of ["discs", "overview"]) draw(name, pictures[name] && `/picture/${name}?v=${pictures[name]}`);
+  const known = Object.keys(titles).filter((name) => documents[name]);
+  show("answer", known.map((name) => answer(name, titles[name], documents[name])));
+  for (const id of ["discs", "overview"]) draw(id, pictures[id] && `/picture/${id}?v=${pictures[id]}`);
 }
 
 async function draw(id, address) {
@@ -378,14 +377,14 @@ async function draw(id, address) {
   slot.hidden = !address;
   if (!address || slot.address === address) return;
   slot.address = address;
-  const svg = await ask(address).then((found) => found.text(), () => "");
-  if (slot.address === address) slot.innerHTML = svg;
+  const svg = await ask(address).then((found) => found.text(), () => null);
+  if (slot.address === address) slot.innerHTML = svg ?? (slot.address = "");
 }
 
 function renderHeader() {
-  const lost = `not saved — the program is not running${queue.length ? `; ${queue.length} waiting here` : ""}`;
-  $("saved").textContent = online ? (queue.length ? "saving…" : said) : lost;
-  $("saved").classList.toggle("why", !online);
+  const words = online ? "saving…" : `not saved — the program is not running (${queue.length} waiting here)`;
+  $("saved").textContent = online && !queue.length ? said : words;
+  $("saved").className = online ? "" : "why";
 }
 
 function render() {
@@ -409,14 +408,13 @@ document.addEventListener("change", ({ target }) => {
 document.addEventListener("keydown", (event) => {
   const { target, key } = event;
   const step = { Enter: 1, ArrowDown: 1, ArrowUp: -1 }[key];
+  const editing = target.matches("input") && target.value !== (target.saved ?? "");
   if (target.cell && step) {
     const column = `td:nth-child(${target.parentNode.cellIndex + 1}) > input`;
     const cells = [...target.closest("table").querySelectorAll(column)];
     const next = cells[cells.indexOf(target) + step];
-    if (next) event.preventDefault();
-    next?.select();
-  } else if (key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey)) {
-    if (target.matches("input") && target.value !== (target.saved ?? "")) return;
+    if (next) next.select(event.preventDefault());
+  } else if (key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && !editing) {
     event.preventDefault();
     send(event.shiftKey ? "/redo" : "/undo", {}).catch(tell);
   }
@@ -433,12 +431,12 @@ document.addEventListener("paste", (event) => {
   if (!target.cell?.row || (lines.length < 2 && lines[0].length < 2)) return;
   event.preventDefault();
   const rows = [...target.closest("tbody").rows].slice(target.closest("tr").sectionRowIndex);
-  const words = lines.flatMap((line, i) => line.map((word, j) =>
-    [word.trim(), rows[i]?.cells[target.parentNode.cellIndex + j]?.querySelector("input")])).filter(([word]) => word);
-  const fit = words.filter(([, input]) => input);
+  const inputAt = (i, j) => rows[i]?.cells[target.parentNode.cellIndex + j]?.querySelector("input");
+  const words = lines.flatMap((line, i) => line.map((word, j) => [word.trim(), inputAt(i, j)]));
+  const fit = words.filter(([word, input]) => word && input);
   save(fit.map(([word, input]) => ({ cell: input.cell, old: input.saved, text: word })));
   for (const [word, input] of fit) input.value = input.saved = word;
-  if (words.length > fit.length) tell(`Not written: ${words.length - fit.length} values outside of the table.`);
+  if (words.some(([word, input]) => word && !input)) tell("Not written: the values outside of the table.");
 });
 
 async function take(input) {
@@ -449,29 +447,36 @@ async function take(input) {
   send("/import", content).catch(tell);
 }
 
-function makeRows() {
-  const header = ["run", $("setup-speed-unit").value, "sensor", $("setup-amplitude-unit").value, "phase_deg"];
-  const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => listOf($(id).value));
-  const places = speeds.flatMap((speed) => names.map((sensor) => ({ speed, sensor })));
-  if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));
-  else edit({ create: "runs", header }, ...addRows("runs", "baseline", places, header[1]));
-}
-
-function addRun() {
-  const [run, plane, unit] = ["new-name", "new-plane", "setup-weight-unit"].map((id) => $(id).value.trim());
-  const create = { create: "weights", header: ["run", "plane", unit, "angle_deg"] };
-  edit(...(data.weights ? [] : [create]), add("weights", { run, plane }), ...addRows("runs", run, usual()));
-}
-
-async function propose() {
-  const options = { with_job: $("trial-with-job").checked };
-  for (const { name, value: text, dataset } of options.with_job ? [] : $("trial").querySelectorAll("[name]")) {
-    if (text) options[name] = dataset.unit ? number(text) + dataset.unit : number(text) || text;
-  }
-  const found = await ask("/trial", { options }).then((one) => one.json(), ({ message }) => ({ judgement: message }));
-  const words = [found.judgement, found.found, ...(found.warnings || []), ...(found.notes || [])];
-  show("trial-answer", words.map((one) => one && h("p", {}, one)));
-  $("trial-picture").innerHTML = found.picture || "";
+const submitted = {
+  "setup-form"() {
+    const [speedName, amplitude] = ["setup-speed-unit", "setup-amplitude-unit"].map((id) => $(id).value);
+    const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => listOf($(id).value));
+    const header = ["run", speedName, "sensor", amplitude, "phase_deg"];
+    const places = speeds.flatMap((speed) => names.map((sensor) => ({ speed, sensor })));
+    if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));
+    else edit(create("runs", { header }), ...addRows("runs", "baseline", places, speedName));
+    $("setup").open = false;
+  },
+  "new-run"() {
+    const [run, plane, unit] = ["new-name", "new-plane", "setup-weight-unit"].map((id) => $(id).value.trim());
+    const made = data.weights ? [] : [create("weights", { header: ["run", "plane", unit, "angle_deg"] })];
+    edit(...made, add("weights", { run, plane }), ...addRows("runs", run, usual()));
+    $("new-plane").value = "";
+  },
+  async trial() {
+    const options = { with_job: $("trial-with-job").checked };
+    for (const { name, value: text, dataset } of $("trial").querySelectorAll("[name]")) {
+      const given = dataset.unit ? number(text) + dataset.unit : number(text) || text;
+      if (text && !options.with_job) options[name] = given;
+    }
+    const told = await ask("/trial", { options }).then((one) => one.json(), (one) => ({ found: one.message }));
+    const words = [told.judgement, told.found, told.warnings, told.notes].flat();
+    show("trial-answer", words.map((one) => one && h("p", {}, one)));
+    $("trial-picture").innerHTML = told.picture || "";
+  },
+};
+for (const [id, act] of Object.entries(submitted)) {
+  $(id).addEventListener("submit", (event) => act(event.preventDefault()));
 }
 
 async function open({ target }) {
@@ -481,9 +486,6 @@ async function open({ target }) {
   else opened.close();
 }
 
-for (const [id, act] of [["setup-form", makeRows], ["trial", propose], ["new-run", addRun]]) {
-  $(id).addEventListener("submit", (event) => act(event.preventDefault()));
-}
 for (const id of ["undo", "redo"]) $(id).onclick = () => send(`/${id}`, {}).catch(tell);
 for (const id of ["print", "whole"]) $(id).onclick = open;
 window.addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
