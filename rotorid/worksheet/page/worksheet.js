@@ -1,11 +1,11 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
 
-For tests: data-cell="runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": second repeat),
-"weights|ROWID|COLUMN" of a weight ("check_weights|…"); data-key of an input: key of the job file, "errors.floor";
-data-key of a .value: path in the document, "corrections.0.mass", its number in data-value, which document in
-data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge; data-type, data-remove, data-add,
-data-import: its buttons; data-keep, data-write: buttons at a refused cell. More ids than those of index.html:
-convention-lead-with (…), add-check, check-others, missing, drop-empty. */
+For tests: data-cell is "runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": second
+repeat) or "weights|ROWID|COLUMN" of a weight ("check_weights|…"). data-key is the key of the job of an input, or
+the path in the document of a .value, "corrections.0.mass", with its number in data-value and the document in
+data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge; data-type, data-remove,
+data-add, data-import: its buttons; data-keep, data-write: buttons at a refused cell. Other ids than those of
+index.html: convention-lead-with (…), add-check, check-others, missing, drop-empty. */
 
 const $ = (id) => document.getElementById(id);
 const token = location.hash.slice(1);
@@ -94,16 +94,19 @@ async function drain() {
   }
 }
 
-/* Changes {cell, old, text} of cells, as one step. */
+/* Changes {cell, old, text} of cells, as one step; what was refused before replaces what is there now. */
 function save(changes) {
-  const edits = changes.map(({ cell: { path, table: name, row, column }, old, text }) => path
-    ? { key: path, old: jsonOf(path, old), new: jsonOf(path, text) }
-    : { table: name, row, column, old, new: text });
-  const newest = ({ cell }) => changes.includes(typed.get(cell.key));
-  const forget = () => changes.filter(newest).forEach(({ cell }) => typed.delete(cell.key));
-  const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes, forget });
+  const again = changes.some(({ cell }) => typed.get(cell.key)?.why);
+  const edits = changes.map(({ cell, old: shown, text }) => {
+    const { path, table: name, row, column } = cell;
+    const old = again ? textNow(cell) : shown;
+    return path ? { key: path, old: jsonOf(path, old), new: jsonOf(path, text) }
+      : { table: name, row, column, old, new: text };
+  });
+  const drop = () => changes.forEach((one) => typed.get(one.cell.key) === one && typed.delete(one.cell.key));
+  const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes, drop });
   changes.forEach((one) => typed.set(one.cell.key, one));
-  send("/edit", { edits }).then(forget, refuse).then(render);
+  send("/edit", { edits }).then(drop, refuse).then(render);
 }
 
 /* The tables of the job. */
@@ -161,11 +164,10 @@ function jsonOf(path, text) {
   return text ? one(text) : null;
 }
 
-function setting(above, begin, usualName, label) {
-  const known = Object.keys(at(state.settings, above) || {}).find((key) => key.startsWith(begin));
-  const path = [...above, known || usualName];
-  const text = textOf(at(state.settings, path));
-  return { key: path.join("."), path, text, label: `${label}, ${above[1]}` };
+function setting(top, begin, usualName, label) {
+  const known = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
+  const path = [...top, known || usualName];
+  return { key: path.join("."), path, text: textOf(at(state.settings, path)), label: `${label}, ${top[1]}` };
 }
 
 /* Cells to type in. */
@@ -186,13 +188,13 @@ const field = (cell, why = whyOf(cell)) => h("input", {
 });
 
 function whyLine(cell) {
-  const { changes, now, forget, text } = typed.get(cell.key) || {};
-  const [theirs, mine] = [textNow(cell) || "nothing", text || "nothing"];
-  const again = (change) => ({ cell: change.cell, old: textNow(change.cell), text: change.text });
+  const { changes, now, drop, text: mine = "" } = typed.get(cell.key) || {};
+  const theirs = textNow(cell);
+  const write = () => save(changes.map((one) => ({ cell: one.cell, text: one.text })));
   return h("p", { key: cell.key, class: "why", id: `why-${idOf(cell)}` }, `${cell.label}: `, now === undefined
-    ? whyOf(cell) : `another window (or program) wrote ${theirs} here; you typed ${mine}. `,
-  changes && button(`Keep ${theirs}`, () => render(forget()), { "data-keep": cell.key }),
-  changes && button(`Write ${mine}`, () => save(changes.map(again)), { "data-write": cell.key }));
+    ? whyOf(cell) : `another window (or program) wrote “${theirs}” here; you typed “${mine}”. `,
+  changes && button(`Keep “${theirs}”`, () => render(drop()), { "data-keep": cell.key }),
+  changes && button(`Write “${mine}”`, write, { "data-write": cell.key }));
 }
 
 /* A table of cells; each line is [heading, cells, what stands behind them]. */
@@ -225,7 +227,7 @@ function weights(name, run) {
     return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
       button("Remove", drop, { "aria-label": `Remove ${label} of ${run}` })];
   });
-  const heads = [["mounted"], ["plane"], [unitOf(data[name].names.weight)], ["at °"], [""]];
+  const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
   const another = () => edit(add(name, { run }, own.at(-1)?.id));
   return [cellTable([heads], lines), button("Add a weight", another, { "data-add": run })];
 }
@@ -300,16 +302,16 @@ function value(doc, path, std) {
   const raw = at(doc, path.split("."));
   const places = (std ? 1 : 2) - Math.floor(Math.log10(Math.abs(std || raw) || 1));
   const text = typeof raw === "number" ? Number(raw.toFixed(Math.min(Math.max(places, 0), 6))) : raw ?? "";
-  const props = { class: "value", "data-key": path, "data-value": raw, title: `${path}: ${raw}` };
-  return h("span", props, `${text}`);
+  return h("span", { class: "value", "data-key": path, "data-value": raw, title: raw }, `${text}`);
 }
 
 /* Rows of a list in a document; a column is [heading, key, key of its ±]. */
-function listing(doc, path, heads, order = Object.keys(at(doc, path.split(".")))) {
-  return table([heads], order.map((i) => h("tr", {}, heads.map(([, key, std]) => {
-    const error = at(doc, [...path.split("."), i, std]);
-    const more = error && [" ± ", value(doc, `${path}.${i}.${std}`, error)];
-    return h("td", {}, value(doc, `${path}.${i}.${key}`, error), more);
+function listing(doc, path, columns, order) {
+  const rows = at(doc, path.split("."));
+  const heads = columns.filter(([, key]) => rows.some((row) => key in row));
+  return table([heads], (order || Object.keys(rows)).map((i) => h("tr", {}, heads.map(([, key, std]) => {
+    const more = rows[i][std] && [" ± ", value(doc, `${path}.${i}.${std}`, rows[i][std])];
+    return h("td", {}, value(doc, `${path}.${i}.${key}`, rows[i][std]), more);
   }))));
 }
 
@@ -319,10 +321,9 @@ function answer(name, title, { document: doc, judgement, warnings, notes }) {
   const list = name === "trim" ? "add_to_mounted" : holes ? "mounting.holes" : "corrections";
   const what = holes ? [["hole", "hole"], [weight, "pieces"]] : [[weight, "mass", "mass_std"]];
   const left = doc.mounting ? "mounting.residuals" : "residuals";
-  const after = at(doc, left.split(".")).map((one) => one.after);
-  const largest = Object.keys(after).sort((a, b) => after[b] - after[a]).slice(0, 5);
-  const before = doc.mounting ? [] : [["before", "before"]];
-  const places = [["largest left", "sensor"], ["rpm", "speed_rpm"], ...before, [vibration, "after"]];
+  const rows = at(doc, left.split("."));
+  const largest = Object.keys(rows).sort((a, b) => rows[b].after - rows[a].after).slice(0, 5);
+  const places = [["largest left", "sensor"], ["rpm", "speed_rpm"], ["before", "before"], [vibration, "after"]];
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), h("p", {}, judgement),
     listing(doc, list, [["plane", "plane"], ["", "action"], ...what, ["at °", "angle_deg", "angle_std_deg"]]),
     listing(doc, left, places, largest), doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"),
@@ -332,9 +333,9 @@ function answer(name, title, { document: doc, judgement, warnings, notes }) {
 }
 
 function renderNow() {
-  const { refused, pieces, trim, answer: first } = state.results;
+  const { refused: why, pieces, trim, answer: first } = state.results;
   const best = trim || pieces || first;
-  const refusals = [...typed.values()].map(({ cell, why: text }) => ({ ...cell, text })).filter((one) => one.text);
+  const refused = [...typed.values()].filter((it) => it.why).map((it) => ({ ...it.cell, text: it.why }));
   const missing = {}; // what is not typed yet, counted for each run
   for (const one of problems(true)) {
     const { run } = allRows(one.table).find(({ id }) => id === one.row) || {};
@@ -342,14 +343,13 @@ function renderNow() {
   }
   const left = Object.entries(missing).map(([text, those]) =>
     ({ ...those[0], text: those[0].row ? `${those.length} × ${text}` : text }));
-  const place = (one) => `[data-at^="${one.table} ${one.row} ${one.column || ""}"]`;
-  const go = (one) => document.querySelector(place(one)).focus();
+  const go = (it) => document.querySelector(`[data-at^="${it.table} ${it.row} ${it.column || ""}"]`).focus();
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
   const empty = allRows("runs").filter((row) => !row.amplitude && !row.phase);
   const drop = () => edit(...remove("runs", empty));
   show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
-    h("div", { class: "why" }, list([...problems(false), ...refusals])), refused && h("p", {}, refused),
+    h("div", { class: "why" }, list([...problems(false), ...refused])), why && h("p", {}, why),
     left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
     empty.length > 0 && button("Not measured: remove the empty rows", drop, { id: "drop-empty" }));
 }
@@ -367,8 +367,7 @@ function renderAnswer() {
   show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
     h("meter", { "aria-label": `effect of ${run}, percent`, max: 100, value: Math.min(share, 100) }))));
-  const known = Object.keys(titles).filter((name) => documents[name]);
-  show("answer", known.map((name) => answer(name, titles[name], documents[name])));
+  show("answer", Object.entries(titles).map(([id, title]) => documents[id] && answer(id, title, documents[id])));
   for (const id of ["discs", "overview"]) draw(id, pictures[id] && `/picture/${id}?v=${pictures[id]}`);
 }
 
@@ -377,13 +376,15 @@ async function draw(id, address) {
   slot.hidden = !address;
   if (!address || slot.address === address) return;
   slot.address = address;
-  const svg = await ask(address).then((found) => found.text(), () => null);
-  if (slot.address === address) slot.innerHTML = svg ?? (slot.address = "");
+  const svg = await ask(address).then((found) => found.text(), () => "");
+  if (slot.address === address && svg) slot.innerHTML = svg;
+  else if (slot.address === address) slot.address = ""; // the next state asks again
 }
 
 function renderHeader() {
-  const words = online ? "saving…" : `not saved — the program is not running (${queue.length} waiting here)`;
-  $("saved").textContent = online && !queue.length ? said : words;
+  const waiting = queue.length ? `: ${queue.length} waiting here` : "";
+  const words = online ? "saving…" : `not saved — the program is not running${waiting}`;
+  $("saved").textContent = online && !waiting ? said : words;
   $("saved").className = online ? "" : "why";
 }
 
@@ -401,9 +402,8 @@ document.addEventListener("change", ({ target }) => {
   if (target.files) take(target);
   if (target.id.startsWith("channel")) renderAnswer();
   if (!target.cell || target.value === target.saved) return;
-  const old = typed.get(target.cell.key)?.why ? textNow(target.cell) : target.saved;
+  save([{ cell: target.cell, old: target.saved, text: target.value.trim() }]);
   target.saved = target.value;
-  save([{ cell: target.cell, old, text: target.value.trim() }]);
 });
 document.addEventListener("keydown", (event) => {
   const { target, key } = event;
@@ -421,7 +421,9 @@ document.addEventListener("keydown", (event) => {
 });
 document.addEventListener("focusin", ({ target }) => {
   if ($("live").hidden || !/^(runs|check)\|/.test(target.dataset.cell)) return;
-  [, , $("channel-speed").value, $("channel-sensor").value] = target.dataset.cell.split("|");
+  const [, , place, sensor] = target.dataset.cell.split("|");
+  $("channel-speed").value = place.replace(/ .*/, "");
+  $("channel-sensor").value = sensor;
   renderAnswer();
 });
 document.addEventListener("paste", (event) => {
@@ -469,15 +471,13 @@ const submitted = {
       const given = dataset.unit ? number(text) + dataset.unit : number(text) || text;
       if (text && !options.with_job) options[name] = given;
     }
-    const told = await ask("/trial", { options }).then((one) => one.json(), (one) => ({ found: one.message }));
+    const told = await ask("/trial", { options }).then((one) => one.json(), (no) => ({ notes: no.message }));
     const words = [told.judgement, told.found, told.warnings, told.notes].flat();
     show("trial-answer", words.map((one) => one && h("p", {}, one)));
     $("trial-picture").innerHTML = told.picture || "";
   },
 };
-for (const [id, act] of Object.entries(submitted)) {
-  $(id).addEventListener("submit", (event) => act(event.preventDefault()));
-}
+for (const id of Object.keys(submitted)) $(id).onsubmit = (event) => submitted[id](event.preventDefault());
 
 async function open({ target }) {
   const opened = window.open("", "_blank");
