@@ -265,7 +265,7 @@ function renderMachine() {
   show("planes", planes().map((plane) => h("option", { value: plane })));
   show("machine", closed.map((text) => h("p", { class: "why" }, text)),
     cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
-    data.runs && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
+    limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
 }
 
 function renderConventions() {
