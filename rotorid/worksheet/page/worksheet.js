@@ -8,7 +8,7 @@ effect; data-type, data-remove, data-add, data-import: its buttons; data-keep, d
 cell. Ids: those of index.html, and convention-lead-with (…), add-check, check-others, missing, drop-empty. */
 
 const $ = (id) => document.getElementById(id);
-const token = location.hash.slice(1);
+let token = location.hash.slice(1);
 const typed = new Map(); // key of a cell → its change, until the state has it; with `why` if it was refused
 const queue = []; // what is still to be sent, in order
 let state = null;
@@ -394,7 +394,8 @@ function renderAnswer() {
   draw("polar", channels.length && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
   show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
-    h("div", { role: "meter", "aria-label": `effect of ${run}, percent`, "aria-valuenow": Math.min(share, 100) },
+    h("div", { role: "meter", "aria-label": `effect of ${run}, percent`, "aria-valuenow": Math.min(share, 100),
+      "aria-valuemin": 0, "aria-valuemax": 100 },
       h("div", { style: `width: ${Math.min(share, 100)}%` })))));
   show("answer", Object.entries(titles).map(([name, title]) => documents[name] && answer(name, title, documents[name])));
   for (const name of ["discs", "overview"]) draw(name, pictures[name] && `/picture/${name}?v=${pictures[name]}`);
@@ -405,6 +406,8 @@ async function draw(id, address) {
   slot.hidden = !address;
   if (!address || slot.address === address) return;
   slot.address = address;
+  await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
+  if (slot.address !== address) return;
   const svg = await ask(address).then((found) => found.text(), () => "");
   if (slot.address === address) slot.innerHTML = svg;
 }
@@ -519,5 +522,6 @@ for (const [id, act] of [["setup-form", makeRows], ["trial", propose], ["new-run
 }
 for (const id of ["undo", "redo"]) $(id).onclick = () => send(`/${id}`, {}).catch(tell);
 for (const id of ["print", "whole"]) $(id).onclick = open;
+window.addEventListener("hashchange", () => tell((token = location.hash.slice(1)) && ""));
 window.addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
 for (;;) await refresh(online && state ? state.version : -1).catch(away);
