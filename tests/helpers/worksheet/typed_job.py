@@ -2,7 +2,7 @@
 
 import csv
 
-from worksheet.window import SPACE, TAB
+from worksheet.window import SPACE
 
 
 def rows(path):
@@ -11,7 +11,7 @@ def rows(path):
     return list(csv.DictReader(lines))
 
 
-def type_job(window, sample, radius):
+def type_job(window, sample, radius=None):
     """A job of one speed by keyboard, from an empty folder; the first run is the page's baseline."""
     runs, weights = rows(sample / "runs.csv"), rows(sample / "weights.csv")
     names = list(dict.fromkeys(row["run"] for row in runs))
@@ -35,11 +35,13 @@ def type_job(window, sample, radius):
                 window.push(f'[data-add="{name}"]')
                 window.type(f'{cell}[data-cell$="|plane"]', weight["plane"])
             window.type(f'{cell}[data-cell$="|mass_g"]', weight["mass_g"])
-            window.press(TAB, *weight["angle_deg"], TAB)
-        window.go(f'{card} [data-cell^="runs|"]')
-        for row in own[name]:  # from cell to cell
-            window.press(*row["amplitude"], TAB, *row["phase_deg"], TAB)
-    for plane in dict.fromkeys(row["plane"] for row in weights):
+            window.next(weight["angle_deg"])
+        first, *others = (text for row in own[name] for text in (row["amplitude"], row["phase_deg"]))
+        window.type(f'{card} [data-cell^="runs|"]', first)
+        for text in others:
+            window.next(text)
+        window.leave()
+    for plane in dict.fromkeys(row["plane"] for row in weights) if radius else ():
         window.type(f'[data-key="planes.{plane}.radius_mm"]', str(radius))
-        window.press(TAB)
+        window.leave()
     window.saved()

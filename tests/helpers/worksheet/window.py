@@ -89,6 +89,16 @@ class Window:
             self.hold(CONTROL, "a")
         self.press(*text)
 
+    def leave(self):
+        """Go on to the next field: what was typed is finished."""
+        self.press(TAB)
+
+    def next(self, text):
+        """Type into the field after this one."""
+        self.leave()
+        time.sleep(self.field)
+        self.press(*text)
+
     def push(self, selector, key=ENTER):
         """A button."""
         self.go(selector)

@@ -156,7 +156,7 @@ def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
     served = serve(turbo / "job.toml")
     window.open(served.address)
     window.type(FIRST, "101")
-    window.press(TAB)
+    window.leave()
     window.saved()
     window.press(TAB, *"102", TAB, TAB, *"103", TAB)
     served.kill()  # two cells may be on their way
@@ -183,7 +183,7 @@ def test_two_windows_on_one_job_lose_nothing(turbo, serve, windows):
         window.open(served.address)
     one.type(FIRST, "90")
     other.type(SECOND, "91")
-    one.press(TAB)
+    one.leave()
     other.wait(lambda: other.text(FIRST) == "90", "the cell of the other window", PUSHED)
     assert other.text(SECOND) == "91"  # not finished, and kept
     assert phases(turbo)[:2] == ["90", "92"]
@@ -193,10 +193,10 @@ def test_two_windows_on_one_job_lose_nothing(turbo, serve, windows):
 
     one.type(FIRST, "50")
     other.type(FIRST, "60")
-    other.press(TAB)
+    other.leave()
     other.saved()
     assert one.text(FIRST) == "50"
-    one.press(TAB)
+    one.leave()
     asked = f'[data-write="{FIRST.split(chr(34))[1]}"]'
     one.wait(lambda: one.texts(asked) == ["Write 50"], "the page asks")
     assert one.texts(asked.replace("write", "keep")) == ["Keep 60"]
