@@ -7,7 +7,7 @@ import re
 import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,18 +22,17 @@ from rotorid.worksheet.settings_cells import changed, setting, settings_in
 from rotorid.worksheet.text_cells import KEYS, Cells, TextCells, kept_ids
 from rotorid.worksheet.workbook_cells import WorkbookVersion
 
-MOST_STEPS = 200
-MOST_TRIES = 5
+MOST_STEPS, MOST_TRIES = 200, 5
 FRESH = 2.0
 """Seconds after a change in which another one may leave a file's time as it is."""
 Contents = Mapping[Path, bytes | None]
-"""What files hold; None: there is none."""
+"""What files hold; None: there is no such file."""
 
 
 class Conflict(ValueError):
     """A cell was changed meanwhile; `now` is what it holds."""
 
-    def __init__(self, message: str, now: Any) -> None:  # noqa: ANN401
+    def __init__(self, message: str, now: Any) -> None:  # noqa: ANN401  any type of JSON
         super().__init__(message)
         self.now = now
 
@@ -43,22 +42,14 @@ class _OutsideError(Exception):
 
 
 class _Step(NamedTuple):
-    """One side of a step of undo: what its files hold, and the ids of the rows of their tables."""
+    """What changed files hold before or after a step, and the ids of their rows."""
 
     data: Contents
-    ids: Mapping[str, Sequence[str]]
+    ids: Mapping[str, list[str]]
 
 
 class FilesVersion:
-    """A job of files as they are at one time; edits change this copy, not the files.
-
-    Parameters
-    ----------
-    job
-        The job file, which may not exist yet.
-    read
-        Gives what a file holds.
-    """
+    """A job of files as `read` gives them; edits change this copy, not the files."""
 
     def __init__(self, job: Path, read: Callable[[Path], bytes | None]) -> None:
         self.job, self._read = job, read
@@ -68,10 +59,9 @@ class FilesVersion:
         self.settings: dict[str, Any] = {}
         self.read_only, self._text = "", self.data[job] or b""
         if self.data[job] is None:  # its first edit writes down the names of the tables that are there
-            self.data |= {job.parent / f"{key}.csv": read(job.parent / f"{key}.csv") for key in KEYS[:2]}
+            self.data |= {path: read(path) for path in (job.parent / f"{key}.csv" for key in KEYS[:2])}
             names = [path.stem for path, data in self.data.items() if data is not None]
-            if "runs" in names:
-                self._text = "".join(f'{name} = "{name}.csv"\n' for name in names).encode()
+            self._text = "".join(f'{name} = "{name}.csv"\n' for name in names if "runs" in names).encode()
         try:
             self.settings = settings_in(self._text)
         except ValueError as error:
@@ -83,49 +73,54 @@ class FilesVersion:
 
     def _open(self, key: str, path: Path) -> None:
         others = [other for other in self.tables if self.paths.get(other) == path]
-        table = Cells(path.name)
         try:
-            if not is_inside(path, self.job.parent):
-                raise ValueError("is not in the folder of the job: copy it there to edit it here")
+            if not _is_inside(path, self.job):
+                raise ValueError(
+                    f"{path.name} is not in the folder of the job: copy it there to edit it here"
+                )
+            self.data[path], self.paths[key] = None, path  # while it cannot be read
             self.data[path] = self._read(path)
-            self.paths[key] = path
             if others:
-                raise ValueError(f"is the table of {others[0]}, too: edit it there")
+                raise ValueError(f"{path.name} is the table of {others[0]}, too: edit it there")
             if path.suffix.lower() in (".toml", *SUFFIXES):
-                raise ValueError("is no text table: it is read as it is, edit it where it comes from")
-            if key in KEYS and (data := self.data[path]) is not None:
+                raise ValueError(
+                    f"{path.name} is no text table: it is read as it is, edit it where it comes from"
+                )
+            if key in KEYS and (data := self.data[path]):
                 self.tables[key] = TextCells(path, data, key)
         except ValueError as error:
-            table.read_only = f"{path.name} {error}"
             if key in KEYS:
-                self.tables[key] = table
+                self.tables[key] = Cells(path.name, str(error))
 
-    def put_setting(self, key: Sequence[str], new: Any) -> None:  # noqa: ANN401  any value of JSON
+    def put_setting(self, key: Sequence[str], new: Any) -> None:  # noqa: ANN401
         """Change, add or (None) remove a setting."""
         self._text = changed(self._text, key, new)
         self.settings = settings_in(self._text)
 
     def create(self, key: str, header: Sequence[str]) -> None:
         """Begin a table in a file that the job names then."""
-        path, folder = self.paths.get(key), self.job.parent
+        path = self.paths.get(key)
         if path is None:
-            names = (f"{key}{number}.csv" for number in ("", *(f"_{n}" for n in range(2, 1000))))
-            path = next(folder / name for name in names if not (folder / name).exists())
+            paths = (
+                self.job.with_name(f"{key}{end}.csv") for end in ("", *(f"_{n}" for n in range(2, 1000)))
+            )
+            path = next(path for path in paths if not path.exists())
             self.put_setting([key], path.name)
         separators = [table.separator for table in self.tables.values() if isinstance(table, TextCells)]
-        line = (separators or [","])[0].join(header)
         # with a mark, because Excel takes a file without it for its own 8-bit encoding
-        table = TextCells(path, f"{line}\n".encode("utf-8-sig"), key)
-        table.ids = ["", ""]
-        self.tables[key], self.paths[key], self.data[path] = table, path, None
+        line = (separators or [","])[0].join(header)
+        self.tables[key] = TextCells(path, f"{line}\n".encode("utf-8-sig"), key)
+        self.paths[key] = path
+        self.data.setdefault(path, None)
+        if self.tables[key].read_only:
+            raise ValueError(self.tables[key].read_only)
 
     def written(self) -> dict[Path, bytes]:
         """The files that are not as they were."""
-        tables = {k: table for k, table in self.tables.items() if isinstance(table, TextCells)}
-        files = {self.paths[key]: table.data() for key, table in tables.items() if not table.read_only}
+        texts = {key: table for key, table in self.tables.items() if isinstance(table, TextCells)}
+        files = {self.paths[key]: table.data() for key, table in texts.items() if not table.read_only}
         files[self.job] = self._text
-        changed_files = {path: data for path, data in files.items() if data != self.data.get(path)}
-        return {} if list(changed_files) == [self.job] and self._text == b"" else changed_files
+        return {path: data for path, data in files.items() if data != (self.data[path] or b"")}
 
 
 Version = FilesVersion | WorkbookVersion
@@ -137,23 +132,19 @@ class JobFiles:
     Parameters
     ----------
     given
-        A job (`.toml` or `.xlsx`), or a folder with one, or with none yet.
-
-    Raises
-    ------
-    ValueError
-        If there is no such file or folder, or several jobs in it.
+        A job (`.toml` or `.xlsx`), or a folder with one, or with none yet; ValueError for any other.
     """
 
     def __init__(self, given: Path) -> None:
-        self.job = job_in(Path(given))
+        self.job = _job_in(Path(given))
         self._ids = itertools.count(1)
         self._known: dict[str, Cells] = {}
         self._stamps: dict[Path, object] = {}
         self._noticed: list[str] = []
         self._done: list[tuple[_Step, _Step]] = []
         self._undone: list[tuple[_Step, _Step]] = []
-        self._take(self._version(self._read, {}))
+        self._now = self._version()
+        self._known = dict(self._now.tables)
 
     def files(self) -> list[Path]:
         """The job and its tables that exist."""
@@ -162,26 +153,13 @@ class JobFiles:
     def state(self) -> dict[str, Any]:
         """What the page shows, in types of JSON."""
         now = self._now
-        tables = {}
-        for key in (key for key in KEYS if key in now.tables):
-            table = now.tables[key]
-            rows = [
-                {"id": table.ids[index], "row": number, "cells": cells}
-                for index, (number, cells) in table.rows.items()
-            ]
-            tables[key] = {
-                "file": table.name,
-                "header": list(table.header),
-                "rows": rows,
-                "read_only": now.read_only or table.read_only,
-            }
         return {
             "job": self.job.name,
             "folder": self.job.absolute().parent.name,
             "exists": now.data[self.job] is not None,
             "kind": "workbook" if is_workbook(self.job) else "files",
             "read_only": now.read_only,
-            "tables": tables,
+            "tables": {key: _shown(now.tables[key], now.read_only) for key in KEYS if key in now.tables},
             "settings": now.settings,
             "undo": bool(self._done),
             "redo": bool(self._undone),
@@ -191,27 +169,22 @@ class JobFiles:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
             folder = self._now.paths.get(key, self.job).resolve().parent
-            if Path(file).name == table.name and Path(file).resolve().parent == folder:
-                for index, (number, _) in table.rows.items():
-                    if number == row:
-                        return key, table.ids[index]
+            if Path(file).name == table.name and (self.job.parent / file).resolve().parent == folder:
+                return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
     def look(self) -> list[str]:
         """Names of the files that another program has changed since the last look."""
-        names, self._noticed = self._noticed, []
         for path, known in self._now.data.items():
             stamp = _stamp(path)
             if stamp is None or stamp != self._stamps.get(path):
-                try:
-                    same = self._read(path) == known
-                except ValueError:  # another program is at it
-                    continue
-                names += [] if same else [path.name]
-                self._stamps[path] = stamp
-        if names:
-            self._take(self._version(self._read, {}))
-        return list(dict.fromkeys(names))
+                with suppress(ValueError):  # another program is at it
+                    if self._read(path) != known:
+                        self._settle({}, {}, {})
+                        break
+                    self._stamps[path] = stamp
+        names, self._noticed = list(dict.fromkeys(self._noticed)), []
+        return names
 
     def apply(self, edits: Sequence[Mapping[str, Any]]) -> list[str | None]:
         """Carry out edits, all or none, as one step of undo; the ids of new rows.
@@ -224,61 +197,46 @@ class JobFiles:
             If an edit is impossible, or a file cannot be written.
         """
         for _ in range(MOST_TRIES):
-            version = self._version(self._read, {})
-            before = {key: list(table.ids) for key, table in version.tables.items()}
-            known = dict(version.data)
+            version = self._version()
+            before = _Step(
+                dict(version.data), {key: list(table.ids) for key, table in version.tables.items()}
+            )
             try:
                 made = [self._edit(version, edit) for edit in edits]
-            except (KeyError, TypeError, AttributeError) as error:
+            except (LookupError, TypeError, AttributeError) as error:
                 raise ValueError(f"an edit of an unknown form: {error}") from error
-            files = version.written()
+            after = _Step(version.written(), {key: table.ids for key, table in version.tables.items()})
             try:
-                self._write(files, known)
+                self._write(after.data, before.data)
             except _OutsideError:
                 continue
-            names = [path.name for path, data in known.items() if data != self._now.data.get(path, data)]
-            self._noticed += names
-            after = {key: list(table.ids) for key, table in version.tables.items()}
-            self._take(self._version(partial(self._known_or_read, known | files), after))
-            if files:
-                old: Contents = {path: known.get(path) for path in files}
-                self._done = [*self._done, (_Step(old, before), _Step(files, after))][-MOST_STEPS:]
-                self._undone = []
+            self._settle(before.data, after.data, after.ids)
+            if after.data:
+                before = before._replace(data={path: before.data.get(path) for path in after.data})
+                self._done, self._undone = [*self._done[1 - MOST_STEPS :], (before, after)], []
             return made
         raise ValueError("another program goes on changing the files of the job: try again in a moment")
 
     def undo(self) -> None:
         """Take the last step back; ValueError where that is impossible."""
-        if not self._done:
-            raise ValueError("there is nothing to undo")
-        before, after = self._done[-1]
-        self._go(after, before, "undone")
-        self._undone.append(self._done.pop())
+        self._go(self._done, self._undone, "undo", 0)
 
     def redo(self) -> None:
-        """Take the last step that was undone again; ValueError where that is impossible."""
-        if not self._undone:
-            raise ValueError("there is nothing to redo")
-        before, after = self._undone[-1]
-        self._go(before, after, "redone")
-        self._done.append(self._undone.pop())
+        """Do the last step that was undone again; ValueError where that is impossible."""
+        self._go(self._undone, self._done, "redo", 1)
 
-    def _go(self, here: _Step, there: _Step, done: str) -> None:
-        for path, data in here.data.items():
-            if self._read(path) != data:
-                raise ValueError(
-                    f"{path.name} was changed by another program after that step, which cannot be {done}"
-                )
+    def _go(
+        self, steps: list[tuple[_Step, _Step]], others: list[tuple[_Step, _Step]], word: str, to: int
+    ) -> None:
+        if not steps:
+            raise ValueError(f"there is nothing to {word}")
+        here, there = steps[-1][1 - to], steps[-1][to]
         try:
             self._write(there.data, here.data)
-        except _OutsideError:
-            raise ValueError("another program has just changed the files: try again") from None
-        version = self._version(self._read, {})
-        ids = {key: ids for key, ids in there.ids.items() if version.paths.get(key) in there.data}
-        self._take(self._version(self._read, ids))
-
-    def _known_or_read(self, known: Contents, path: Path) -> bytes | None:
-        return known[path] if path in known else self._read(path)
+        except _OutsideError as error:
+            raise ValueError(f"{error} was changed by another program after that step: no {word}") from None
+        self._settle(here.data, there.data, there.ids)
+        others.append(steps.pop())
 
     def _read(self, path: Path) -> bytes | None:
         try:
@@ -288,109 +246,114 @@ class JobFiles:
         except OSError as error:
             raise ValueError(f"{path.name} cannot be read ({error.strerror or error})") from error
 
-    def _version(self, read: Callable[[Path], bytes | None], ids: Mapping[str, Sequence[str]]) -> Version:
-        version = (WorkbookVersion if is_workbook(self.job) else FilesVersion)(self.job, read)
+    def _version(self, files: Contents | None = None, ids: Mapping[str, list[str]] | None = None) -> Version:
+        """The job as it is on disk; `ids` of tables in `files`, which have just been written, are known."""
+        version = (WorkbookVersion if is_workbook(self.job) else FilesVersion)(self.job, self._read)
         for key, table in version.tables.items():
-            given = ids.get(key, ())
-            fits = len(given) == len(table.lines) and all(given)
-            table.ids = list(given) if fits else kept_ids(self._known.get(key), table.lines, self._new_id)
+            known = (ids or {}).get(key, []) if version.paths.get(key) in (files or {}) else []
+            fits = len(known) == len(table.lines) and all(known)
+            table.ids = list(known) if fits else kept_ids(self._known.get(key), table.lines, self._ids)
         return version
 
-    def _new_id(self) -> str:
-        return str(next(self._ids))
-
-    def _take(self, version: Version) -> None:
-        self._now = version
-        self._known |= version.tables
+    def _settle(self, known: Contents, files: Contents, ids: Mapping[str, list[str]]) -> None:
+        """Take what is on disk, where `files` replaced `known`; notice what another program has changed."""
+        was = self._now.data
+        self._now = self._version(files, ids)
+        self._known |= {key: table for key, table in self._now.tables.items() if table.lines}
+        expected = {**self._now.data, **was, **known, **files}
+        outside = [path for path, data in known.items() if data != was.get(path, data)]
+        outside += [path for path, data in self._now.data.items() if data != expected[path]]
+        self._noticed += [path.name for path in outside]
 
     def _write(self, files: Contents, known: Contents) -> None:
         """Replace files, if they still hold what is known of them; None removes one."""
         for path in files:
-            if not is_inside(path, self.job.parent):
+            if not _is_inside(path, self.job):
                 raise ValueError(f"{path.name} is not in the folder of the job")
             for name, program in ((f"~${path.name}", "Excel"), (f".~lock.{path.name}#", "LibreOffice")):
                 if path.with_name(name).exists():
-                    raise ValueError(_is_open(path, program, f" (if it is not open, delete {name})"))
+                    raise ValueError(_is_open(path, program, f" (if it is not, delete {name})"))
 
         def last_look() -> None:
-            if any(self._read(path) != known.get(path) for path in files):
-                raise _OutsideError
+            for path in files:
+                if self._read(path) != known.get(path):
+                    raise _OutsideError(path.name)
 
         kept = {path: data for path, data in files.items() if data is not None}
         try:
+            last_look()
             write_files(kept, last_look)
-            if not kept:
-                last_look()
             for path in files.keys() - kept.keys():
                 path.unlink(missing_ok=True)
         except (InputError, PermissionError) as error:
+            done = [path for path in kept if kept[path] == self._read(path) != known.get(path)]
+            write_files({path: data for path in done if (data := known.get(path)) is not None})
             if isinstance(error.__cause__ or error, PermissionError):
-                raise ValueError(_is_open(next(iter(kept or files)), "Excel", " or is protected")) from error
+                raise ValueError(_is_open(next(iter(files)), "Excel", " or protected")) from error
             raise
-        finally:
-            for path in files:
-                self._stamps.pop(path, None)
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:
             raise ValueError(version.read_only)
         if "key" in edit:
-            self._set(version, [str(part) for part in edit["key"]], edit)
+            key, new = [str(part) for part in edit["key"]], edit["new"]
+            if not _is_done(setting(version.settings, key), new, edit, ".".join(key)):
+                version.put_setting(key, new)
             return None
-        key = edit["create"] if "create" in edit else edit["table"]
         if "create" in edit:
-            header = [str(name) for name in edit["header"]]
-            if key not in KEYS or key in version.tables or not all(re.fullmatch(r"\w+", n) for n in header):
-                raise ValueError(f"a table {key!r} cannot be made: there is one, or it has no such columns")
-            version.create(key, header)
+            known = edit["create"] in KEYS and edit["create"] not in version.tables
+            if not known or not all(re.fullmatch(r"\w+", name) for name in edit["header"]):
+                raise ValueError(
+                    f"a table {edit['create']!r} cannot be made: there is one, or none of this name"
+                )
+            version.create(edit["create"], edit["header"])
+            table = version.tables[edit["create"]]
+            table.ids = kept_ids(None, table.lines, self._ids)
             return None
-        if key not in version.tables:
-            raise ValueError(f"the job has no table {key!r}")
-        table = version.tables[key]
+        table = version.tables[edit["table"]]
         if table.read_only:
             raise ValueError(table.read_only)
-        if "row" in edit:
-            _put(table, edit)
-        elif "delete" in edit:
-            index = _index(table, edit["delete"])
-            now = table.cells(index)
-            if "old" in edit and now != edit["old"]:
-                raise Conflict(f"a row of {table.name} was changed meanwhile: it is not deleted", now)
-            table.delete(index)
-        else:
-            row_id, after = self._new_id(), edit.get("after")
+        if "cells" in edit:
+            row_id, after = str(next(self._ids)), table.index(edit.get("after"))
             cells = {name: str(text) for name, text in edit["cells"].items()}
-            table.insert(table.ids.index(after) if after in table.ids else table.end, cells, row_id)
+            table.insert(table.end if after is None else after, cells, row_id)
             return row_id
+        index = table.index(edit.get("row") or edit["delete"])
+        if index is None:
+            raise Conflict(f"a row of {table.name} is not there any more", None)
+        now = table.cells(index)
+        if "delete" in edit:
+            _is_done(now, None, edit, f"a row of {table.name}")
+            table.delete(index)
+            return None
+        place, column, new = table.column(edit["column"]), edit["column"], clean(str(edit["new"]))
+        said = {"old": clean(str(edit["old"]))} if "old" in edit else {}
+        if not _is_done(now[place], new, said, f"{column} in a row of {table.name}"):
+            table.put(index, column, new)
         return None
 
-    def _set(self, version: Version, key: Sequence[str], edit: Mapping[str, Any]) -> None:
-        now, new = setting(version.settings, key), edit["new"]
-        if now == new:
-            return
-        if "old" in edit and now != edit["old"]:
-            raise Conflict(f"{'.'.join(key)} was changed meanwhile: it is {now!r} now", now)
-        version.put_setting(key, new)
+
+def _is_done(now: Any, new: Any, edit: Mapping[str, Any], what: str) -> bool:  # noqa: ANN401
+    """Whether a value is the new one already; Conflict if it is not the old one either."""
+    if now != new and now != edit.get("old", now):
+        raise Conflict(
+            f"{what} was changed meanwhile: {'nothing' if now is None else now!r} is there now", now
+        )
+    return bool(now == new)
 
 
-def _put(table: Cells, edit: Mapping[str, Any]) -> None:
-    index, column, new = _index(table, edit["row"]), str(edit["column"]), clean(str(edit["new"]))
-    now = table.cells(index)[table.column(column)]
-    if now == new or now.replace(",", ".") == new.replace(",", ".") != clean(str(edit["old"])):
-        return
-    if now != clean(str(edit["old"])):
-        raise Conflict(f"{column} in a row of {table.name} was changed meanwhile: it is {now!r} now", now)
-    table.put(index, column, new)
-
-
-def _index(table: Cells, row_id: str) -> int:
-    if row_id not in table.ids:
-        raise Conflict(f"the row of {table.name} is not there any more", None)
-    return table.ids.index(row_id)
+def _shown(table: Cells, read_only: str) -> dict[str, Any]:
+    rows = [{"id": table.ids[i], "row": number, "cells": cells} for i, (number, cells) in table.rows.items()]
+    why = read_only or table.read_only
+    return {"file": table.name, "header": list(table.header), "rows": rows, "read_only": why}
 
 
 def _is_open(path: Path, program: str, hint: str) -> str:
-    return f"{path.name} is open in {program}{hint}: close it there, then type again; nothing was changed"
+    return f"{path.name} is open in {program}{hint}: close it there, then try again; nothing was changed"
+
+
+def _is_inside(path: Path, job: Path) -> bool:
+    return path.resolve().is_relative_to(job.absolute().parent.resolve())
 
 
 def _stamp(path: Path) -> object:
@@ -403,24 +366,14 @@ def _stamp(path: Path) -> object:
     return (found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino) if old else None
 
 
-def is_inside(path: Path, folder: Path) -> bool:
-    """Whether a file, behind its links, is in a folder."""
-    return path.resolve().is_relative_to(folder.resolve())
-
-
-def job_in(given: Path) -> Path:
-    """The job of a worksheet: the file that is given, or the only one of a folder, or one to be made.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or several.
-    """
+def _job_in(given: Path) -> Path:
+    """The file that is given, or the only job of a folder, or one to be made there, and the folder, too."""
+    if not given.suffix and not given.exists() and given.parent.is_dir():
+        given.mkdir()
     if not given.is_dir():
-        if given.suffix.lower() not in (".toml", *SUFFIXES):
-            raise ValueError(f"{given}: a folder or a job (.toml or .xlsx) is needed")
-        if not given.is_file() and (is_workbook(given) or not given.parent.is_dir()):
-            raise ValueError(f"{given}: there is no such file")
+        there = given.is_file() or (given.suffix.lower() == ".toml" and given.parent.is_dir())
+        if given.suffix.lower() not in (".toml", *SUFFIXES) or not there:
+            raise ValueError(f"{given}: expected a folder, or a job (.toml or .xlsx) that exists")
         return given
     found = [path for path in sorted(given.iterdir()) if path.name[0] not in "~." and _is_job(path)]
     if len(found) > 1:
@@ -434,11 +387,7 @@ def _is_job(path: Path) -> bool:
     try:
         if path.suffix.lower() == ".toml":
             return isinstance(settings_in(file_content(path)).get("runs"), str)
-        if is_workbook(path):
-            with zipfile.ZipFile(path) as archive:
-                return (
-                    re.search(rb'<sheet [^>]*name="runs"', archive.read("xl/workbook.xml"), re.I) is not None
-                )
+        with zipfile.ZipFile(path) as archive:
+            return bool(re.search(rb'(?i)<sheet [^>]*name="runs"', archive.read("xl/workbook.xml")))
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
-        pass
-    return False
+        return False

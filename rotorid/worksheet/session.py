@@ -41,7 +41,7 @@ class Session:
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.aside = Worker(), Worker()
+        self.front, self.aside = (Worker(files.job.absolute().parent) for _ in range(2))
         self._of_files = 1
         self._notice = ""
         self._results = dict(_NOTHING)
@@ -94,7 +94,7 @@ class Session:
 
     def about(self) -> dict[str, Any]:
         """What a request to a worker says of the job."""
-        return {"job": str(self.files.job), "version": self._of_files}
+        return {"job": self.files.job.name, "version": self._of_files}
 
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
@@ -175,8 +175,10 @@ class Session:
         """A problem of a file, with the cell of the page."""
         row = problem["row"]
         table, place = (row and self.files.place(problem["file"], row)) or (None, None)
-        words = {key: problem[key] for key in ("column", "text")}
-        return {"table": table, "row": place, **words, "missing": not problem["value"]}
+        column, text = problem["column"], problem["text"]
+        if (row, column) == (None, "weights"):
+            text = "no trial run yet"
+        return {"table": table, "row": place, "column": column, "text": text, "missing": not problem["value"]}
 
     def _outside(self, settings: dict[str, Any]) -> str:
         """What the job names outside of its folder; the worksheet reads nothing there."""

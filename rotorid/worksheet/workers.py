@@ -7,6 +7,7 @@ import contextlib
 import json
 import sys
 from asyncio.subprocess import PIPE, Process
+from pathlib import Path
 from typing import Any
 
 GRACE = 0.3
@@ -30,18 +31,20 @@ class Refused(ValueError):
 
 
 class Worker:
-    """One process of `calculation`, one request at a time."""
+    """One process of `calculation` in the folder of a job, one request at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self._process: Process | None = None
         self._lock = asyncio.Lock()
 
     async def start(self) -> Process:
         """Start it where it does not run; it imports what it needs with the first request."""
         if self._process is None or self._process.returncode is not None:
-            command = sys.executable, "-m", "rotorid.worksheet.calculation"
+            # -P: what lies in the folder of a job is no module
+            command = sys.executable, "-P", "-m", "rotorid.worksheet.calculation"
             self._process = await asyncio.create_subprocess_exec(
-                *command, stdin=PIPE, stdout=PIPE, limit=_LONGEST
+                *command, stdin=PIPE, stdout=PIPE, limit=_LONGEST, cwd=self._folder
             )
         return self._process
 

@@ -87,7 +87,7 @@ class RunsSoFar:
         }
 
     def _effect(self, run: str) -> dict[str, Any] | None:
-        """What a run changes where the baseline is largest, in words; None before there are both."""
+        """The largest change that a run makes, in words; None before there are readings of both."""
         from scipy.special import chdtri
 
         from balancing.coefficients.trial_effects import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
@@ -97,7 +97,7 @@ class RunsSoFar:
         found = [(one, made) for one in self.channels if (made := one.change(self.baseline, run))]
         if not found:
             return None
-        channel, (start, change, errors) = max(found, key=lambda one: abs(one[1][0]))
+        channel, (start, change, errors) = max(found, key=lambda one: abs(one[1][1]))
         seen = any(made[2] ** 2 > float(chdtri(2, 0.05 / len(found))) for _, made in found)
         large = any(
             not start
@@ -106,20 +106,22 @@ class RunsSoFar:
             for _, (start, change, _) in found
         )
         level = LEVELS[seen * (1 + large)]
-        where = f"{channel.sensor} at {channel.trials.labels.speed_words(float(channel.trials.speeds[0]))}"
+        labels = channel.trials.labels
+        where = f"{channel.sensor} at {labels.speed_words(float(channel.trials.speeds[0]))}"
         share = 100 * abs(change) / abs(start) if start else None
-        amount = "from rest" if share is None else f"by {figures(share, 3)} % of its reading"
+        amount = labels.amplitude_words(abs(change))
+        amount += "" if share is None else f", {figures(share, 3)} % of its reading"
         verdict = {
             "none": "no more than the errors explain: a larger weight is needed",
-            "weak": "less than 30 % and 30° everywhere: a larger weight would make the answer more certain",
-            "good": f"{figures(errors, 2)} times its error",
+            "weak": "nowhere by 30 % or 30°: a larger weight would make the answer more certain",
+            "good": f"{figures(errors, 2)} times the errors of the readings",
         }[level]
         return {
             "run": run,
             "share_percent": share,
             "where": where,
             "level": level,
-            "words": f"changes {where} {amount}, {verdict}",
+            "words": f"changes {where} by {amount}; {verdict}",
         }
 
     def figure(self, speed: str, sensor: str) -> Figure:

@@ -1,11 +1,11 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
 
-For tests: data-cell="runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; "|2" behind it: its second repeat),
-"weights|ROWID|COLUMN" of a weight ("check_weights|…"); data-key of an input: key of the job file,
-"planes.left.radius_mm"; data-key of a .value: path in the document, "corrections.0.mass", its number in
-data-value, the document in data-doc around it (answer, pieces, trim). data-run: card of a run, .gauge[data-run] its
-effect; data-type, data-remove, data-add, data-import: its buttons; data-keep, data-write: buttons at a refused
-cell. Ids: those of index.html, and convention-lead-with (…), add-check, check-others, missing, drop-empty. */
+For tests: data-cell is "runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": second
+repeat) or "weights|ROWID|COLUMN" of a weight ("check_weights|…"). data-key is the key of the job of an input, or
+the path in the document of a .value, "corrections.0.mass", with its number in data-value and the document in
+data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge; data-type, data-remove,
+data-add, data-import: its buttons; data-keep, data-write: buttons at a refused cell. Other ids than those of
+index.html: convention-lead-with (…), add-check, check-others, missing, drop-empty. */
 
 const $ = (id) => document.getElementById(id);
 let token = location.hash.slice(1);
@@ -17,7 +17,6 @@ let online = true;
 let said = "all is saved";
 
 /* Elements: `h` describes one, `patch` makes children so; focus and what is being typed stay. */
-
 const h = (tag, props, ...children) => ({ tag, props, children: children.flat(4).filter((one) => one) });
 
 function patch(parent, nodes) {
@@ -28,35 +27,27 @@ function patch(parent, nodes) {
     const child = kept.get(keys[i]) || (node.tag ? document.createElement(node.tag) : new Text());
     child.vKey = keys[i];
     if (parent.childNodes[i] !== child) parent.insertBefore(child, parent.childNodes[i] || null);
-    if (node.tag) update(child, node);
-    else if (child.data !== node) child.data = node;
+    if (!node.tag && child.data !== node) child.data = node;
+    if (node.tag && !node.props.own) patch(child, node.children); // others fill an `own` one
+    for (const [name, value] of Object.entries(node.props || {})) put(child, name, value);
   });
 }
 
-function update(element, { props, children }) {
-  if (!props?.own) patch(element, children); // others fill an `own` one
-  for (const [name, value] of Object.entries(props || {})) {
-    if (name === "cell" || name === "onclick") element[name] = value;
-    else if (name === "value") setValue(element, value);
-    else if (value === null || value === undefined) element.removeAttribute(name);
-    else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
-  }
+function put(element, name, value) {
+  if (name === "value" && element.value !== (element.saved ?? element.value)) return; // somebody types here
+  if (name === "value") element.value = element.saved = value;
+  else if (name === "cell" || name === "onclick") element[name] = value;
+  else if (value === null || value === undefined) element.removeAttribute(name);
+  else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
 }
-
-function setValue(element, value) {
-  if (element.saved !== undefined && element.value !== element.saved) return; // somebody is typing here
-  if (element.value !== value) element.value = value;
-  element.saved = value;
-}
-
 const show = (id, ...nodes) => patch($(id), h("", {}, nodes).children);
 const tell = (text) => show("message", text && h("p", {}, text.message || text));
 const button = (text, onclick, props) => h("button", { type: "button", onclick, ...props }, text);
-const table = (heads, rows) => h("div", { class: "scroll" }, h("table", {}, h("thead", {}, heads.map((line) =>
-  h("tr", {}, line.map(([text, colspan]) => h("th", { colspan }, text || "\u00a0"))))), h("tbody", {}, rows)));
+const heading = (line) => h("tr", {}, line.map(([text, colspan]) => h("th", { colspan }, text || "\u00a0")));
+const table = (heads, rows) => h("div", { class: "scroll" },
+  h("table", {}, h("thead", {}, heads.map(heading)), h("tbody", {}, rows)));
 
 /* The server. What changes the job is sent one after the other, and again when the program was away. */
-
 async function ask(path, body) {
   const headers = { "X-Rotorid-Token": token, "Content-Type": "application/json" };
   const answer = await fetch(path, { headers, ...(body && { method: "POST", body: JSON.stringify(body) }) });
@@ -74,20 +65,18 @@ async function refresh(after) {
   render();
 }
 
-async function away(problem) {
+async function away({ status }) {
   online = false;
   renderHeader();
-  const why = token ? "This page belongs to a program that has ended." : "This address lacks its token.";
-  if (problem.status === 403) tell(`${why} Open the address that “rotorid worksheet” shows now.`);
+  if (status === 403) tell("This address is of no running worksheet: open the one that the program shows.");
   await new Promise((resolve) => setTimeout(resolve, 1000));
 }
 
-function send(path, body) {
+const send = (path, body) => new Promise((done, failed) => {
   tell("");
-  return new Promise((done, failed) => {
-    if (queue.push({ path, body, done, failed }) === 1) drain();
-  });
-}
+  if (queue.push({ path, body, done, failed }) === 1) drain();
+});
+const edit = (...edits) => send("/edit", { edits }).catch(tell);
 
 async function drain() {
   for (; queue.length; renderHeader()) {
@@ -105,41 +94,39 @@ async function drain() {
   }
 }
 
-const edit = (...edits) => send("/edit", { edits }).catch(tell);
-
-/* Changes {cell, old, text} of cells, as one step. */
+/* Changes {cell, old, text} of cells, as one step; what was refused before replaces what is there now. */
 function save(changes) {
-  const edits = changes.map(({ cell: { path, table: name, row, column }, old, text }) => path
-    ? { key: path, old: jsonOf(path, old), new: jsonOf(path, text) }
-    : { table: name, row, column, old, new: text });
-  for (const change of changes) typed.set(change.cell.key, change);
-  const forget = () => changes.filter(({ cell }) => changes.includes(typed.get(cell.key)))
-    .forEach(({ cell }) => typed.delete(cell.key));
-  const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes });
-  send("/edit", { edits }).then(forget, refuse).then(render);
+  const again = changes.some(({ cell }) => typed.get(cell.key)?.why);
+  const edits = changes.map(({ cell, old: shown, text }) => {
+    const { path, table: name, row, column } = cell;
+    const old = again ? textNow(cell) : shown;
+    return path ? { key: path, old: jsonOf(path, old), new: jsonOf(path, text) }
+      : { table: name, row, column, old, new: text };
+  });
+  const drop = () => changes.forEach((one) => typed.get(one.cell.key) === one && typed.delete(one.cell.key));
+  const refuse = ({ message, now }) => Object.assign(changes[0], { why: message, now, changes, drop });
+  changes.forEach((one) => typed.set(one.cell.key, one));
+  send("/edit", { edits }).then(drop, refuse).then(render);
 }
 
 /* The tables of the job. */
-
 const number = (text) => Number(String(text).trim().replace(",", "."));
 const each = (values) => [...new Set(values)].filter((value) => value);
 const listOf = (text, by = /[,;]/) => each(text.split(by).map((one) => one.trim()));
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
-const unitOf = (column) => (column || "").replace(/^(amplitude|speed|mass|unbalance)_?/, "").replace("um", "µm")
-  .replace(/_(pp|rms)$/, " $1").replace(/(m|in)_s/, "$1/s").replace("_", "·");
+const unitOf = (column) => (column || "").replace(/^(amplitude|speed|mass|unbalance)_?/, "")
+  .replace("um", "µm").replace(/_(pp|rms)$/, " $1").replace(/(m|in)_s/, "$1/s").replace("_", "·");
 
 function read({ header, rows, read_only: closed }) {
   const times = {};
   const named = (cells) => Object.fromEntries(header.map((name, i) => [whatOf(name), cells[i] || ""]));
-  const found = rows.map(({ id, cells }) => {
-    const row = { ...named(cells), id, cells };
-    const place = `${row.run}|${row.speed}|${row.sensor}`;
-    times[place] = (times[place] || 0) + 1;
-    return { ...row, time: times[place] };
-  });
-  return { header, rows: found, closed, names: named(header) };
+  const placed = (row) => {
+    const time = (times[[row.run, row.speed, row.sensor]] ||= []).push(row);
+    return { ...row, place: time > 1 ? `${row.speed} (${time})` : row.speed };
+  };
+  const found = rows.map(({ id, cells }) => placed({ ...named(cells), id, cells }));
+  return { header, closed, names: named(header), rows: found };
 }
-
 const allRows = (...tables) => tables.flatMap((name) => data[name]?.rows || []);
 const rowsOf = (name, run) => allRows(name).filter((row) => row.run === run);
 const valuesOf = (what, ...tables) => each(allRows(...tables).map((row) => row[what]));
@@ -148,75 +135,66 @@ const runs = () => valuesOf("run", "runs", "weights");
 const planes = () => each([...Object.keys(state.settings.planes || {}), ...valuesOf("plane", "weights")]);
 const baseline = () =>
   state.results.runs?.baseline || runs().find((run) => !rowsOf("weights", run).length) || "baseline";
-const usual = () => rowsOf("runs", baseline()).filter((row) => row.time === 1);
+const usual = () => rowsOf("runs", baseline()).filter((row) => row.place === row.speed);
 const remove = (name, rows) => rows.map((row) => ({ table: name, delete: row.id, old: row.cells }));
 const add = (name, cells, after = null) => ({ table: name, after, cells });
-const addRows = (name, run, places, speedName = data.runs?.names.speed) =>
+const create = (name, { header }) => ({ create: name, header });
+const addRows = (name, run, places, speedName = data.runs.names.speed) =>
   places.map(({ speed, sensor }) => add(name, { run, [speedName]: speed, sensor }));
 
 function cellOf(name, row, what, more) {
   const column = data[name].names[what];
-  const place = row.sensor ? [row.run, row.speed, row.sensor, column] : [row.id, column];
-  const key = [name, ...place, ...(row.sensor && row.time > 1 ? [row.time] : [])].join("|");
-  return { key, table: name, row: row.id, what, column, text: row[what], label: `${what}, ${row.run}, ${more}` };
+  const key = [name, ...(row.sensor ? [row.run, row.place, row.sensor] : [row.id]), column].join("|");
+  const label = `${what}, ${row.run}, ${more}`;
+  return { key, table: name, row: row.id, what, column, text: row[what], label };
 }
 
 /* Values of the job file: numbers, words, lists "5; 10", values by speed "3000: 20; 4500: 30". */
-
-const settingOf = (path) => path.reduce((one, key) => one?.[key], state.settings);
-
-function textOf(value) {
-  if (value === null || typeof value !== "object") return String(value ?? "");
-  return (Array.isArray(value) ? value : Object.entries(value).map((pair) => pair.join(": "))).join("; ");
-}
+const at = (doc, path) => path.reduce((one, key) => one?.[key], doc);
+const textOf = (value) => value === null || typeof value !== "object" ? String(value ?? "")
+  : (Array.isArray(value) ? value : Object.entries(value).map((pair) => pair.join(": "))).join("; ");
 
 function jsonOf(path, text) {
+  const now = at(state.settings, path);
   const one = (word) => (Number.isNaN(number(word)) ? word.trim() : number(word));
   const parts = listOf(text, /;/);
-  if (text === textOf(settingOf(path))) return settingOf(path) ?? null;
+  if (text === textOf(now)) return now ?? null;
   if (text.includes(":")) return Object.fromEntries(parts.map((part) => part.split(":").map(one)));
   if (parts.length > 1 || (text && /^(available|stock|holes_)/.test(path.at(-1)))) return parts.map(one);
   return text ? one(text) : null;
 }
 
-function setting(above, begin, usualName, label) {
-  const name = Object.keys(settingOf(above) || {}).find((key) => key.startsWith(begin)) || usualName;
-  const path = [...above, name];
-  return { key: path.join("."), path, text: textOf(settingOf(path)), label: `${label}, ${above[1]}` };
+function setting(top, begin, usualName, label) {
+  const known = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
+  const path = [...top, known || usualName];
+  return { key: path.join("."), path, text: textOf(at(state.settings, path)), label: `${label}, ${top[1]}` };
 }
 
 /* Cells to type in. */
-
 const problems = (missing) => state.results.problems.filter((one) => one.missing === missing);
 const idOf = (cell) => encodeURIComponent(cell.key);
-const textNow = (cell) => cell.path ? textOf(settingOf(cell.path))
+const textNow = (cell) => cell.path ? textOf(at(state.settings, cell.path))
   : allRows(cell.table).find((row) => row.id === cell.row)?.[cell.what] ?? "";
-const whyOf = ({ key, table: name, row, column }) => typed.get(key)?.why || (row && problems(false).find((one) =>
-  one.table === name && one.row === row && (one.column || column) === column)?.text);
+const isAt = (problem, { table: name, row, column }) =>
+  row && problem.table === name && problem.row === row && (problem.column || column) === column;
+const whyOf = (cell) => typed.get(cell.key)?.why || problems(false).find((one) => isAt(one, cell))?.text;
 
-function field(cell) {
-  const why = whyOf(cell);
-  return h("input", {
-    id: idOf(cell), cell, value: typed.get(cell.key)?.text ?? cell.text, "aria-label": cell.label,
-    [cell.path ? "data-key" : "data-cell"]: cell.key, "data-at": `${cell.table} ${cell.row} ${cell.column}`,
-    inputmode: cell.list ? "text" : "decimal", list: cell.list, autocomplete: "off",
-    disabled: state.read_only || data[cell.table]?.closed ? "" : null,
-    "aria-invalid": why ? "true" : null, "aria-describedby": why ? `why-${idOf(cell)}` : null,
-  });
-}
+const field = (cell, why = whyOf(cell)) => h("input", {
+  id: idOf(cell), cell, value: typed.get(cell.key)?.text ?? cell.text, "aria-label": cell.label,
+  [cell.path ? "data-key" : "data-cell"]: cell.key, "data-at": `${cell.table} ${cell.row} ${cell.column}`,
+  inputmode: cell.list ? "text" : "decimal", list: cell.list, autocomplete: "off",
+  disabled: state.read_only || data[cell.table]?.closed ? "" : null,
+  "aria-invalid": why ? "true" : null, "aria-describedby": why ? `why-${idOf(cell)}` : null,
+});
 
 function whyLine(cell) {
-  const { changes, now, text = "" } = typed.get(cell.key) || {};
-  const quoted = (word) => word || "nothing";
-  const keep = () => {
-    changes.forEach((change) => typed.delete(change.cell.key));
-    render();
-  };
-  const write = () => save(changes.map((one) => ({ cell: one.cell, text: one.text, old: textNow(one.cell) })));
+  const { changes, now, drop, text: mine = "" } = typed.get(cell.key) || {};
+  const theirs = textNow(cell);
+  const write = () => save(changes.map((one) => ({ cell: one.cell, text: one.text })));
   return h("p", { key: cell.key, class: "why", id: `why-${idOf(cell)}` }, `${cell.label}: `, now === undefined
-    ? whyOf(cell) : `another window (or program) wrote ${quoted(now)} here; you typed ${quoted(text)}. `,
-  changes && [button(`Keep ${quoted(textNow(cell))}`, keep, { "data-keep": cell.key }),
-    button(`Write ${quoted(text)}`, write, { "data-write": cell.key })]);
+    ? whyOf(cell) : `another window (or program) wrote “${theirs}” here; you typed “${mine}”. `,
+  changes && button(`Keep “${theirs}”`, () => render(drop()), { "data-keep": cell.key }),
+  changes && button(`Write “${mine}”`, write, { "data-write": cell.key }));
 }
 
 /* A table of cells; each line is [heading, cells, what stands behind them]. */
@@ -225,35 +203,33 @@ function cellTable(heads, lines) {
     h("th", { scope: "row" }, head), cells.map((cell) => h("td", {}, cell ? field(cell) : "–")),
     behind && h("td", {}, behind)));
   const wrong = lines.flatMap((line) => line[1]).filter((cell) => cell && whyOf(cell));
-  return h("div", { key: lines[0]?.[1][0]?.key }, table(heads, rows), wrong.map(whyLine));
+  return lines.length > 0 && h("div", {}, table(heads, rows), wrong.map(whyLine));
 }
 
 function grid(name, run) {
-  const { amplitude, speed: speedName } = data[name].names;
-  const own = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed) || a.time - b.time);
-  const lines = each(own.map(({ speed, time }) => `${speed}|${time}`)).map((place) => {
-    const [speed, time] = place.split("|");
-    const label = `${speed} ${unitOf(speedName)}${time > 1 ? `, repeat ${time}` : ""}`;
-    return [speed, sensors().flatMap((sensor) => {
-      const row = own.find((one) => one.sensor === sensor && `${one.speed}|${one.time}` === place);
-      return ["amplitude", "phase"].map((what) => row && cellOf(name, row, what, `${sensor}, ${label}`));
-    })];
-  });
+  const { amplitude, speed } = data[name].names;
+  const own = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed));
+  const lines = each(own.map((row) => row.place)).map((place) => [place, sensors().flatMap((sensor) => {
+    const row = own.find((one) => one.sensor === sensor && one.place === place);
+    const label = `${sensor}, ${place} ${unitOf(speed)}`;
+    return ["amplitude", "phase"].map((what) => row && cellOf(name, row, what, label));
+  })]);
   const units = sensors().flatMap(() => [[unitOf(amplitude)], ["°"]]);
-  return cellTable([[[unitOf(speedName)], ...sensors().map((sensor) => [sensor, 2])], [[""], ...units]], lines);
+  return cellTable([[[unitOf(speed)], ...sensors().map((sensor) => [sensor, 2])], [[""], ...units]], lines);
 }
 
 function weights(name, run) {
   const own = rowsOf(name, run);
   const lines = own.map((row, i) => {
-    const cells = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, `weight ${i + 1}`));
-    cells[0].list = "planes";
-    const label = { "aria-label": `Remove weight ${i + 1} of ${run}` };
-    return [`${i + 1}`, cells, button("Remove", () => edit(...remove(name, [row])), label)];
+    const label = `weight ${i + 1}`;
+    const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, label));
+    const drop = () => edit(...remove(name, [row]));
+    return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
+      button("Remove", drop, { "aria-label": `Remove ${label} of ${run}` })];
   });
-  const heads = [["Mounted"], ["plane"], [unitOf(data[name].names.weight)], ["at °"], [""]];
-  return [own.length > 0 && cellTable([heads], lines),
-    button("Add a weight", () => edit(add(name, { run }, own.at(-1)?.id)), { "data-add": run })];
+  const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
+  const another = () => edit(add(name, { run }, own.at(-1)?.id));
+  return [cellTable([heads], lines), button("Add a weight", another, { "data-add": run })];
 }
 
 function card(name, run) {
@@ -261,81 +237,82 @@ function card(name, run) {
   const free = run === baseline();
   const all = () => [...remove(name, rowsOf(name, run)), ...remove(mounted, rowsOf(mounted, run))];
   const drop = () => confirm(`Remove ${run} with its readings and weights?`) && edit(...all());
+  const type = () => edit(...addRows(name, run, usual()));
   return h("article", { key: run, "data-run": run }, !free && h("h3", {}, run),
     !free && data[mounted] && weights(mounted, run),
-    rowsOf(name, run).length ? grid(name, run)
-      : button("Type its readings", () => edit(...addRows(name, run, usual())), { "data-type": run }),
+    grid(name, run) || button("Type its readings", type, { "data-type": run }),
     name === "runs" && h("label", { class: "button" }, "Take from a file…",
       h("input", { type: "file", class: "unseen", "data-import": run })),
     !free && button("Remove this run", drop, { "data-remove": run }));
 }
 
 /* The steps. */
-
 function renderMachine() {
   const column = data.weights?.names.weight || $("setup-weight-unit").value;
   const unit = unitOf(column);
+  const pieces = column.replace(/mass|unbalance/, "available");
   const keys = [["max_", `max_${column}`, `largest, ${unit}`], ["radius_", "radius_mm", "radius, mm"],
-    ["holes", "holes", "holes"], ["first_hole", "first_hole_deg", "first hole, °"], ["per_hole", "per_hole", "per hole"],
-    ["available", column.replace(/mass|unbalance/, "available"), `pieces, ${unit}`], ["stock", "stock", "stock"]];
+    ["holes", "holes", "holes"], ["first_hole", "first_hole_deg", "first hole, °"],
+    ["available", pieces, `pieces, ${unit}`], ["per_", "per_hole", "per hole"], ["stock", "stock", "stock"]];
   const lines = planes().map((plane) => [plane, keys.map((key) => setting(["planes", plane], ...key))]);
-  const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest amplitude"));
-  const closed = [state.read_only, ...Object.values(data).map((one) => one.closed)];
-  $("setup").open ||= !data.runs;
+  const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest"));
+  const closed = each([state.read_only, ...Object.values(data).map((one) => one.closed)]);
+  if (!data.runs && !queue.length) $("setup").open = true;
   $("new-unit").hidden = Boolean(data.weights);
   show("planes", planes().map((plane) => h("option", { value: plane })));
-  show("machine", each(closed).map((text) => h("p", { class: "why" }, text)),
-    lines.length > 0 && cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
-    limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
+  show("machine", closed.map((text) => h("p", { class: "why" }, text)),
+    cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
+    data.runs && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
 }
 
 function renderConventions() {
-  const { phase, angles } = state.settings;
-  const four = [["lead", "with"], ["lead", "against"], ["lag", "with"], ["lag", "against"]];
-  show("convention-said", phase && angles ? `The job says: phase ${phase}, angles ${angles}.`
+  const { phase = null, angles = null } = state.settings;
+  const four = ["lead-with", "lead-against", "lag-with", "lag-against"];
+  $("choice").open ||= !(phase && angles);
+  show("convention-said", phase && angles ? `The job says: phase ${phase}, angles ${angles}`
     : "Not chosen yet. Until then the answer assumes that phase leads and angles count with rotation.");
-  show("conventions", four.map(([way, side]) => button(
-    [h("b", {}, `Phase ${way}s, angles ${side} rotation`), h("div", { id: `drawing-${way}-${side}`, own: "" })],
-    () => edit({ key: ["phase"], old: phase ?? null, new: way },
-      { key: ["angles"], old: angles ?? null, new: `${side} rotation` }),
-    { id: `convention-${way}-${side}`, "aria-pressed": phase === way && angles === `${side} rotation` })));
-  for (const [way, side] of four) draw(`drawing-${way}-${side}`, `/convention/${way}-${side}`);
+  show("conventions", four.map((name) => {
+    const [way, side] = [name.split("-")[0], `${name.split("-")[1]} rotation`];
+    const edits = [{ key: ["phase"], old: phase, new: way }, { key: ["angles"], old: angles, new: side }];
+    const words = h("b", {}, `Phase ${way}s, angles ${side}`);
+    return button([words, h("span", { id: `drawing-${name}`, own: "" })],
+      () => edit(...edits), { id: `convention-${name}`, "aria-pressed": phase === way && angles === side });
+  }));
+  four.forEach((name) => draw(`drawing-${name}`, `/convention/${name}`));
 }
 
 function renderRuns() {
   const trials = runs().filter((run) => run !== baseline());
   const checks = valuesOf("run", "check");
-  const create = () => edit({ create: "check", header: data.runs.header }, ...addRows("check", "check", usual()));
-  const others = () => edit({ create: "check_weights", header: data.weights.header },
-    ...planes().map((plane) => add("check_weights", { run: checks[0], plane })));
+  const begin = () => edit(create("check", data.runs), ...addRows("check", "check", usual()));
+  const rows = () => planes().map((plane) => add("check_weights", { run: checks[0], plane }));
+  const others = () => edit(create("check_weights", data.weights), ...rows());
+  $("new-run").hidden = !data.runs;
+  put($("new-name"), "value", `trial ${trials.length + 1}`);
   show("baseline", data.runs ? card("runs", baseline()) : "First make the table, in step 1.");
   show("runs", trials.map((run) => card("runs", run)));
-  $("new-run").hidden = !data.runs;
-  setValue($("new-name"), `trial ${trials.length + 1}`);
   show("check", checks.map((run) => card("check", run)),
-    data.runs && !data.check && button("Add a check run", create, { id: "add-check" }),
-    data.check && data.weights && !data.check_weights && h("p", {}, "Were the proposed weights mounted? If not: ",
-      button("Other weights were mounted", others, { id: "check-others" })));
+    data.runs && !data.check && button("Add a check run", begin, { id: "add-check" }),
+    data.check && data.weights && !data.check_weights && h("p", {}, "Mounted as proposed? ",
+      button("No, other weights were mounted", others, { id: "check-others" })));
 }
 
 /* The answer: every number of a document stands with its path. */
-
-const at = (doc, path) => path.split(".").reduce((one, key) => one?.[key], doc);
-
 function value(doc, path, std) {
-  const raw = at(doc, path);
-  const size = Math.floor(Math.log10(Math.abs(std || raw) || 1));
-  const text = typeof raw === "number" ? raw.toFixed(Math.min(Math.max((std ? 1 : 2) - size, 0), 6)) : raw ?? "–";
-  return h("span", { class: "value", "data-key": path, "data-value": raw, title: `${path}: ${raw}` }, String(text));
+  const raw = at(doc, path.split("."));
+  const places = (std ? 1 : 2) - Math.floor(Math.log10(Math.abs(std || raw) || 1));
+  const text = typeof raw === "number" ? Number(raw.toFixed(Math.min(Math.max(places, 0), 6))) : raw ?? "";
+  return h("span", { class: "value", "data-key": path, "data-value": raw, title: raw }, `${text}`);
 }
 
 /* Rows of a list in a document; a column is [heading, key, key of its ±]. */
-function listing(doc, path, heads, order = Object.keys(at(doc, path))) {
-  const rows = order.map((i) => h("tr", {}, heads.map(([, key, std]) => {
-    const error = at(doc, `${path}.${i}`)[std];
-    return h("td", {}, value(doc, `${path}.${i}.${key}`, error), error && [" ± ", value(doc, `${path}.${i}.${std}`, error)]);
-  })));
-  return table([heads.map((head) => [head[0]])], rows);
+function listing(doc, path, columns, order) {
+  const rows = at(doc, path.split("."));
+  const heads = columns.filter(([, key]) => rows.some((row) => key in row));
+  return table([heads], (order || Object.keys(rows)).map((i) => h("tr", {}, heads.map(([, key, std]) => {
+    const more = rows[i][std] && [" ± ", value(doc, `${path}.${i}.${std}`, rows[i][std])];
+    return h("td", {}, value(doc, `${path}.${i}.${key}`, rows[i][std]), more);
+  }))));
 }
 
 function answer(name, title, { document: doc, judgement, warnings, notes }) {
@@ -344,61 +321,54 @@ function answer(name, title, { document: doc, judgement, warnings, notes }) {
   const list = name === "trim" ? "add_to_mounted" : holes ? "mounting.holes" : "corrections";
   const what = holes ? [["hole", "hole"], [weight, "pieces"]] : [[weight, "mass", "mass_std"]];
   const left = doc.mounting ? "mounting.residuals" : "residuals";
-  const after = (i) => at(doc, left)[i].after;
-  const largest = Object.keys(at(doc, left)).sort((a, b) => after(b) - after(a)).slice(0, 5);
+  const rows = at(doc, left.split("."));
+  const largest = Object.keys(rows).sort((a, b) => rows[b].after - rows[a].after).slice(0, 5);
+  const places = [["largest left", "sensor"], ["rpm", "speed_rpm"], ["before", "before"], [vibration, "after"]];
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), h("p", {}, judgement),
     listing(doc, list, [["plane", "plane"], ["", "action"], ...what, ["at °", "angle_deg", "angle_std_deg"]]),
-    listing(doc, left, [["largest left", "sensor"], ["rpm", "speed_rpm"], [vibration, "after"]], largest),
-    doc.check && h("p", { class: "verdict" }, "Check run: ", value(doc, "check.verdict"), "; rms ",
-      value(doc, "check.rms_before"), " → ", value(doc, "check.rms_achieved"),
-      ", predicted ", value(doc, "check.rms_predicted")),
-    warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)), notes.map((one) => h("p", {}, `Note: ${one}`)));
-}
-
-/* What is not typed yet, counted for each run: "3 phases of trial 2". */
-function missing() {
-  const groups = {};
-  for (const one of problems(true)) {
-    const row = allRows(one.table).find(({ id }) => id === one.row);
-    const text = row ? [whatOf(one.column || "reading"), `of ${row.run}`] : [one.text];
-    (groups[text] ||= { ...one, words: text, count: 0 }).count += 1;
-  }
-  return Object.values(groups).map((one) => ({ ...one, text: one.words.length === 1 ? one.words[0]
-    : `${one.count} ${one.words[0]}${one.count > 1 ? "s" : ""} ${one.words[1]}` }));
+    listing(doc, left, places, largest), doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"),
+      "; rms ", value(doc, "check.rms_before"), " → ", value(doc, "check.rms_achieved")),
+    warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)),
+    notes.map((one) => h("p", {}, `Note: ${one}`)));
 }
 
 function renderNow() {
-  const { refused, pieces, trim, answer: first } = state.results;
+  const { refused: why, pieces, trim, answer: first } = state.results;
   const best = trim || pieces || first;
-  const refusals = [...typed.values()].filter((one) => one.why).map(({ cell, why }) => ({ ...cell, text: why }));
-  const go = (one) => document.querySelector(`[data-at^="${one.table} ${one.row} ${one.column || ""}"]`).focus();
+  const refused = [...typed.values()].filter((it) => it.why).map((it) => ({ ...it.cell, text: it.why }));
+  const missing = {}; // what is not typed yet, counted for each run
+  for (const one of problems(true)) {
+    const { run } = allRows(one.table).find(({ id }) => id === one.row) || {};
+    (missing[run ? `${whatOf(one.column || "reading")} of ${run}` : one.text] ||= []).push(one);
+  }
+  const left = Object.entries(missing).map(([text, those]) =>
+    ({ ...those[0], text: those[0].row ? `${those.length} × ${text}` : text }));
+  const go = (it) => document.querySelector(`[data-at^="${it.table} ${it.row} ${it.column || ""}"]`).focus();
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
-  const [wrong, left] = [[...problems(false), ...refusals], missing()];
   const empty = allRows("runs").filter((row) => !row.amplitude && !row.phase);
+  const drop = () => edit(...remove("runs", empty));
   show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
-    wrong.length > 0 && h("div", { class: "why", key: "wrong" }, list(wrong)), refused && h("p", {}, refused),
-    left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left), empty.length > 0
-      && button("Not measured: remove the empty rows", () => edit(...remove("runs", empty)), { id: "drop-empty" })));
+    h("div", { class: "why" }, list([...problems(false), ...refused])), why && h("p", {}, why),
+    left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
+    empty.length > 0 && button("Not measured: remove the empty rows", drop, { id: "drop-empty" }));
 }
 
 function renderAnswer() {
   const { runs: found, pictures, ...documents } = state.results;
-  const titles = { answer: "Weights", pieces: "Pieces in the holes", trim: "Trim after the check run" };
-  const channels = found?.channels || [];
+  const titles = { trim: "Trim after the check run", pieces: "Pieces in the holes", answer: "Weights" };
   for (const key of ["speed", "sensor"]) {
-    show(`channel-${key}`, each(channels.map((one) => one[key])).map((one) => h("option", { key: one }, one)));
+    const values = each((found?.channels || []).map((one) => one[key]));
+    show(`channel-${key}`, values.map((one) => h("option", { key: one }, one)));
   }
-  $("live").hidden = !channels.length;
   const [speed, sensor] = ["channel-speed", "channel-sensor"].map((id) => encodeURIComponent($(id).value));
-  draw("polar", channels.length && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
+  $("live").hidden = !sensor;
+  draw("polar", sensor && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
   show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
-    h("div", { role: "meter", "aria-label": `effect of ${run}, percent`, "aria-valuenow": Math.min(share, 100),
-      "aria-valuemin": 0, "aria-valuemax": 100 },
-      h("div", { style: `width: ${Math.min(share, 100)}%` })))));
-  show("answer", Object.entries(titles).map(([name, title]) => documents[name] && answer(name, title, documents[name])));
-  for (const name of ["discs", "overview"]) draw(name, pictures[name] && `/picture/${name}?v=${pictures[name]}`);
+    h("meter", { "aria-label": `effect of ${run}, percent`, max: 100, value: Math.min(share, 100) }))));
+  show("answer", Object.entries(titles).map(([id, title]) => documents[id] && answer(id, title, documents[id])));
+  for (const id of ["discs", "overview"]) draw(id, pictures[id] && `/picture/${id}?v=${pictures[id]}`);
 }
 
 async function draw(id, address) {
@@ -409,13 +379,15 @@ async function draw(id, address) {
   await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
   if (slot.address !== address) return;
   const svg = await ask(address).then((found) => found.text(), () => "");
-  if (slot.address === address) slot.innerHTML = svg;
+  if (slot.address === address && svg) slot.innerHTML = svg;
+  else if (slot.address === address) slot.address = ""; // the next state asks again
 }
 
 function renderHeader() {
-  const lost = `not saved — the program is not running${queue.length ? `; ${queue.length} waiting here` : ""}`;
-  $("saved").textContent = online ? (queue.length ? "saving…" : said) : lost;
-  $("saved").classList.toggle("why", !online);
+  const waiting = queue.length ? `: ${queue.length} waiting here` : "";
+  const words = online ? "saving…" : `not saved — the program is not running${waiting}`;
+  $("saved").textContent = online && !waiting ? said : words;
+  $("saved").className = online ? "" : "why";
 }
 
 function render() {
@@ -428,40 +400,34 @@ function render() {
 }
 
 /* What a person does. */
-
 document.addEventListener("change", ({ target }) => {
   if (target.files) take(target);
   if (target.id.startsWith("channel")) renderAnswer();
   if (!target.cell || target.value === target.saved) return;
-  const old = typed.get(target.cell.key)?.why ? textNow(target.cell) : target.saved;
+  save([{ cell: target.cell, old: target.saved, text: target.value.trim() }]);
   target.saved = target.value;
-  save([{ cell: target.cell, old, text: target.value.trim() }]);
 });
-
 document.addEventListener("keydown", (event) => {
   const { target, key } = event;
   const step = { Enter: 1, ArrowDown: 1, ArrowUp: -1 }[key];
+  const editing = target.matches("input") && target.value !== (target.saved ?? "");
   if (target.cell && step) {
     const column = `td:nth-child(${target.parentNode.cellIndex + 1}) > input`;
     const cells = [...target.closest("table").querySelectorAll(column)];
     const next = cells[cells.indexOf(target) + step];
-    if (next) event.preventDefault();
-    next?.select();
-  } else if (key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey)) {
-    if (target.matches("input") && target.value !== (target.saved ?? "")) return;
+    if (next) next.select(event.preventDefault());
+  } else if (key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && !editing) {
     event.preventDefault();
     send(event.shiftKey ? "/redo" : "/undo", {}).catch(tell);
   }
 });
-
 document.addEventListener("focusin", ({ target }) => {
-  const [name, , speed, sensor] = target.dataset.cell?.split("|") || [];
-  if ($("live").hidden || !["runs", "check"].includes(name)) return;
-  $("channel-speed").value = speed;
+  if ($("live").hidden || !/^(runs|check)\|/.test(target.dataset.cell)) return;
+  const [, , place, sensor] = target.dataset.cell.split("|");
+  $("channel-speed").value = place.replace(/ .*/, "");
   $("channel-sensor").value = sensor;
   renderAnswer();
 });
-
 document.addEventListener("paste", (event) => {
   const { target } = event;
   const text = event.clipboardData.getData("text").replace(/[\r\n]+$/, "");
@@ -469,12 +435,12 @@ document.addEventListener("paste", (event) => {
   if (!target.cell?.row || (lines.length < 2 && lines[0].length < 2)) return;
   event.preventDefault();
   const rows = [...target.closest("tbody").rows].slice(target.closest("tr").sectionRowIndex);
-  const words = lines.flatMap((line, i) => line.map((word, j) =>
-    [word.trim(), rows[i]?.cells[target.parentNode.cellIndex + j]?.querySelector("input")])).filter(([word]) => word);
-  const fit = words.filter(([, input]) => input);
+  const inputAt = (i, j) => rows[i]?.cells[target.parentNode.cellIndex + j]?.querySelector("input");
+  const words = lines.flatMap((line, i) => line.map((word, j) => [word.trim(), inputAt(i, j)]));
+  const fit = words.filter(([word, input]) => word && input);
   save(fit.map(([word, input]) => ({ cell: input.cell, old: input.saved, text: word })));
   for (const [word, input] of fit) input.value = input.saved = word;
-  if (words.length > fit.length) tell(`Not written: ${words.length - fit.length} values outside of the table.`);
+  if (words.some(([word, input]) => word && !input)) tell("Not written: the values outside of the table.");
 });
 
 async function take(input) {
@@ -485,30 +451,35 @@ async function take(input) {
   send("/import", content).catch(tell);
 }
 
-function makeRows() {
-  const header = ["run", $("setup-speed-unit").value, "sensor", $("setup-amplitude-unit").value, "phase_deg"];
-  const places = listOf($("setup-speeds").value).flatMap((speed) =>
-    listOf($("setup-sensors").value).map((sensor) => ({ speed, sensor })));
-  if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));
-  else edit({ create: "runs", header }, ...addRows("runs", "baseline", places, header[1]));
-}
-
-function addRun() {
-  const [run, plane, unit] = ["new-name", "new-plane", "setup-weight-unit"].map((id) => $(id).value.trim());
-  const create = { create: "weights", header: ["run", "plane", unit, "angle_deg"] };
-  edit(...(data.weights ? [] : [create]), add("weights", { run, plane }), ...addRows("runs", run, usual()));
-}
-
-async function propose() {
-  const options = { with_job: $("trial-with-job").checked };
-  for (const { name, value: text, dataset } of options.with_job ? [] : $("trial").querySelectorAll("[name]")) {
-    if (text) options[name] = dataset.unit ? number(text) + dataset.unit : number(text) || text;
-  }
-  const found = await ask("/trial", { options }).then((one) => one.json(), ({ message }) => ({ judgement: message }));
-  const words = [found.judgement, found.found, ...(found.warnings || []), ...(found.notes || [])];
-  show("trial-answer", words.map((one) => one && h("p", {}, one)));
-  $("trial-picture").innerHTML = found.picture || "";
-}
+const submitted = {
+  "setup-form"() {
+    const [speedName, amplitude] = ["setup-speed-unit", "setup-amplitude-unit"].map((id) => $(id).value);
+    const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => listOf($(id).value));
+    const header = ["run", speedName, "sensor", amplitude, "phase_deg"];
+    const places = speeds.flatMap((speed) => names.map((sensor) => ({ speed, sensor })));
+    if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));
+    else edit(create("runs", { header }), ...addRows("runs", "baseline", places, speedName));
+    $("setup").open = false;
+  },
+  "new-run"() {
+    const [run, plane, unit] = ["new-name", "new-plane", "setup-weight-unit"].map((id) => $(id).value.trim());
+    const made = data.weights ? [] : [create("weights", { header: ["run", "plane", unit, "angle_deg"] })];
+    edit(...made, add("weights", { run, plane }), ...addRows("runs", run, usual()));
+    $("new-plane").value = "";
+  },
+  async trial() {
+    const options = { with_job: $("trial-with-job").checked };
+    for (const { name, value: text, dataset } of $("trial").querySelectorAll("[name]")) {
+      const given = dataset.unit ? number(text) + dataset.unit : number(text) || text;
+      if (text && !options.with_job) options[name] = given;
+    }
+    const told = await ask("/trial", { options }).then((one) => one.json(), (no) => ({ notes: no.message }));
+    const words = [told.judgement, told.found, told.warnings, told.notes].flat();
+    show("trial-answer", words.map((one) => one && h("p", {}, one)));
+    $("trial-picture").innerHTML = told.picture || "";
+  },
+};
+for (const id of Object.keys(submitted)) $(id).onsubmit = (event) => submitted[id](event.preventDefault());
 
 async function open({ target }) {
   const opened = window.open("", "_blank");
@@ -517,9 +488,6 @@ async function open({ target }) {
   else opened.close();
 }
 
-for (const [id, act] of [["setup-form", makeRows], ["trial", propose], ["new-run", addRun]]) {
-  $(id).addEventListener("submit", (event) => act(event.preventDefault()));
-}
 for (const id of ["undo", "redo"]) $(id).onclick = () => send(`/${id}`, {}).catch(tell);
 for (const id of ["print", "whole"]) $(id).onclick = open;
 window.addEventListener("hashchange", () => tell((token = location.hash.slice(1)) && ""));

@@ -18,8 +18,6 @@ def type_job(window, sample, radius=None):
     own = {name: [row for row in runs if row["run"] == name] for name in names}
     window.type("#setup-sensors", ", ".join(row["sensor"] for row in own[names[0]]))
     window.type("#setup-speeds", runs[0]["speed_rpm"])
-    window.go("#setup-amplitude-unit")
-    window.press("o")  # other
     window.push("#setup-make")
     window.push("#convention-lead-with", SPACE)
     for name in names:

@@ -4,6 +4,7 @@ import codecs
 import itertools
 import os
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,10 @@ from rotorid.tables import read_job
 from rotorid.tables.reader import table_writing
 from rotorid.tables.reader.columns import read_grid
 from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.worksheet import job_files
 from rotorid.worksheet.job_files import Conflict, JobFiles
+
+pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
 
 TURBO = Path(__file__).resolve().parents[3] / "sample_data" / "turbo_job"
 FILES = ("checked.toml", "runs.csv", "weights.csv", "check.csv", "check_weights.csv")
@@ -61,7 +65,7 @@ def plain_job(folder, text, encoding="utf-8"):
 
 @st.composite
 def tables(draw):
-    """A file as parts that are joined: `cells[row][column]`, what is between them, and which one to change."""
+    """A file as parts that are joined, and which of its cells to change."""
     encoding = draw(st.sampled_from(sorted(MARKS)))
     separator = draw(st.sampled_from([",", ";", "\t"]))
     sign = "." if separator == "," else draw(st.sampled_from([".", ","]))
@@ -131,7 +135,7 @@ def test_numbers_that_may_have_thousands_stay_as_typed_and_are_refused(tmp_path)
 def test_a_character_that_the_encoding_lacks_is_refused(tmp_path):
     job = plain_job(tmp_path, "run,speed_rpm,sensor,amplitude,phase_deg\nпуск,1200,s,1.5,3\n", "cp1251")
     before = contents(tmp_path)
-    with pytest.raises(ValueError, match="cp1251.*'é'.*UTF-8"):
+    with pytest.raises(ValueError, match=r"cp1251.*'é'.*UTF-8"):
         job.apply([cell(job, 0, "sensor", "é")])
     assert contents(tmp_path) == before
 
@@ -151,6 +155,7 @@ def test_comments_and_order_of_settings_stay(turbo):
     assert [line for line in old if line not in new] == ['phase = "lead"']
     expected = ['phase = "lag"', 'view = "driven end"', "floor = 0.5", "[planes.left]", "taken = {3 = 10}"]
     assert [line for line in new if line and line not in old] == expected
+    assert new[new.index('view = "driven end"') - 1] == 'angles = "with rotation"'
     assert [line for line in new if line in old and line] == [line for line in old if line in new and line]
     job.apply([{"key": ["planes", "left", "taken"], "old": {"3": 10}, "new": None}])
     assert "planes" not in job.state()["settings"]
@@ -176,7 +181,7 @@ def test_comments_and_order_of_settings_stay(turbo):
         ("", ["planes", "a b", "holes"], 12, '[planes."a b"]\nholes = 12\n'),
         ("runs = 'r'\r\n[errors]\r\nfloor = 1\r\n", ["phase"], "lag", 'phase = "lag"\r\n'),
         ("[errors] # stated\n# none\n", ["errors", "floor"], 2, "floor = 2\n"),
-        ("planes = { a = { holes = 3 } }\n", ["planes", "a", "use"], False, ",use = false"),
+        ("planes = { a = { holes = 3 } }\n", ["planes", "a", "use"], False, ", use = false"),
         ("errors.floor = 1\n", ["errors", "phase_deg"], 2, "errors.phase_deg = 2\n"),
         (
             "[planes.a]\nholes = 3\n# of b\n[planes.b]\nholes = 4",
@@ -199,7 +204,7 @@ def test_a_setting_is_added_to_files_of_all_forms(tmp_path, text, key, new, adde
     job.apply([{"key": key, "old": None, "new": new}])
     found = path.read_bytes().decode()
     assert added in found
-    assert found.replace(added, "", 1) == text
+    assert found.replace(added, "", 1).replace(" ", "") == text.replace(" ", "")
     inner = job.state()["settings"]
     for part in key:
         inner = inner[part]
@@ -218,7 +223,7 @@ def test_steps_over_several_files_go_back_and_forth_to_the_same_bytes(turbo):
                 cell(job, k, new=f"{k + 1}.5"),
                 {"table": "weights", "after": None, "cells": {"run": f"w{k}", "plane": "left"}},
                 {"table": "runs", "delete": last["id"], "old": last["cells"]},
-                {"key": ["planes", "left", "radius_mm"], "old": k and 100 + k - 1 or None, "new": 100 + k},
+                {"key": ["planes", "left", "radius_mm"], "old": 99 + k if k else None, "new": 100 + k},
             ]
         )
         versions.append(contents(turbo))
@@ -383,9 +388,9 @@ def test_several_jobs_and_none_are_told(turbo):
     with pytest.raises(ValueError, match=r"checked\.toml and other\.toml"):
         JobFiles(turbo)
     assert JobFiles(turbo / "other.toml").state()["job"] == "other.toml"
-    for given in (turbo / "none" / "job.toml", turbo / "none.xlsx", turbo / "runs.csv"):
-        with pytest.raises(ValueError, match=given.name):
-            JobFiles(given)
+    for wrong in (turbo / "none" / "job.toml", turbo / "none.xlsx", turbo / "runs.csv"):
+        with pytest.raises(ValueError, match=wrong.name):
+            JobFiles(wrong)
 
 
 def test_files_outside_the_folder_are_neither_read_nor_written(turbo, tmp_path_factory):
@@ -430,6 +435,115 @@ def test_a_job_file_that_is_broken_meanwhile_is_told_and_its_rows_keep_their_ids
 )
 def test_edits_of_unknown_forms_are_refused(turbo, edit):
     job, before = JobFiles(turbo), contents(turbo)
-    with pytest.raises(ValueError, match="edit|table"):
+    with pytest.raises(ValueError, match=r"edit|table"):
         job.apply([edit])
     assert contents(turbo) == before
+
+
+@pytest.mark.parametrize("last", ["", "\r\n"])
+def test_rows_come_and_go_at_the_end_of_a_file_as_it_ends(tmp_path, last):
+    text = "run;speed_rpm;sensor;amplitude;phase_deg;;\r\na;1200;s;1,5 ;3\r\n# end"
+    job = plain_job(tmp_path, text.removesuffix("\r\n# end") + last)
+    (made,) = job.apply([{"table": "runs", "after": None, "cells": {"run": "b", "amplitude": "2.25"}}])
+    start = text.removesuffix("# end")
+    assert (tmp_path / "runs.csv").read_bytes().decode() == f"{start}b;;;2,25;;;{last}"
+    job.apply([cell(job, 0, "amplitude", "2.5")])
+    assert (tmp_path / "runs.csv").read_bytes().decode() == f"{start}b;;;2,25;;;{last}".replace(
+        "1,5 ", "2,5 "
+    )
+    job.apply([{"table": "runs", "delete": made}])
+    assert (tmp_path / "runs.csv").read_bytes().decode() == start.rstrip().replace("1,5 ", "2,5 ") + last
+
+
+def test_blank_rows_of_a_spreadsheet_take_no_time_and_keep_ids(tmp_path):
+    rest = "".join(f"r{k};{k};s;1;3\n" for k in range(1, 500)) + ";;;;\n" * 20000
+    job = plain_job(tmp_path, "run;speed_rpm;sensor;amplitude;phase_deg\n" + rest)
+    ids = [row["id"] for row in rows(job)]
+    (tmp_path / "runs.csv").write_text(
+        "run;speed_rpm;sensor;amplitude;phase_deg\nnew;1;s;2;3\n" + rest, "utf-8"
+    )
+    start = time.monotonic()
+    assert job.look() == ["runs.csv"]
+    assert time.monotonic() - start < 10
+    assert [row["id"] for row in rows(job)][1:] == ids
+
+
+def test_a_table_that_cannot_be_read_for_a_while_comes_back(turbo, monkeypatch):
+    job, ids = JobFiles(turbo), [row["id"] for row in rows(JobFiles(turbo))]
+    real = job_files.first_bytes
+
+    def refuse(path, most):
+        if path.name == "runs.csv":
+            raise PermissionError(13, "in use")
+        return real(path, most)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(job_files, "first_bytes", refuse)
+        with pytest.raises(ValueError, match=r"runs\.csv cannot be read \(in use\)"):
+            job.apply([cell(job)])
+        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}])
+        assert "cannot be read" in job.state()["tables"]["runs"]["read_only"]
+    assert "runs.csv" in job.look()
+    assert [row["id"] for row in rows(job)] == ids
+
+
+def test_a_new_row_ends_as_the_one_above(tmp_path):
+    job = plain_job(tmp_path, b"run,speed_rpm,sensor,amplitude,phase_deg\na,1,s,1,3\r\nb,1,s,1,3\n")
+    job.apply([{"table": "runs", "after": rows(job)[0]["id"], "cells": {"run": "c"}}])
+    assert (tmp_path / "runs.csv").read_bytes().splitlines(keepends=True)[2] == b"c,,,,\r\n"
+    assert (tmp_path / "runs.csv").read_bytes().splitlines(keepends=True)[1] == b"a,1,s,1,3\r\n"
+
+
+def test_a_step_that_made_a_file_is_not_undone_over_a_change_in_it(tmp_path):
+    job = JobFiles(tmp_path)
+    job.apply([{"create": "runs", "header": HEADER}])
+    (tmp_path / "runs.csv").write_text(",".join(HEADER) + "\na,1,b,2,3\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"runs\.csv was changed by another program"):
+        job.undo()
+    assert sorted(contents(tmp_path)) == ["job.toml", "runs.csv"]
+    assert JobFiles(tmp_path).state()["tables"]["runs"]["rows"][0]["cells"][0] == "a"
+
+
+def test_a_change_that_leaves_time_and_size_is_seen(turbo):
+    job, path = JobFiles(turbo), turbo / "runs.csv"
+    assert job.look() == []
+    found = path.stat()
+    path.write_bytes(path.read_bytes().replace(b"3.36", b"3.37"))
+    os.utime(path, ns=(found.st_atime_ns, found.st_mtime_ns))
+    assert job.look() == ["runs.csv"]
+    assert rows(job)[0]["cells"][3] == "3.37"
+    for k in range(40):  # faster than the clock of a file system
+        path.write_bytes(
+            path.read_bytes().replace(b"baseline,1220,probe 1,3.37", b"baseline,1220,probe 1,3.38")
+        )
+        assert job.look() == ["runs.csv"], k
+        path.write_bytes(
+            path.read_bytes().replace(b"baseline,1220,probe 1,3.38", b"baseline,1220,probe 1,3.37")
+        )
+        assert job.look() == ["runs.csv"], k
+
+
+def test_no_file_is_changed_where_one_cannot_be(turbo, monkeypatch):
+    job, before, real, seen = JobFiles(turbo), contents(turbo), Path.replace, []
+
+    def replace(self, target):
+        seen.append(target)
+        if len(seen) == 2:
+            raise PermissionError(13, "in use")
+        return real(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(ValueError, match="is open in Excel"):
+        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}, cell(job)])
+    assert len(seen) == 3
+    assert contents(turbo) == before
+    assert job.look() == []
+
+
+def test_an_empty_table_is_begun_in_place(tmp_path):
+    job = plain_job(tmp_path, "")
+    assert job.state()["tables"] == {}
+    job.apply([{"create": "runs", "header": HEADER}])
+    assert job.state()["tables"]["runs"]["file"] == "runs.csv"
+    job.undo()
+    assert contents(tmp_path)["runs.csv"] == b""

@@ -39,7 +39,8 @@ def copy(tmp_path, sample="turbo_job"):
 def command(job, *options):
     """The document of `rotorid balance --json`, without what each run has of its own."""
     done = subprocess.run(
-        [sys.executable, "-m", "rotorid", "balance", str(job), "--json", *options],
+        [sys.executable, "-m", "rotorid", "balance", job.name, "--json", *options],
+        cwd=job.parent,
         capture_output=True,
         text=True,
         check=True,
@@ -289,3 +290,83 @@ def test_a_trial_weight_with_and_without_the_coefficients(tmp_path, serve):
     )
     status, answer = served.ask("/trial", {"options": {"with_job": True, "plane": "left"}})
     assert (status, answer["picture"][:4]) == (200, "<svg")
+
+
+def test_a_problem_has_its_cell_and_names_the_file_alone(tmp_path, serve):
+    served = serve(copy(tmp_path) / "job.toml")
+    row = served.settled()["tables"]["runs"]["rows"][2]
+    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": row["cells"][-1], "new": "915"}
+    assert served.edit(edit)[0] == 200
+    results = served.settled()["results"]
+    (problem,) = results["problems"]
+    assert (problem["table"], problem["row"], problem["column"]) == ("runs", row["id"], "phase_deg")
+    assert problem["text"].startswith(f"runs.csv, row {row['row']}, column phase_deg: found '915'")
+    assert not problem["missing"]
+    assert (results["answer"], results["pictures"]) == (None, {})
+    assert served.edit({**edit, "old": "915", "new": ""})[0] == 200
+    assert [one["missing"] for one in served.settled()["results"]["problems"]] == [True]
+
+
+def test_a_folder_that_is_not_there_yet_becomes_a_job(tmp_path, serve):
+    served = serve(tmp_path / "my_fan")
+    state = served.settled()
+    assert (state["exists"], state["tables"], state["results"]["answer"]) == (False, {}, None)
+    assert list((tmp_path / "my_fan").iterdir()) == []
+    header = ["run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg"]
+    created = {"create": "runs", "header": header}
+    assert served.edit(created, {"key": ["phase"], "old": None, "new": "lag"})[0] == 200
+    assert (tmp_path / "my_fan" / "job.toml").read_text().splitlines() == [
+        'runs = "runs.csv"',
+        'phase = "lag"',
+    ]
+    served.kill()
+    assert serve(tmp_path / "my_fan").state()["settings"] == {"runs": "runs.csv", "phase": "lag"}
+
+
+@pytest.mark.parametrize("given", ["no_such/job.toml", "runs.csv", "."])
+def test_what_is_no_job_is_refused_with_one_sentence(tmp_path, given):
+    folder = copy(tmp_path)
+    command = [sys.executable, "-m", "rotorid", "worksheet", str(folder / given), "--no-browser"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+
+
+def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
+    code = "import sys; sys.modules['uvicorn'] = None; from rotorid.cli import main; main()"
+    command = [sys.executable, "-c", code, "worksheet", str(tmp_path), "--no-browser"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == 'rotorid: the worksheet needs uvicorn: pip install "rotorid[worksheet]"\n'
+
+
+def test_a_workbook_of_rotorid_is_edited_and_another_is_not(tmp_path, serve):
+    import openpyxl
+
+    folder = copy(tmp_path)
+    book = folder / "sheet.xlsx"
+    subprocess.run(
+        [sys.executable, "-m", "rotorid", "balance", "job.toml", "--output", "sheet.xlsx"],
+        cwd=folder,
+        check=True,
+    )
+    served = serve(book)
+    state = served.settled()
+    assert (state["kind"], state["read_only"]) == ("workbook", "")
+    row = state["tables"]["runs"]["rows"][0]
+    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": row["cells"][-1], "new": "95"}
+    assert served.edit(edit)[0] == 200
+    found = served.settled()["results"]["answer"]["document"]["corrections"]
+    assert found == command(book)["corrections"]
+    assert found != state["results"]["answer"]["document"]["corrections"]
+    other = openpyxl.load_workbook(book)
+    other.properties.creator = "somebody"
+    other.save(folder / "other.xlsx")
+    before = (folder / "other.xlsx").read_bytes()
+    served = serve(folder / "other.xlsx")
+    state = served.settled()
+    assert state["read_only"]
+    assert state["results"]["answer"]["document"]["corrections"] == found
+    row = state["tables"]["runs"]["rows"][0]
+    assert served.edit({**edit, "row": row["id"], "old": "95", "new": "96"})[0] == 400
+    assert (folder / "other.xlsx").read_bytes() == before
