@@ -1,8 +1,8 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
 
 For tests: data-cell is "runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": second
-repeat) or "weights|ROWID|COLUMN" of a weight ("check_weights|…"). data-key is the key of the job of an input, or
-the path in the document of a .value, "corrections.0.mass", with its number in data-value and the document in
+repeat) or "weights|ROWID|COLUMN" of a weight ("check_weights|…"). data-key is the key of the job, or, of a
+.value, the path in the document, "corrections.0.mass", with its number in data-value and the document in
 data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge; data-type, data-remove,
 data-add, data-import: its buttons; data-keep, data-write: buttons at a refused cell. Other ids than those of
 index.html: convention-lead-with (…), add-check, check-others, missing, drop-empty. */
@@ -111,6 +111,7 @@ function save(changes) {
 
 /* The tables of the job. */
 const number = (text) => Number(String(text).trim().replace(",", "."));
+const near = (a, b) => Math.abs(number(a) - number(b)) <= 0.005 * number(a);
 const each = (values) => [...new Set(values)].filter((value) => value);
 const listOf = (text, by = /[,;]/) => each(text.split(by).map((one) => one.trim()));
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
@@ -135,6 +136,7 @@ const runs = () => valuesOf("run", "runs", "weights");
 const planes = () => each([...Object.keys(state.settings.planes || {}), ...valuesOf("plane", "weights")]);
 const baseline = () =>
   state.results.runs?.baseline || runs().find((run) => !rowsOf("weights", run).length) || "baseline";
+const isEmpty = (row) => !row.amplitude && !row.phase;
 const usual = () => rowsOf("runs", baseline()).filter((row) => row.place === row.speed);
 const remove = (name, rows) => rows.map((row) => ({ table: name, delete: row.id, old: row.cells }));
 const add = (name, cells, after = null) => ({ table: name, after, cells });
@@ -223,9 +225,8 @@ function weights(name, run) {
   const lines = own.map((row, i) => {
     const label = `weight ${i + 1}`;
     const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, label));
-    const drop = () => edit(...remove(name, [row]));
     return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
-      button("Remove", drop, { "aria-label": `Remove ${label} of ${run}` })];
+      button("Remove", () => edit(...remove(name, [row])), { "aria-label": `Remove ${label} of ${run}` })];
   });
   const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
   const another = () => edit(add(name, { run }, own.at(-1)?.id));
@@ -235,14 +236,16 @@ function weights(name, run) {
 function card(name, run) {
   const mounted = name === "runs" ? "weights" : "check_weights";
   const free = run === baseline();
-  const all = () => [...remove(name, rowsOf(name, run)), ...remove(mounted, rowsOf(mounted, run))];
+  const lacking = usual().filter(({ speed, sensor }) =>
+    !rowsOf(name, run).some((row) => row.sensor === sensor && near(row.speed, speed)));
+  const type = () => edit(...addRows(name, run, lacking));
+  const all = () => [name, mounted].flatMap((one) => remove(one, rowsOf(one, run)));
   const drop = () => confirm(`Remove ${run} with its readings and weights?`) && edit(...all());
-  const type = () => edit(...addRows(name, run, usual()));
   return h("article", { key: run, "data-run": run }, !free && h("h3", {}, run),
     !free && data[mounted] && weights(mounted, run),
-    grid(name, run) || button("Type its readings", type, { "data-type": run }),
+    grid(name, run), lacking.length > 0 && button("Type the missing readings", type, { "data-type": run }),
     name === "runs" && h("label", { class: "button" }, "Take from a file…",
-      h("input", { type: "file", class: "unseen", "data-import": run })),
+      h("input", { type: "file", class: "unseen", "data-import": run, "aria-label": `file of ${run}` })),
     !free && button("Remove this run", drop, { "data-remove": run }));
 }
 
@@ -316,14 +319,15 @@ function listing(doc, path, columns, order) {
 }
 
 function answer(name, title, { document: doc, judgement, warnings, notes }) {
-  const [weight, vibration] = [doc.conventions.weight_unit, doc.conventions.vibration_unit].map(unitOf);
+  const [weight, unit] = [doc.conventions.weight_unit, doc.conventions.vibration_unit].map(unitOf);
+  const after = `after, ${unit}`;
   const holes = doc.mounting?.holes;
   const list = name === "trim" ? "add_to_mounted" : holes ? "mounting.holes" : "corrections";
   const what = holes ? [["hole", "hole"], [weight, "pieces"]] : [[weight, "mass", "mass_std"]];
   const left = doc.mounting ? "mounting.residuals" : "residuals";
   const rows = at(doc, left.split("."));
   const largest = Object.keys(rows).sort((a, b) => rows[b].after - rows[a].after).slice(0, 5);
-  const places = [["largest left", "sensor"], ["rpm", "speed_rpm"], ["before", "before"], [vibration, "after"]];
+  const places = [["largest", "sensor"], ["rpm", "speed_rpm"], ["before", "before"], [after, "after"]];
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), h("p", {}, judgement),
     listing(doc, list, [["plane", "plane"], ["", "action"], ...what, ["at °", "angle_deg", "angle_std_deg"]]),
     listing(doc, left, places, largest), doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"),
@@ -346,7 +350,7 @@ function renderNow() {
   const go = (it) => document.querySelector(`[data-at^="${it.table} ${it.row} ${it.column || ""}"]`).focus();
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
-  const empty = allRows("runs").filter((row) => !row.amplitude && !row.phase);
+  const empty = allRows("runs").filter(isEmpty);
   const drop = () => edit(...remove("runs", empty));
   show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
     h("div", { class: "why" }, list([...problems(false), ...refused])), why && h("p", {}, why),
@@ -356,7 +360,7 @@ function renderNow() {
 
 function renderAnswer() {
   const { runs: found, pictures, ...documents } = state.results;
-  const titles = { trim: "Trim after the check run", pieces: "Pieces in the holes", answer: "Weights" };
+  const titles = { trim: "Trim: add to what is mounted", pieces: "Pieces in the holes", answer: "Weights" };
   for (const key of ["speed", "sensor"]) {
     const values = each((found?.channels || []).map((one) => one[key]));
     show(`channel-${key}`, values.map((one) => h("option", { key: one }, one)));
@@ -367,7 +371,7 @@ function renderAnswer() {
   show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
     h("meter", { "aria-label": `effect of ${run}, percent`, max: 100, value: Math.min(share, 100) }))));
-  show("answer", Object.entries(titles).map(([id, title]) => documents[id] && answer(id, title, documents[id])));
+  show("answer", Object.keys(titles).map((id) => documents[id] && answer(id, titles[id], documents[id])));
   for (const id of ["discs", "overview"]) draw(id, pictures[id] && `/picture/${id}?v=${pictures[id]}`);
 }
 
@@ -384,9 +388,8 @@ async function draw(id, address) {
 }
 
 function renderHeader() {
-  const waiting = queue.length ? `: ${queue.length} waiting here` : "";
-  const words = online ? "saving…" : `not saved — the program is not running${waiting}`;
-  $("saved").textContent = online && !waiting ? said : words;
+  const lost = `not saved — the program is not running${queue.length ? `: ${queue.length} wait here` : ""}`;
+  $("saved").textContent = online ? (queue.length ? "saving…" : said) : lost;
   $("saved").className = online ? "" : "why";
 }
 
@@ -401,7 +404,7 @@ function render() {
 
 /* What a person does. */
 document.addEventListener("change", ({ target }) => {
-  if (target.files) take(target);
+  if (target.files) take(target).catch(tell).then(() => (target.value = ""));
   if (target.id.startsWith("channel")) renderAnswer();
   if (!target.cell || target.value === target.saved) return;
   save([{ cell: target.cell, old: target.saved, text: target.value.trim() }]);
@@ -443,12 +446,11 @@ document.addEventListener("paste", (event) => {
   if (words.some(([word, input]) => word && !input)) tell("Not written: the values outside of the table.");
 });
 
-async function take(input) {
-  const [file] = input.files;
+async function take({ files: [file], dataset: { import: run } }) {
   const bytes = Array.from(new Uint8Array(await file.arrayBuffer()), (byte) => String.fromCharCode(byte));
-  const content = { table: "runs", run: input.dataset.import, name: file.name, data: btoa(bytes.join("")) };
-  input.value = "";
-  send("/import", content).catch(tell);
+  const empty = rowsOf("runs", run).filter(isEmpty);
+  await send("/import", { table: "runs", run, name: file.name, data: btoa(bytes.join("")) });
+  if (empty.length) edit(...remove("runs", empty));
 }
 
 const submitted = {
@@ -464,7 +466,8 @@ const submitted = {
   "new-run"() {
     const [run, plane, unit] = ["new-name", "new-plane", "setup-weight-unit"].map((id) => $(id).value.trim());
     const made = data.weights ? [] : [create("weights", { header: ["run", "plane", unit, "angle_deg"] })];
-    edit(...made, add("weights", { run, plane }), ...addRows("runs", run, usual()));
+    const enter = () => $("runs").lastChild?.querySelectorAll("input")[1]?.focus();
+    edit(...made, add("weights", { run, plane }), ...addRows("runs", run, usual())).then(enter);
     $("new-plane").value = "";
   },
   async trial() {
