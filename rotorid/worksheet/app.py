@@ -115,7 +115,10 @@ class Routes:
         if name == "runs":
             place = {key: asked[key] for key in ("speed", "sensor")}
             return _svg(await self.session.front.ask("channel", **self.session.about(), **place))
-        return _svg(await self.session.picture(name))
+        try:
+            return _svg(await self.session.picture(name))
+        except Refused:  # the job has changed since the page saw that picture
+            return Response(status_code=204, headers=HEADERS)
 
     async def convention(self, request: Request) -> Response:
         """One of the four drawings: lead-with, lead-against, lag-with, lag-against."""

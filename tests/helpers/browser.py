@@ -1,4 +1,4 @@
-"""A real browser for the tests: headless Chromium that opens a file and tells what happened.
+"""A real browser for the tests: headless Chromium that opens a file or an address and tells what happened.
 
 It needs Debian's packages chromium and chromium-driver (or whatever puts `chromium` and `chromedriver` on the
 path) and the Python package selenium. The browser reaches no network: every host name is refused, and every
@@ -30,7 +30,8 @@ FLAGS = (
     "--no-default-browser-check",
     "--hide-scrollbars",
     "--force-color-profile=srgb",
-    "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1",
+    # another name of this computer, as a rebinding site has it
+    "--host-resolver-rules=MAP rebound.example 127.0.0.1 , MAP * ~NOTFOUND , EXCLUDE 127.0.0.1",
 )
 
 # Every visible element with a key: [key, what it shows, scale from the document's unit to the shown one].
@@ -96,10 +97,13 @@ class Browser:
         self.driver.quit()
 
     def open(self, path):
-        """Open a local file at the present width; what it logged and asked for."""
-        for kind in ("browser", "performance"):
-            self.driver.get_log(kind)  # forget what came before
-        self.driver.get(Path(path).resolve().as_uri())
+        """Open a local file, or an address, at the present width; what it logged and asked for."""
+        self.heard()  # forget what came before
+        self.driver.get(path if str(path).startswith("http:") else Path(path).resolve().as_uri())
+        return self.heard()
+
+    def heard(self):
+        """What was logged and asked for since the last time."""
         console = [f"{entry['level']}: {entry['message']}" for entry in self.driver.get_log("browser")]
         requests = []
         for entry in self.driver.get_log("performance"):

@@ -8,7 +8,7 @@ data-add, data-import: its buttons; data-keep, data-write: buttons at a refused 
 index.html: convention-lead-with (…), add-check, check-others, missing, drop-empty. */
 
 const $ = (id) => document.getElementById(id);
-const token = location.hash.slice(1);
+let token = location.hash.slice(1);
 const typed = new Map(); // key of a cell → its change, until the state has it; with `why` if it was refused
 const queue = []; // what is still to be sent, in order
 let state = null;
@@ -380,6 +380,8 @@ async function draw(id, address) {
   slot.hidden = !address;
   if (!address || slot.address === address) return;
   slot.address = address;
+  await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
+  if (slot.address !== address) return;
   const svg = await ask(address).then((found) => found.text(), () => "");
   if (slot.address === address && svg) slot.innerHTML = svg;
   else if (slot.address === address) slot.address = ""; // the next state asks again
@@ -491,5 +493,6 @@ async function open({ target }) {
 
 for (const id of ["undo", "redo"]) $(id).onclick = () => send(`/${id}`, {}).catch(tell);
 for (const id of ["print", "whole"]) $(id).onclick = open;
+window.addEventListener("hashchange", () => tell((token = location.hash.slice(1)) && ""));
 window.addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
 for (;;) await refresh(online && state ? state.version : -1).catch(away);

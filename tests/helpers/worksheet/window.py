@@ -1,0 +1,127 @@
+"""A window of the worksheet in a real browser, used by keyboard alone."""
+
+import time
+
+# As WebDriver writes them; here, because selenium may be missing.
+TAB, ENTER, SPACE, SHIFT, CONTROL = "\ue004", "\ue007", "\ue00d", "\ue008", "\ue009"
+
+# How many Tabs lead to what is looked for, about; negative: backwards; null: there is none.
+_TABS = """
+const wanted = document.querySelector(arguments[0]);
+const kinds = 'a[href], button, input, select, summary, [tabindex="0"]';
+const all = [...document.querySelectorAll(kinds)].filter(e => !e.disabled && e.getClientRects().length);
+return wanted && all.indexOf(wanted) - all.indexOf(document.activeElement);
+"""
+_TEXTS = """
+return Array.from(document.querySelectorAll(arguments[0])).map(
+  e => e.dataset.value ?? (e.matches('input, select') ? e.value : e.textContent));
+"""
+_NUMBERS = """
+return Array.from(document.querySelectorAll(arguments[0])).map(e => [e.dataset.key, e.dataset.value]);
+"""
+_COPY = """
+const [text, done] = arguments;
+navigator.clipboard.writeText(text).then(() => done(''), e => done(String(e)));
+"""
+MOST_TRIES = 20
+
+
+class Window:
+    """One window; a person needs `stroke` seconds for a key and `field` for the next field."""
+
+    def __init__(self, browser, stroke=0.0, field=0.0):
+        self.browser, self.driver = browser, browser.driver
+        self.stroke, self.field = stroke, field
+
+    def open(self, address):
+        """The page, as soon as it shows the job."""
+        self.driver.get("about:blank")  # for another token alone the browser loads nothing
+        visit = self.browser.open(address)
+        self.wait(lambda: self.text("#job") != "rotorid worksheet", "the job is shown")
+        return visit
+
+    def wait(self, met, what, seconds=30.0):
+        """Until something is met; what it returned."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            if found := met():
+                return found
+            time.sleep(0.02)
+        raise AssertionError(f"not within {seconds:g} s: {what}; the page shows:\n{self.browser.text()}")
+
+    def actions(self):
+        """Keys to come."""
+        from selenium.webdriver import ActionChains
+
+        return ActionChains(self.driver, duration=0)
+
+    def press(self, *keys):
+        """Keys, one after the other."""
+        for key in keys:
+            self.actions().send_keys(key).perform()
+            time.sleep(self.stroke)
+
+    def hold(self, modifier, key):
+        """A key together with a modifier."""
+        self.actions().key_down(modifier).send_keys(key).key_up(modifier).perform()
+        time.sleep(self.stroke)
+
+    def go(self, selector):
+        """Move the focus there by Tab."""
+        self.wait(lambda: self.texts(selector), f"there is a {selector}")
+        time.sleep(self.field)
+        for _ in range(MOST_TRIES):
+            if not (tabs := self.driver.execute_script(_TABS, selector)):
+                return
+            actions = self.actions()
+            if tabs < 0:
+                actions.key_down(SHIFT)
+            for _ in range(abs(tabs)):
+                actions.send_keys(TAB).pause(self.stroke)
+            actions.perform()
+            actions.reset_actions()  # lets go of the keys
+        raise AssertionError(f"{selector} cannot be reached by Tab")
+
+    def type(self, selector, text):
+        """Go to a field, and type into it in place of what it holds."""
+        self.go(selector)
+        if self.texts(selector) != [""]:
+            self.hold(CONTROL, "a")
+        self.press(*text)
+
+    def leave(self):
+        """Go on to the next field: what was typed is finished."""
+        self.press(TAB)
+
+    def next(self, text):
+        """Type into the field after this one."""
+        self.leave()
+        time.sleep(self.field)
+        self.press(*text)
+
+    def push(self, selector, key=ENTER):
+        """A button."""
+        self.go(selector)
+        self.press(key)
+
+    def saved(self):
+        """Wait until all is saved."""
+        self.wait(lambda: self.text("#saved").startswith(("saved", "all is saved")), "all is saved")
+
+    def text(self, selector):
+        """What the first one shows."""
+        return self.texts(selector)[0]
+
+    def texts(self, selector):
+        """What all of them show: the number of a value, the text of a cell."""
+        return self.driver.execute_script(_TEXTS, selector)
+
+    def document(self, name="answer"):
+        """Numbers of a document that the page shows, by their paths."""
+        return dict(self.driver.execute_script(_NUMBERS, f'[data-doc="{name}"] .value'))
+
+    def clipboard(self, text):
+        """Put a text where Ctrl+V takes it from."""
+        rights = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
+        self.driver.execute_cdp_cmd("Browser.grantPermissions", rights)
+        assert self.driver.execute_async_script(_COPY, text) == ""

@@ -1,0 +1,285 @@
+"""The worksheet's page in a real browser, by keyboard alone: whole jobs, two windows, kill -9, axe.
+
+Without Chromium the tests are skipped, and say which packages bring it; where CI=true it must be there.
+"""
+
+import contextlib
+import json
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import browser as chromium
+import pytest
+from worksheet.served import Served
+from worksheet.stranger import stranger
+from worksheet.typed_job import rows, type_job
+from worksheet.window import CONTROL, TAB, Window
+
+from rotorid.samples import sample_data
+
+pytest.importorskip("starlette", reason="without the extra rotorid[worksheet]")
+pytest.importorskip("uvicorn", reason="without the extra rotorid[worksheet]")
+pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
+
+FINGER = 40  # pixels that a finger needs
+SIZES = {1366: 768, 1024: 768, 800: 1280}
+PUSHED = 10.0  # seconds; a window that is told nothing asks again after 20
+FIRST, SECOND = (f'[data-cell="runs|baseline|1220|probe {k}|phase_deg"]' for k in (1, 2))
+
+# Of what a finger should hit, the smaller side of it or of its label; what is out of sight is left out.
+_TARGETS = """
+return Array.from(document.querySelectorAll('button, a, input, select, summary')).map(e => {
+  const box = (e.type === 'checkbox' || e.type === 'file' ? e.closest('label') : e).getBoundingClientRect();
+  const name = `${e.tagName} ${e.id} ${e.textContent.trim().slice(0, 40)}`;
+  return [name, Math.min(box.width, box.height), box.right];
+}).filter(([, side, right]) => side > 0 && side < arguments[0] && right > 0);
+"""
+_AXE = """
+const done = arguments[0];
+axe.run().then(found => done(found.violations), e => done([{impact: 'none', id: String(e), nodes: []}]));
+"""
+
+
+def session(folder):
+    lacking = chromium.missing()
+    if lacking and chromium.on_ci():
+        pytest.fail(f"CI needs a browser: {lacking}")
+    if lacking:
+        pytest.skip(lacking)
+    return chromium.Browser(folder)
+
+
+@pytest.fixture(scope="module")
+def browsers(tmp_path_factory):
+    """Two, for two windows that both have the focus."""
+    with contextlib.ExitStack() as stack:
+        both = [session(tmp_path_factory.mktemp("profile")) for _ in range(2)]
+        for one in both:
+            stack.callback(one.close)
+        yield both
+
+
+@pytest.fixture
+def windows(browsers):
+    for one in browsers:
+        one.resize(1366, 768)
+    yield [Window(one) for one in browsers]
+    for one in browsers:
+        one.driver.get("about:blank")  # nobody asks a program that has ended
+
+
+@pytest.fixture
+def serve():
+    running = []
+
+    def start(job, *options):
+        running.append(Served(job, *options))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.close()
+
+
+@pytest.fixture
+def turbo(tmp_path):
+    """A copy of the job, ready to be changed."""
+    return Path(shutil.copytree(sample_data() / "turbo_job", tmp_path / "turbo_job"))
+
+
+def phases(folder):
+    return [row["phase_deg"] for row in rows(folder / "runs.csv")]
+
+
+def corrections(job):
+    """What the command line says."""
+    command = [sys.executable, "-m", "rotorid", "balance", str(job), "--json"]
+    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)[
+        "corrections"
+    ]
+
+
+def shown(window, told):
+    """Of the corrections that the command line says: what the page shows of them, numbers as numbers."""
+    found = [{} for _ in told]
+    for path, text in window.document().items():
+        if path.startswith("corrections."):
+            _, place, key = path.split(".")
+            found[int(place)][key] = text if isinstance(told[int(place)][key], str) else float(text)
+    return found
+
+
+@pytest.mark.parametrize("name", ["bk_two_plane", "left_in"])
+def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, name):
+    folder, sample, window = tmp_path / "new", sample_data() / name, windows[0]
+    folder.mkdir()
+    served = serve(folder)
+    visits = [window.open(served.address)]
+    type_job(window, sample, 120)
+    window.wait(lambda: window.texts('[data-doc="answer"]'), "an answer")
+    for field, text in (("rotor_mass", "50"), ("speed", "3000"), ("radius", "120")):
+        window.type(f'[name="{field}"]', text)
+    window.push("#propose")
+    window.wait(lambda: window.texts("#trial-answer p"), "a trial weight")
+    served.settled()
+    window.wait(lambda: not window.text("#busy"), "all is computed")
+
+    assert {path.name for path in folder.iterdir()} == {"job.toml", "runs.csv", "weights.csv"}
+    settings = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))
+    planes = {plane: {"radius_mm": 120} for plane in ("1", "2")}
+    stated = {"phase": "lead", "angles": "with rotation", "planes": planes}
+    assert settings == {"runs": "runs.csv", "weights": "weights.csv", **stated}
+    for table in ("runs.csv", "weights.csv"):
+        expected = [{**row, "run": row["run"].replace("initial", "baseline")} for row in rows(sample / table)]
+        # of what the page cannot leave open, a unit, the numbers do not depend
+        named = [{**row, "amplitude": row.pop("amplitude_um_pp")} for row in rows(folder / table)]
+        assert rows(folder / table) == expected
+
+    told = corrections(folder / "job.toml")
+    found = shown(window, told)
+    assert [{"plane", "mass", "angle_deg"} - row.keys() for row in found] == [set(), set()]
+    assert found == [{key: row[key] for key in found[0]} for row in told]
+    for ours, theirs in zip(told, corrections(sample / "job.toml"), strict=True):
+        for key in ("mass", "angle_deg"):
+            assert ours[key] == pytest.approx(theirs[key], rel=1e-9)
+
+    visits.append(window.browser.heard())
+    asked = [url for visit in visits for url in visit.requests if not url.startswith(("data:", "blob:"))]
+    assert len(asked) > 50
+    assert [url for url in asked if not url.startswith(f"http://127.0.0.1:{served.port}/")] == []
+    assert [line for visit in visits for line in visit.console] == []
+
+
+def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
+    window = windows[0]
+    served = serve(turbo / "job.toml")
+    window.open(served.address)
+    window.type(FIRST, "101")
+    window.leave()
+    window.saved()
+    window.press(TAB, *"102", TAB, TAB, *"103", TAB)
+    served.kill()  # two cells may be on their way
+    window.press(TAB, *"104", TAB)
+    window.wait(lambda: window.text("#saved").startswith("not saved"), "not saved")
+    assert "waiting" in window.text("#saved")
+    assert phases(turbo)[0] == "101"
+    assert not [path for path in turbo.iterdir() if ".tmp" in path.name]
+
+    again = serve(turbo / "job.toml", "--port", str(served.port))
+    window.wait(lambda: "a program that has ended" in window.text("#message"), "the token is an old one")
+    assert again.state()["tables"]["runs"]["rows"][0]["cells"][-1] == "101"
+    window.driver.get(again.address)  # of the same page: what waits there stays
+    window.saved()
+    assert phases(turbo)[:4] == ["101", "102", "103", "104"]
+    window.open(again.address)
+    assert window.texts('[data-cell^="runs|baseline|1220|"][data-cell$="phase_deg"]') == phases(turbo)[:4]
+
+
+def test_two_windows_on_one_job_lose_nothing(turbo, serve, windows):
+    one, other = windows
+    served = serve(turbo / "job.toml")
+    for window in windows:
+        window.open(served.address)
+    one.type(FIRST, "90")
+    other.type(SECOND, "91")
+    one.leave()
+    other.wait(lambda: other.text(FIRST) == "90", "the cell of the other window", PUSHED)
+    assert other.text(SECOND) == "91"  # not finished, and kept
+    assert phases(turbo)[:2] == ["90", "92"]
+    other.press("5", TAB)
+    one.wait(lambda: one.text(SECOND) == "915", "the cell of the other window", PUSHED)
+    assert phases(turbo)[:2] == ["90", "915"]
+
+    one.type(FIRST, "50")
+    other.type(FIRST, "60")
+    other.leave()
+    other.saved()
+    assert one.text(FIRST) == "50"
+    one.leave()
+    asked = f'[data-write="{FIRST.split(chr(34))[1]}"]'
+    one.wait(lambda: one.texts(asked) == ["Write 50"], "the page asks")
+    assert one.texts(asked.replace("write", "keep")) == ["Keep 60"]
+    assert phases(turbo)[0] == "60"
+    one.push(asked)
+    other.wait(lambda: other.text(FIRST) == "50", "the answer of the other window", PUSHED)
+    assert phases(turbo)[0] == "50"
+    assert one.texts("[data-write]") == []
+
+
+def test_a_wrong_token_another_origin_another_host(turbo, serve, windows):
+    window = windows[0]
+    served = serve(turbo / "job.toml")
+    before = (turbo / "job.toml").read_bytes()
+    base = served.address.split("#")[0]
+    for token, why in (("#wrong", "a program that has ended"), ("", "lacks its token")):
+        window.driver.get("about:blank")
+        window.browser.open(base + token)
+        window.wait(lambda w=why: w in window.text("#message"), why)
+        assert window.texts("[data-cell]") == []
+
+    with stranger(served.address) as address:
+        window.browser.open(address)
+        tried = window.wait(lambda: window.text("p"), "the tries have ended").split(", ")
+        assert [one.split()[0] for one in tried[:2]] == ["rejected", "rejected"]
+        assert tried[2] in ("rejected ", "fulfilled opaque")
+        window.driver.switch_to.frame(0)
+        assert window.texts("h1#job") == []
+        window.driver.switch_to.default_content()
+    window.browser.open(served.address.replace("127.0.0.1", "rebound.example"))
+    assert "this name of the computer is not that of the worksheet" in window.browser.text()
+    assert (turbo / "job.toml").read_bytes() == before
+
+
+def test_a_block_from_excel_is_one_step(turbo, serve, windows):
+    window = windows[0]
+    before = (turbo / "runs.csv").read_bytes()
+    window.open(serve(turbo / "job.toml").address)
+    cells = '[data-cell^="runs|baseline|1220|"], [data-cell^="runs|baseline|1360|"]'
+    held = window.texts(cells)
+    window.clipboard("3,5\t91\t9,5\t93\r\n4,5\t279\t11,25\t277\r\n")
+    window.go('[data-cell="runs|baseline|1220|probe 2|amplitude_um_pp"]')
+    window.hold(CONTROL, "v")
+    window.wait(lambda: window.text(FIRST.replace("probe 1", "probe 3")) == "93", "the block is there")
+    window.saved()
+    expected = [*held]
+    expected[2:6], expected[10:14] = ["3.5", "91", "9.5", "93"], ["4.5", "279", "11.25", "277"]
+    window.wait(lambda: window.texts(cells) == expected, "as the file writes them")
+    lines = (turbo / "runs.csv").read_text().splitlines()
+    assert [lines[k] for k in (2, 3, 6, 7)] == [
+        "baseline,1220,probe 2,3.5,91",
+        "baseline,1220,probe 3,9.5,93",
+        "baseline,1360,probe 2,4.5,279",
+        "baseline,1360,probe 3,11.25,277",
+    ]
+    window.hold(CONTROL, "z")
+    window.wait(lambda: window.texts(cells) == held, "one step takes it back")
+    window.saved()
+    assert (turbo / "runs.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("job", ["new", "holes.toml", "checked.toml"])
+def test_nothing_sticks_out_and_axe_finds_nothing_serious(turbo, serve, windows, job):
+    axe = Path(pytest.importorskip("axe_core_python").__file__).parent / "axe.min.js"
+    window = windows[0]
+    (turbo / "new").mkdir()
+    served = serve(turbo / job)
+    window.open(served.address)
+    if job != "new":
+        kind = {"holes.toml": "pieces", "checked.toml": "trim"}[job]
+        window.wait(lambda: window.texts(f'[data-doc="{kind}"]') and not window.text("#busy"), kind)
+        window.wait(lambda: window.texts("#polar svg") and window.texts("#overview svg"), "the pictures")
+    window.driver.execute_script(axe.read_text(encoding="utf-8"))
+    for width, height in SIZES.items():
+        window.browser.resize(width, height)
+        assert window.browser.widths() == (width, width), window.browser.too_wide()
+        found = window.driver.execute_async_script(_AXE)
+        serious = [one for one in found if one["impact"] not in ("minor", "moderate")]
+        assert [(one["id"], [node["html"][:200] for node in one["nodes"]]) for one in serious] == []
+        if width < 1366:
+            small = [
+                (what, side) for what, side, _ in window.driver.execute_script(_TARGETS) if side < FINGER
+            ]
+            assert small == []
