@@ -135,7 +135,6 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     for table in ("runs.csv", "weights.csv"):
         expected = [{**row, "run": row["run"].replace("initial", "baseline")} for row in rows(sample / table)]
         # of what the page cannot leave open, a unit, the numbers do not depend
-        named = [{**row, "amplitude": row.pop("amplitude_um_pp")} for row in rows(folder / table)]
         assert rows(folder / table) == expected
 
     told = corrections(folder / "job.toml")
