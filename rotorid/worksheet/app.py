@@ -114,7 +114,7 @@ class Routes:
         name, asked = request.path_params["name"], request.query_params
         if name == "runs":
             place = {key: asked[key] for key in ("speed", "sensor")}
-            return _svg(await self.session.front.ask("channel", **self.session.about(), **place))
+            return _svg(await self.session.drawing.ask("channel", **self.session.about(), **place))
         try:
             return _svg(await self.session.picture(name))
         except Refused:  # the job has changed since the page saw that picture
@@ -123,7 +123,7 @@ class Routes:
     async def convention(self, request: Request) -> Response:
         """One of the four drawings: lead-with, lead-against, lag-with, lag-against."""
         phase, _, side = request.path_params["name"].partition("-")
-        return _svg(await self.session.front.ask("convention", phase=phase, angles=f"{side} rotation"))
+        return _svg(await self.session.drawing.ask("convention", phase=phase, angles=f"{side} rotation"))
 
     async def sheet(self, request: Request) -> Response:
         """The balancing sheet."""

@@ -35,14 +35,14 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    front, aside
-        What answers at once, and what may take its time.
+    front, drawing, aside
+        What answers at once, what draws, and what may take its time.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.aside = (Worker(files.job.absolute().parent) for _ in range(2))
+        self.front, self.drawing, self.aside = (Worker(files.job.absolute().parent) for _ in range(3))
         self._of_files = 1
         self._notice = ""
         self._behind = ""
@@ -53,15 +53,13 @@ class Session:
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Compute, and look for changes from outside, until the page is closed."""
-        await self.front.start()
-        await self.aside.start()
         await self.changed()
         watching = asyncio.ensure_future(self._watch())
         yield
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        await asyncio.gather(self.front.stop(), self.aside.stop())
+        await asyncio.gather(*(worker.stop() for worker in (self.front, self.drawing, self.aside)))
 
     def state(self) -> dict[str, Any]:
         """All that a window shows."""
@@ -100,8 +98,8 @@ class Session:
 
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
-        kind = {"overview": "answer", "discs": "pieces"}[name] + self._behind
-        return str(await self.aside.ask("picture", **self.about(), kind=kind))
+        worker, kind = {"overview": (self.drawing, "answer"), "discs": (self.aside, "pieces")}[name]
+        return str(await worker.ask("picture", **self.about(), kind=kind + self._behind))
 
     async def append(self, name: str, data: str, run: str) -> list[str | None]:
         """Add the rows of another runs table to that of the job, all as one run where it is named.
