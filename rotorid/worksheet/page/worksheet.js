@@ -75,13 +75,13 @@ async function away({ status }) {
 const send = (path, body) => new Promise((done, failed) => {
   tell("");
   if (queue.push({ path, body, done, failed }) === 1) drain();
+  renderHeader();
 });
 const edit = (...edits) => send("/edit", { edits }).catch(tell);
 
 async function drain() {
   for (; queue.length; renderHeader()) {
     const { path, body, done, failed } = queue[0];
-    renderHeader();
     try {
       await ask(path, body);
       said = `saved ${new Date().toTimeString().slice(0, 8)}`;
@@ -136,7 +136,7 @@ const runs = () => valuesOf("run", "runs", "weights");
 const planes = () => each([...Object.keys(state.settings.planes || {}), ...valuesOf("plane", "weights")]);
 const baseline = () =>
   state.results.runs?.baseline || runs().find((run) => !rowsOf("weights", run).length) || "baseline";
-const isEmpty = (row) => !row.amplitude && !row.phase;
+const isEmpty = (row) => row.amplitude === "" && row.phase === "";
 const usual = () => rowsOf("runs", baseline()).filter((row) => row.place === row.speed);
 const remove = (name, rows) => rows.map((row) => ({ table: name, delete: row.id, old: row.cells }));
 const add = (name, cells, after = null) => ({ table: name, after, cells });
@@ -265,7 +265,7 @@ function renderMachine() {
   show("planes", planes().map((plane) => h("option", { value: plane })));
   show("machine", closed.map((text) => h("p", { class: "why" }, text)),
     cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
-    data.runs && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
+    limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
 }
 
 function renderConventions() {
