@@ -21,11 +21,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotorid.tables import Job
     from rotorid.workflows.balance import Balance
     from rotorid.workflows.result_provenance import Outcome
 
 KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
 """Balances of one job, by the options of `rotorid balance`."""
+UNCHECKED = " before the check run"
+"""Behind a kind: as if there were no check run, which somebody is typing."""
 _kept: dict[str, tuple[int, Balance]] = {}
 """The newest of each kind, with the version of the files: pictures and sheets are made of it."""
 
@@ -56,8 +59,25 @@ def _balance(job: str, version: int, kind: str) -> Balance:
 
     known = _kept.get(kind)
     if known is None or known[0] != version:
-        known = _kept[kind] = version, balance(Path(job), BalanceOptions(**KINDS[kind]))
+        options = BalanceOptions(**KINDS[kind.removesuffix(UNCHECKED)])
+        read = _without_check(Path(job)) if kind.endswith(UNCHECKED) else Path(job)
+        known = _kept[kind] = version, balance(read, options)
     return known[1]
+
+
+def _without_check(path: Path) -> Job:
+    """The job as it is before its check run."""
+    from rotorid.tables.job.job_data import Overrides
+    from rotorid.tables.job.job_from_excel import open_job
+    from rotorid.tables.job.job_reading import job_of
+    from rotorid.tables.reader.problems import Problems
+
+    problems = Problems()
+    written = open_job(path, problems)
+    for key in ("check", "check_weights"):
+        written.settings.pop(key, None)
+        written.tables.pop(key, None)
+    return job_of(path, written.top(problems), written.tables, Overrides(), problems)
 
 
 def told(outcome: Outcome) -> dict[str, Any]:
@@ -80,6 +100,8 @@ def balanced(job: str, version: int, kind: str) -> dict[str, Any]:
         warnings.simplefilter("always")
         found = told(_balance(job, version, kind))
     said = kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
+    if kind.endswith(UNCHECKED):
+        said.insert(0, "the check run is not finished: the answer is that of the runs before it")
     return {**found, "warnings": [*said, *found["warnings"]]}
 
 
@@ -135,8 +157,9 @@ def convention(phase: str, angles: str) -> str:
     from rotorid.tables.runs.stated_conventions import as_angles, as_phase
 
     labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
-    turning = _svg(explained.rotor_figure(labels), f"Angles of weights {angles}")
-    return turning + _svg(explained.phase_figure(labels), f"A phase of 60° as {phase}")
+    title = f"phase {phase}, angles {angles}"
+    turning = _svg(explained.rotor_figure(labels), f"The rotor from its end: {title}")
+    return turning + _svg(explained.phase_figure(labels), f"A reading over time: {title}")
 
 
 def rows(name: str, data: str) -> dict[str, Any]:

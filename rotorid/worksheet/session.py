@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from rotorid.tables.job.job_keys import TABLES
+from rotorid.worksheet.calculation import UNCHECKED
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.workers import Refused, Worker
 
@@ -44,6 +45,7 @@ class Session:
         self.front, self.aside = (Worker(files.job.absolute().parent) for _ in range(2))
         self._of_files = 1
         self._notice = ""
+        self._behind = ""
         self._results = dict(_NOTHING)
         self._news = asyncio.Condition()
         self._computing: asyncio.Task[None] | None = None
@@ -90,7 +92,7 @@ class Session:
     @property
     def best(self) -> str:
         """What is printed: the pieces in holes where there are some."""
-        return "answer" if self._results["pieces"] is None else "pieces"
+        return ("answer" if self._results["pieces"] is None else "pieces") + self._behind
 
     def about(self) -> dict[str, Any]:
         """What a request to a worker says of the job."""
@@ -98,7 +100,7 @@ class Session:
 
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
-        kind = {"overview": "answer", "discs": "pieces", "trim": "trim"}[name]
+        kind = {"overview": "answer", "discs": "pieces"}[name] + self._behind
         return str(await self.aside.ask("picture", **self.about(), kind=kind))
 
     async def append(self, name: str, data: str, run: str) -> list[str | None]:
@@ -146,30 +148,40 @@ class Session:
             await self._publish(**{**_NOTHING, "refused": outside})
             return
         await self._part("runs", self.front.ask("so_far", **about))
-        if not await self._part("answer", self.front.ask("balanced", **about, kind="answer")):
+        self._behind = ""
+        found = await self._part("answer", self.front.ask("balanced", **about, kind="answer"))
+        if not found and "check" in state["tables"]:
+            self._behind = UNCHECKED
+            asked = self.front.ask("balanced", **about, kind="answer" + UNCHECKED)
+            found = await self._part("answer", asked, keep=True)
+        if not found:
             await self._publish(busy="")
             return
         await self._publish(pictures={"overview": str(self.version)})
-        if "check" in state["tables"]:
+        if "check" in state["tables"] and not self._behind:
             await self._publish(busy="computing the trim")
             await self._part("trim", self.aside.ask("balanced", **about, kind="trim"))
         if any(_holes(plane) for plane in state["settings"].get("planes", {}).values()):
             await self._publish(busy="choosing pieces for the holes")
-            if await self._part("pieces", self.aside.ask("balanced", **about, kind="pieces")):
+            if await self._part("pieces", self.aside.ask("balanced", **about, kind="pieces" + self._behind)):
                 pictures = {"overview": str(self.version), "discs": str(self.version)}
                 await self._publish(pictures=pictures)
         await self._publish(busy="")
 
-    async def _part(self, name: str, asked: Any) -> bool:  # noqa: ANN401 - a coroutine of `ask`
-        """Publish one part, or why there is none; whether there is one."""
+    async def _part(self, name: str, asked: Any, *, keep: bool = False) -> bool:  # noqa: ANN401 - of `ask`
+        """Publish one part, or why there is none (`keep` what was said); whether there is one."""
+        said: dict[str, Any] = {}
         try:
             found = await asked
         except Refused as error:
-            told = {"problems": [self._problem(one) for one in error.problems], "refused": str(error)}
-            await self._publish(**{name: None}, **(told if name == "answer" else {}))
-            return False
-        await self._publish(**{name: found}, **({"problems": [], "refused": ""} if name == "answer" else {}))
-        return True
+            found = None
+            said = {"problems": [self._problem(one) for one in error.problems], "refused": str(error)}
+        if name != "answer" or keep:
+            said = {}
+        elif found is not None:
+            said = {"problems": [], "refused": ""}
+        await self._publish(**{name: found}, **said)
+        return found is not None
 
     def _problem(self, problem: dict[str, Any]) -> dict[str, Any]:
         """A problem of a file, with the cell of the page."""

@@ -169,7 +169,8 @@ function jsonOf(path, text) {
 function setting(top, begin, usualName, label) {
   const known = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
   const path = [...top, known || usualName];
-  return { key: path.join("."), path, text: textOf(at(state.settings, path)), label: `${label}, ${top[1]}` };
+  const text = textOf(at(state.settings, path));
+  return { key: path.join("."), path, text, label: `${label}, ${top.at(-1)}` };
 }
 
 /* Cells to type in. */
@@ -229,8 +230,8 @@ function weights(name, run) {
       button("Remove", () => edit(...remove(name, [row])), { "aria-label": `Remove ${label} of ${run}` })];
   });
   const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
-  const another = () => edit(add(name, { run }, own.at(-1)?.id));
-  return [cellTable([heads], lines), button("Add a weight", another, { "data-add": run })];
+  const more = () => edit(add(name, { run }, own.at(-1)?.id));
+  return [cellTable([heads], lines), button("Add a weight", more, { "data-add": run })];
 }
 
 function card(name, run) {
@@ -252,20 +253,22 @@ function card(name, run) {
 /* The steps. */
 function renderMachine() {
   const column = data.weights?.names.weight || $("setup-weight-unit").value;
-  const unit = unitOf(column);
-  const pieces = column.replace(/mass|unbalance/, "available");
+  const [unit, pieces] = [unitOf(column), column.replace(/mass|unbalance/, "available")];
   const keys = [["max_", `max_${column}`, `largest, ${unit}`], ["radius_", "radius_mm", "radius, mm"],
     ["holes", "holes", "holes"], ["first_hole", "first_hole_deg", "first hole, °"],
     ["available", pieces, `pieces, ${unit}`], ["per_", "per_hole", "per hole"], ["stock", "stock", "stock"]];
   const lines = planes().map((plane) => [plane, keys.map((key) => setting(["planes", plane], ...key))]);
   const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest"));
+  const kinds = { amplitude_percent: "reading, %", phase_deg: "phase, °", run_percent: "run to run, %" };
+  const errors = Object.entries(kinds).map(([key, label]) => setting(["errors"], key, key, label));
   const closed = each([state.read_only, ...Object.values(data).map((one) => one.closed)]);
   if (!data.runs && !queue.length) $("setup").open = true;
   $("new-unit").hidden = Boolean(data.weights);
   show("planes", planes().map((plane) => h("option", { value: plane })));
   show("machine", closed.map((text) => h("p", { class: "why" }, text)),
     cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
-    limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]));
+    limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]),
+    cellTable([[["errors"], ...Object.values(kinds).map((word) => [word])]], [["standard", errors]]));
 }
 
 function renderConventions() {
@@ -351,11 +354,11 @@ function renderNow() {
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
   const empty = allRows("runs").filter(isEmpty);
-  const drop = () => edit(...remove("runs", empty));
   show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
     h("div", { class: "why" }, list([...problems(false), ...refused])), why && h("p", {}, why),
     left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
-    empty.length > 0 && button("Not measured: remove the empty rows", drop, { id: "drop-empty" }));
+    empty.length > 0 && button("Not measured: remove the empty rows",
+      () => edit(...remove("runs", empty)), { id: "drop-empty" }));
 }
 
 function renderAnswer() {

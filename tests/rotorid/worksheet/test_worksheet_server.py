@@ -370,3 +370,28 @@ def test_a_workbook_of_rotorid_is_edited_and_another_is_not(tmp_path, serve):
     row = state["tables"]["runs"]["rows"][0]
     assert served.edit({**edit, "row": row["id"], "old": "95", "new": "96"})[0] == 400
     assert (folder / "other.xlsx").read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["job.toml", "holes.toml"])
+def test_while_a_check_run_is_typed_the_answer_before_it_stays(tmp_path, serve, name):
+    served = serve(copy(tmp_path) / name)
+    before = served.settled()["results"]
+    header = served.state()["tables"]["runs"]["header"]
+    row = {"run": "check", "speed_rpm": "1220", "sensor": "probe 1"}
+    edits = {"create": "check", "header": header}, {"table": "check", "after": None, "cells": row}
+    assert served.edit(*edits)[0] == 200
+    found = served.settled()["results"]
+    for kind in ("answer", "pieces"):
+        if before[kind] is None:
+            assert found[kind] is None
+            continue
+        assert found[kind]["document"]["corrections"] == before[kind]["document"]["corrections"]
+        assert found[kind]["warnings"][0].startswith("the check run is not finished")
+    assert {one["table"] for one in found["problems"]} == {"check"}
+    assert found["trim"] is None
+    assert served.ask("/picture/overview")[0] == 200
+    assert served.ask("/sheet")[0] == 200
+    # the trial runs themselves must be whole
+    last = served.state()["tables"]["runs"]["rows"][-1]
+    assert served.edit({"table": "runs", "delete": last["id"], "old": last["cells"]})[0] == 200
+    assert served.settled()["results"]["answer"] is None
