@@ -3,7 +3,8 @@
 import time
 
 # As WebDriver writes them; here, because selenium may be missing.
-TAB, ENTER, SPACE, SHIFT, CONTROL = "\ue004", "\ue007", "\ue00d", "\ue008", "\ue009"
+TAB, ENTER, SPACE, UP, DOWN = "\ue004", "\ue007", "\ue00d", "\ue013", "\ue015"
+SHIFT, CONTROL = "\ue008", "\ue009"
 
 # How many Tabs lead to what is looked for, about; negative: backwards; null: there is none.
 _TABS = """
