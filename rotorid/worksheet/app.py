@@ -15,7 +15,7 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -65,7 +65,7 @@ class Guard:
         if int(request.headers.get("content-length", "0")) > _LARGEST:
             return f"at most {_LARGEST // 10**6} MB"
         given = request.headers.get(TOKEN, "").encode()
-        if request.url.path not in PAGE and not hmac.compare_digest(given, self.token):
+        if request.scope["path"] not in PAGE and not hmac.compare_digest(given, self.token):
             return "the address lacks the token of this worksheet: open the one that the program shows"
         return ""
 
@@ -83,23 +83,23 @@ class Routes:
     async def edit(self, request: Request) -> Response:
         """Cells, rows, settings: all of them, or none."""
         rows = self.session.files.apply((await request.json())["edits"])
-        return _json({"version": await self.session.changed(), "rows": rows})
+        return _json({"version": self.session.changed(), "rows": rows})
 
     async def undo(self, request: Request) -> Response:
         """The last edit of any window."""
         self.session.files.undo()
-        return _json({"version": await self.session.changed()})
+        return _json({"version": self.session.changed()})
 
     async def redo(self, request: Request) -> Response:
         """The last edit that was undone."""
         self.session.files.redo()
-        return _json({"version": await self.session.changed()})
+        return _json({"version": self.session.changed()})
 
     async def take(self, request: Request) -> Response:
         """Rows of a file that a person chose."""
         given = await request.json()
         rows = await self.session.append(given["name"], given["data"], given.get("run", ""))
-        return _json({"version": await self.session.changed(), "rows": rows})
+        return _json({"version": self.session.changed(), "rows": rows})
 
     async def trial(self, request: Request) -> Response:
         """A first trial weight."""
@@ -114,7 +114,7 @@ class Routes:
         name, asked = request.path_params["name"], request.query_params
         if name == "runs":
             place = {key: asked[key] for key in ("speed", "sensor")}
-            return _svg(await self.session.front.ask("channel", **self.session.about(), **place))
+            return _svg(await self.session.drawing.ask("channel", **self.session.about(), **place))
         try:
             return _svg(await self.session.picture(name))
         except Refused:  # the job has changed since the page saw that picture
@@ -123,7 +123,7 @@ class Routes:
     async def convention(self, request: Request) -> Response:
         """One of the four drawings: lead-with, lead-against, lag-with, lag-against."""
         phase, _, side = request.path_params["name"].partition("-")
-        return _svg(await self.session.front.ask("convention", phase=phase, angles=f"{side} rotation"))
+        return _svg(await self.session.drawing.ask("convention", phase=phase, angles=f"{side} rotation"))
 
     async def sheet(self, request: Request) -> Response:
         """The balancing sheet."""
@@ -197,9 +197,9 @@ def _told(route: Callable[[Request], Awaitable[Response]]) -> Callable[[Request]
         except Refused as error:
             words = "\n".join([str(error), *(one["text"] for one in error.problems)])
             return JSONResponse({"error": words.strip()}, 400, HEADERS)
-        except (KeyError, TypeError) as error:
+        except (KeyError, TypeError, AttributeError, RecursionError) as error:
             return JSONResponse({"error": f"the page asked for what there is not: {error}"}, 400, HEADERS)
-        except (ValueError, OSError) as error:
+        except (ValueError, OSError, ClientDisconnect) as error:  # who has gone reads no answer
             return JSONResponse({"error": str(error)}, 400, HEADERS)
 
     return answered

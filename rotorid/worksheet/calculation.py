@@ -10,8 +10,10 @@ line calls.
 from __future__ import annotations
 
 import base64
+import errno
 import json
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -31,21 +33,36 @@ UNCHECKED = " before the check run"
 """Behind a kind: as if there were no check run, which somebody is typing."""
 _kept: dict[str, tuple[int, Balance]] = {}
 """The newest of each kind, with the version of the files: pictures and sheets are made of it."""
+_read: set[str] = set()
+"""Names of the files that were read."""
 
 
 def main() -> None:
     """Answer requests until standard input ends."""
+    from rotorid.tables.reader.input_file import reading
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    reading.set(_noted)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     sys.stdout = sys.stderr  # nothing that is printed may come between the answers
     for line in sys.stdin:
         request = json.loads(line)
-        print(json.dumps(_answered(request.pop("do"), request)), file=answers, flush=True)
+        answer = {**_answered(request.pop("do"), request.pop("folder"), request), "read": sorted(_read)}
+        print(json.dumps(answer), file=answers, flush=True)
 
 
-def _answered(name: str, request: dict[str, Any]) -> dict[str, Any]:
+def _noted(path: Path) -> None:
+    """Refuse a file outside of the folder, by whatever file it is named."""
+    if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(".")):
+        raise OSError(errno.EACCES, "it is outside the folder of the job, where the worksheet reads nothing")
+    _read.add(str(path))
+
+
+def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]:
     from rotorid.tables.reader.problems import InputError
 
     try:
+        os.chdir(folder)  # each time: another one may have been put in its place
         return {"value": REQUESTS[name](**request)}
     except InputError as error:
         return {"problems": [{**vars(one), "text": str(one)} for one in error.problems]}

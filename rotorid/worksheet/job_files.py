@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import os
 import re
 import time
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -136,7 +137,8 @@ class JobFiles:
     """
 
     def __init__(self, given: Path) -> None:
-        self.job = _job_in(Path(given))
+        self.job = _job_in(Path(given)).absolute()
+        self._others: dict[Path, object] = {}
         self._ids = itertools.count(1)
         self._known: dict[str, Cells] = {}
         self._stamps: dict[Path, object] = {}
@@ -155,7 +157,7 @@ class JobFiles:
         now = self._now
         return {
             "job": self.job.name,
-            "folder": self.job.absolute().parent.name,
+            "folder": self.job.parent.name,
             "exists": now.data[self.job] is not None,
             "kind": "workbook" if is_workbook(self.job) else "files",
             "read_only": now.read_only,
@@ -168,21 +170,31 @@ class JobFiles:
     def place(self, file: str, row: int) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
-            folder = self._now.paths.get(key, self.job).resolve().parent
-            if Path(file).name == table.name and (self.job.parent / file).resolve().parent == folder:
+            found = (self._now.paths.get(key, self.job), self.job.parent / file)
+            one, other = (os.path.dirname(os.path.realpath(path)) for path in found)
+            if Path(file).name == table.name and one == other:
                 return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
-    def look(self) -> list[str]:
-        """Names of the files that another program has changed since the last look."""
+    def look(self, others: Iterable[str] = ()) -> list[str]:
+        """Names of the files that another program has changed since the last look, of `others` too."""
         for path, known in self._now.data.items():
             stamp = _stamp(path)
             if stamp is None or stamp != self._stamps.get(path):
-                with suppress(ValueError):  # another program is at it
-                    if self._read(path) != known:
+                with suppress(ValueError):  # another program is at the job
+                    try:
+                        data = self._read(path)
+                    except ValueError:
+                        data = known if path == self.job else None  # as a version has it
+                    if data != known:
                         self._settle({}, {}, {})
                         break
                     self._stamps[path] = stamp
+        for path in {self.job.parent / name for name in others} - self._now.data.keys():
+            stamp = _stamp(path, 0)
+            if stamp != self._others.setdefault(path, stamp):
+                self._noticed.append(path.name)
+            self._others[path] = stamp
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
         return names
 
@@ -353,16 +365,16 @@ def _is_open(path: Path, program: str, hint: str) -> str:
 
 
 def _is_inside(path: Path, job: Path) -> bool:
-    return path.resolve().is_relative_to(job.absolute().parent.resolve())
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(job.parent))
 
 
-def _stamp(path: Path) -> object:
+def _stamp(path: Path, fresh: float = FRESH) -> object:
     """What tells that a file is as it was; None where nothing does."""
     try:
         found = path.stat()
     except OSError:
         return ()
-    old = time.time() - found.st_mtime > FRESH
+    old = not fresh or time.time() - found.st_mtime > fresh
     return (found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino) if old else None
 
 

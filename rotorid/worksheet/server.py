@@ -6,6 +6,7 @@ import secrets
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 
 HOST = "127.0.0.1"
 
@@ -38,6 +39,12 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
     from rotorid.worksheet.session import Session
 
     session, token = Session(JobFiles(job)), secrets.token_urlsafe(24)
+
+    class Server(uvicorn.Server):
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            session.leave()
+            super().handle_exit(sig, frame)
+
     with socket.socket() as listening:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -48,4 +55,4 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
         own = f"{HOST}:{listening.getsockname()[1]}"
         app = application(session, token, own, lambda: told(f"http://{own}/#{token}"))
         config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=1)
-        uvicorn.Server(config).run(sockets=[listening])
+        Server(config).run(sockets=[listening])

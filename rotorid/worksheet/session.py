@@ -7,7 +7,6 @@ import contextlib
 from collections.abc import AsyncIterator
 from typing import Any
 
-from rotorid.tables.job.job_keys import TABLES
 from rotorid.worksheet.calculation import UNCHECKED
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.workers import Refused, Worker
@@ -35,33 +34,31 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    front, aside
-        What answers at once, and what may take its time.
+    front, drawing, aside
+        What answers at once, what draws, and what may take its time.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.aside = (Worker(files.job.absolute().parent) for _ in range(2))
+        self.front, self.drawing, self.aside = (Worker(files.job.parent) for _ in range(3))
         self._of_files = 1
         self._notice = ""
         self._behind = ""
         self._results = dict(_NOTHING)
-        self._news = asyncio.Condition()
+        self._news, self._left = asyncio.Event(), False
         self._computing: asyncio.Task[None] | None = None
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Compute, and look for changes from outside, until the page is closed."""
-        await self.front.start()
-        await self.aside.start()
-        await self.changed()
+        self.changed()
         watching = asyncio.ensure_future(self._watch())
         yield
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        await asyncio.gather(self.front.stop(), self.aside.stop())
+        await asyncio.gather(*(worker.stop() for worker in (self.front, self.drawing, self.aside)))
 
     def state(self) -> dict[str, Any]:
         """All that a window shows."""
@@ -74,18 +71,24 @@ class Session:
 
     async def after(self, version: int, seconds: float = 20.0) -> dict[str, Any]:
         """The state, as soon as it is newer, or after so many seconds."""
-        async with self._news:
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._news.wait_for(lambda: self.version > version), seconds)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while self.version <= version and not self._left:
+                    await self._news.wait()
         return self.state()
 
-    async def changed(self, notice: str = "") -> int:
+    def leave(self) -> None:
+        """Answer those who wait for news, since the program ends."""
+        self._left = True
+        self._news.set()
+
+    def changed(self, notice: str = "") -> int:
         """Say that the files are others, and compute them anew; what is being computed is given up."""
         self._notice = notice
-        self._of_files = self.version + 1
+        self._of_files += 1
         if self._computing is not None:
             self._computing.cancel()
-        await self._publish(pieces=None, trim=None, pictures={}, busy="computing")
+        self._publish(pieces=None, trim=None, pictures={}, busy="computing")
         self._computing = asyncio.ensure_future(self._compute())
         return self.version
 
@@ -100,8 +103,8 @@ class Session:
 
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
-        kind = {"overview": "answer", "discs": "pieces"}[name] + self._behind
-        return str(await self.aside.ask("picture", **self.about(), kind=kind))
+        worker, kind = {"overview": (self.drawing, "answer"), "discs": (self.aside, "pieces")}[name]
+        return str(await worker.ask("picture", **self.about(), kind=kind + self._behind))
 
     async def append(self, name: str, data: str, run: str) -> list[str | None]:
         """Add the rows of another runs table to that of the job, all as one run where it is named.
@@ -125,27 +128,24 @@ class Session:
             cells.update({"run": run} if run else {})
         return self.files.apply([{"table": "runs", "after": None, "cells": cells} for cells in kept])
 
-    async def _publish(self, **results: object) -> None:
-        async with self._news:
-            self._results = {**self._results, **results}
-            self.version += 1
-            self._news.notify_all()
+    def _publish(self, **results: object) -> None:
+        self._results = {**self._results, **results}
+        self.version += 1
+        self._news.set()
+        self._news = asyncio.Event()
 
     async def _watch(self) -> None:
         while True:
             await asyncio.sleep(LOOK)
-            if names := self.files.look():
+            if names := self.files.look(self.front.read | self.aside.read):
                 verb = "was" if len(names) == 1 else "were"
-                await self.changed(f"{' and '.join(names)} {verb} changed by another program")
+                self.changed(f"{' and '.join(names)} {verb} changed by another program")
 
     async def _compute(self) -> None:
         """Runs, then the answer at once; pictures, trim and pieces aside."""
         about, state = self.about(), self.files.state()
         if not state["exists"]:
-            await self._publish(**_NOTHING)
-            return
-        if outside := self._outside(state["settings"]):
-            await self._publish(**{**_NOTHING, "refused": outside})
+            self._publish(**_NOTHING)
             return
         await self._part("runs", self.front.ask("so_far", **about))
         self._behind = ""
@@ -155,18 +155,18 @@ class Session:
             asked = self.front.ask("balanced", **about, kind="answer" + UNCHECKED)
             found = await self._part("answer", asked, keep=True)
         if not found:
-            await self._publish(busy="")
+            self._publish(busy="")
             return
-        await self._publish(pictures={"overview": str(self.version)})
+        self._publish(pictures={"overview": str(self.version)})
         if "check" in state["tables"] and not self._behind:
-            await self._publish(busy="computing the trim")
+            self._publish(busy="computing the trim")
             await self._part("trim", self.aside.ask("balanced", **about, kind="trim"))
         if any(_holes(plane) for plane in state["settings"].get("planes", {}).values()):
-            await self._publish(busy="choosing pieces for the holes")
+            self._publish(busy="choosing pieces for the holes")
             if await self._part("pieces", self.aside.ask("balanced", **about, kind="pieces" + self._behind)):
                 pictures = {"overview": str(self.version), "discs": str(self.version)}
-                await self._publish(pictures=pictures)
-        await self._publish(busy="")
+                self._publish(pictures=pictures)
+        self._publish(busy="")
 
     async def _part(self, name: str, asked: Any, *, keep: bool = False) -> bool:  # noqa: ANN401 - of `ask`
         """Publish one part, or why there is none (`keep` what was said); whether there is one."""
@@ -180,7 +180,7 @@ class Session:
             said = {}
         elif found is not None:
             said = {"problems": [], "refused": ""}
-        await self._publish(**{name: found}, **said)
+        self._publish(**{name: found}, **said)
         return found is not None
 
     def _problem(self, problem: dict[str, Any]) -> dict[str, Any]:
@@ -191,15 +191,6 @@ class Session:
         if (row, column) == (None, "weights"):
             text = "no trial run yet"
         return {"table": table, "row": place, "column": column, "text": text, "missing": not problem["value"]}
-
-    def _outside(self, settings: dict[str, Any]) -> str:
-        """What the job names outside of its folder; the worksheet reads nothing there."""
-        folder = self.files.job.parent.resolve()
-        for key in (*TABLES, "rotor"):
-            name = settings.get(key)
-            if isinstance(name, str) and not (folder / name).resolve().is_relative_to(folder):
-                return f"{key} = {name!r} is outside the folder of the job, where the worksheet reads nothing"
-        return ""
 
 
 def _holes(plane: object) -> bool:

@@ -15,9 +15,11 @@ _MARK = "\ue000"
 
 def settings_in(data: bytes) -> dict[str, Any]:
     """What a job file says, in types of JSON; ValueError if it is no TOML."""
-    found: dict[str, Any] = json.loads(
-        json.dumps(_loads(data.decode("utf-8-sig")), default=str), parse_constant=str
-    )
+    try:
+        plain = json.dumps(_loads(data.decode("utf-8-sig")), default=str)
+        found: dict[str, Any] = json.loads(plain, parse_constant=str)
+    except RecursionError as error:
+        raise ValueError(str(error)) from error
     return found
 
 

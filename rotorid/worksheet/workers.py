@@ -31,9 +31,16 @@ class Refused(ValueError):
 
 
 class Worker:
-    """One process of `calculation` in the folder of a job, one request at a time."""
+    """One process of `calculation` in the folder of a job, one request at a time.
+
+    Attributes
+    ----------
+    read
+        Names of all files that it has read so far.
+    """
 
     def __init__(self, folder: Path) -> None:
+        self.read: set[str] = set()
         self._folder = folder
         self._process: Process | None = None
         self._lock = asyncio.Lock()
@@ -41,10 +48,10 @@ class Worker:
     async def start(self) -> Process:
         """Start it where it does not run; it imports what it needs with the first request."""
         if self._process is None or self._process.returncode is not None:
-            # -P: what lies in the folder of a job is no module
+            # -P: what lies in the folder of a job is no module; Ctrl+C is for the server, which ends this
             command = sys.executable, "-P", "-m", "rotorid.worksheet.calculation"
             self._process = await asyncio.create_subprocess_exec(
-                *command, stdin=PIPE, stdout=PIPE, limit=_LONGEST, cwd=self._folder
+                *command, stdin=PIPE, stdout=PIPE, limit=_LONGEST, start_new_session=True
             )
         return self._process
 
@@ -62,7 +69,7 @@ class Worker:
             process = await self.start()
             assert process.stdin is not None
             assert process.stdout is not None
-            process.stdin.write(json.dumps({"do": do, **given}).encode() + b"\n")
+            process.stdin.write(json.dumps({"do": do, "folder": str(self._folder), **given}).encode() + b"\n")
             reading = asyncio.ensure_future(process.stdout.readline())
             try:
                 line = await asyncio.shield(reading)
@@ -72,10 +79,11 @@ class Worker:
                     await self.stop()
                     await self.start()
                 raise
-        if not line:
+        if not line.endswith(b"\n"):
             await self.stop()
             raise Refused("the calculation ended unexpectedly: try again", [])
         answer = json.loads(line)
+        self.read |= {*answer["read"]}
         if "value" in answer:
             return answer["value"]
         raise Refused(answer.get("refused", ""), answer.get("problems", []))

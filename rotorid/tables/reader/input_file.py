@@ -6,13 +6,15 @@ import errno
 import hashlib
 import stat
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
 STANDARD_INPUT = "-"
 MOST_BYTES = 200_000_000
+reading: ContextVar[Callable[[Path], None] | None] = ContextVar("reading", default=None)
+"""Is called before a file is opened, and may refuse it by an OSError."""
 _read: ContextVar[dict[Path, bytes] | None] = ContextVar("read", default=None)
 
 
@@ -64,6 +66,8 @@ def first_bytes(path: Path, most: int) -> bytes:
     OSError
         If it cannot be read or is no regular file.
     """
+    if (asked := reading.get()) is not None:
+        asked(path)
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise OSError(errno.EINVAL, "it is no regular file; - is standard input", str(path))
