@@ -10,24 +10,18 @@ in an empty folder to the answer of Brüel & Kjær's two-plane example, by keybo
 
 from __future__ import annotations
 
-import json
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.peers import ROOT
 from benchmarks.timing import Row, relative_difference
-
-if TYPE_CHECKING:
-    from worksheet.served import Served
-    from worksheet.window import Window
+from rotorid.workflows import BalanceOptions, balance
 
 sys.path[:0] = [str(ROOT / "tests" / "helpers")]
 SAMPLES = ROOT / "sample_data"
@@ -36,7 +30,6 @@ STROKE, FIELD, UPDATES, STARTS = 0.25, 1.0, 20, 5
 CELL = '[data-cell="runs|baseline|1220|probe 1|phase_deg"]'
 CORRECTIONS = '[data-doc="answer"] [data-key^="corrections."]'
 
-_TOOK = "return took"
 # Milliseconds from the end of typing to the first other correction, for every change.
 _WATCH = """
 window.took = [];
@@ -53,7 +46,7 @@ new MutationObserver(() => {
 
 
 @contextmanager
-def opened(folder: Path, sample: str = "", **pace: float) -> Iterator[tuple[Served, Window]]:
+def opened(folder: Path, sample: str = "", **pace: float):
     """A copy of a job, or an empty folder, in a window that shows it."""
     from browser import Browser
     from worksheet.served import Served
@@ -89,12 +82,13 @@ def updates(folder: Path) -> list[float]:
         window.wait(lambda: window.texts(CORRECTIONS), "an answer")
         served.settled()
         window.driver.execute_script(_WATCH)
+        took = partial(window.driver.execute_script, "return took")
         for k in range(UPDATES):
             window.type(CELL, str(90 + k))
             window.leave()
-            window.wait(lambda n=k: len(window.driver.execute_script(_TOOK)) > n, "other corrections")
+            window.wait(lambda n=k: len(took()) > n, "other corrections")
             time.sleep(FIELD)  # a person reads, too
-        return [ms / 1e3 for ms in window.driver.execute_script(_TOOK)]
+        return [ms / 1e3 for ms in took()]
 
 
 def person(folder: Path) -> tuple[float, float]:
@@ -105,9 +99,7 @@ def person(folder: Path) -> tuple[float, float]:
         type_job(window, SAMPLES / "bk_two_plane")
         window.wait(lambda: window.texts(CORRECTIONS), "an answer")
         seconds, shown = time.perf_counter() - served.begun, window.document()
-    job = str(SAMPLES / "bk_two_plane" / "job.toml")
-    command = [sys.executable, "-m", "rotorid", "balance", job, "--json"]
-    told = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)["corrections"]
+    told = balance(SAMPLES / "bk_two_plane" / "job.toml", BalanceOptions()).document["corrections"]
     masses = [float(shown[f"corrections.{k}.mass"]) for k in range(2)]
     return seconds, relative_difference(masses, [row["mass"] for row in told])
 
@@ -120,7 +112,7 @@ def run() -> list[Row]:
     median = f"the largest of {len(took)}; median {1e3 * statistics.median(took):.0f} ms"
     rows = [("page ready", ready, READY, 0.0, ""), ("first answer", first, ANSWER, 0.0, "")]
     rows += [("update of corrections", max(took), UPDATE, 0.0, median)]
-    rows += [("B&K typed by a person", typed, PERSON, difference, "from an empty folder to the answer")]
+    rows += [("B&K typed by a person", typed, PERSON, difference, "")]
     return [Row(f"Worksheet, {a}", "rotorid", s, "limit", lim, d, 1e-9, 1.0, n) for a, s, lim, d, n in rows]
 
 
