@@ -1,12 +1,9 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
 
-For tests: data-cell is "runs|RUN|SPEED|SENSOR|COLUMN" of a reading ("check|…"; SPEED "1220 (2)": second
-repeat) or "weights|ROWID|COLUMN" of a weight ("check_weights|…"). data-key is the key of the job, or, of a
-.value, the path in the document, "corrections.0.mass", with its number in data-value and the document in
-data-doc around it (answer, pieces, trim). data-run: card of a run, or its gauge; data-type, data-remove,
-data-add, data-import: its buttons; data-keep, data-write: buttons at a refused cell. Other ids than those of
-index.html: convention-lead-with (…), add-check, check-others, missing, drop-empty. */
-
+For tests: data-cell "runs|RUN|SPEED|SENSOR|COLUMN" is a reading ("check|…"; SPEED "1220 (2)": second repeat),
+"weights|ROWID|COLUMN" a weight ("check_weights|…"); data-key a key of the job, or, of a .value, the path in
+the document of data-doc around it (answer, pieces, trim), its number in data-value; data-run a run's card or
+gauge; data-type, -remove, -add, -import, -keep and -write are on buttons. */
 const $ = (id) => document.getElementById(id);
 let token = location.hash.slice(1);
 const typed = new Map(); // key of a cell → its change, until the state has it; with `why` if it was refused
