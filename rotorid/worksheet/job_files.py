@@ -7,7 +7,7 @@ import os
 import re
 import time
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +26,7 @@ from rotorid.worksheet.workbook_cells import WorkbookVersion
 MOST_STEPS, MOST_TRIES = 200, 5
 FRESH = 2.0
 """Seconds after a change in which another one may leave a file's time as it is."""
+_NONE: Mapping[str, int] = {}
 Contents = Mapping[Path, bytes | None]
 """What files hold; None: there is no such file."""
 
@@ -75,10 +76,6 @@ class FilesVersion:
     def _open(self, key: str, path: Path) -> None:
         others = [other for other in self.tables if self.paths.get(other) == path]
         try:
-            if not _is_inside(path, self.job):
-                raise ValueError(
-                    f"{path.name} is not in the folder of the job: copy it there to edit it here"
-                )
             self.data[path], self.paths[key] = None, path  # while it cannot be read
             self.data[path] = self._read(path)
             if others:
@@ -138,7 +135,7 @@ class JobFiles:
 
     def __init__(self, given: Path) -> None:
         self.job = _job_in(Path(given)).absolute()
-        self._others: dict[Path, object] = {}
+        self._others: dict[str, int] = {}
         self._ids = itertools.count(1)
         self._known: dict[str, Cells] = {}
         self._stamps: dict[Path, object] = {}
@@ -176,8 +173,8 @@ class JobFiles:
                 return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
-    def look(self, others: Iterable[str] = ()) -> list[str]:
-        """Names of the files that another program has changed since the last look, of `others` too."""
+    def look(self, others: Mapping[str, int] = _NONE) -> list[str]:
+        """Names of the files that another program has changed since the last look; of others by the time."""
         for path, known in self._now.data.items():
             stamp = _stamp(path)
             if stamp is None or stamp != self._stamps.get(path):
@@ -190,11 +187,12 @@ class JobFiles:
                         self._settle({}, {}, {})
                         break
                     self._stamps[path] = stamp
-        for path in {self.job.parent / name for name in others} - self._now.data.keys():
-            stamp = _stamp(path, 0)
-            if stamp != self._others.setdefault(path, stamp):
+        for name, read in others.items():
+            path = self.job.parent / name
+            changed = path.stat().st_mtime_ns if path.exists() else 0
+            if path not in self._now.data and changed != self._others.get(name, read):
                 self._noticed.append(path.name)
-            self._others[path] = stamp
+            self._others[name] = changed
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
         return names
 
@@ -251,6 +249,8 @@ class JobFiles:
         others.append(steps.pop())
 
     def _read(self, path: Path) -> bytes | None:
+        if path != self.job and not _is_inside(path, self.job):
+            raise ValueError(f"{path.name} is not in the folder of the job: copy it there to edit it here")
         try:
             return first_bytes(path, MOST_BYTES + 1)  # as it is now, whatever was read before
         except (FileNotFoundError, NotADirectoryError):
@@ -368,13 +368,13 @@ def _is_inside(path: Path, job: Path) -> bool:
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(job.parent))
 
 
-def _stamp(path: Path, fresh: float = FRESH) -> object:
+def _stamp(path: Path) -> object:
     """What tells that a file is as it was; None where nothing does."""
     try:
         found = path.stat()
     except OSError:
         return ()
-    old = not fresh or time.time() - found.st_mtime > fresh
+    old = time.time() - found.st_mtime > FRESH
     return (found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino) if old else None
 
 

@@ -104,7 +104,8 @@ class Session:
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
         kind = {"overview": "answer", "discs": "pieces", "trim": "trim"}[name]
-        return str(await self.aside.ask("picture", **self.about(), kind=kind))
+        worker = self.front if kind == "answer" else self.aside  # which may be choosing pieces for long
+        return str(await worker.ask("picture", **self.about(), kind=kind))
 
     async def append(self, name: str, data: str, run: str) -> list[str | None]:
         """Add the rows of another runs table to that of the job, all as one run where it is named.
@@ -168,7 +169,7 @@ class Session:
             found = await asked
         except Refused as error:
             told = {"problems": [self._problem(one) for one in error.problems], "refused": str(error)}
-            self._publish(**{name: None}, **(told if name == "answer" else {}))
+            self._publish(**{name: None}, **(told if name != "runs" else {}))
             return False
         self._publish(**{name: found}, **({"problems": [], "refused": ""} if name == "answer" else {}))
         return True

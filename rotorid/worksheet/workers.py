@@ -36,11 +36,11 @@ class Worker:
     Attributes
     ----------
     read
-        Names of all files that it has read so far.
+        Names of all files that it has read so far, and when each was changed before that (ns).
     """
 
     def __init__(self, folder: Path) -> None:
-        self.read: set[str] = set()
+        self.read: dict[str, int] = {}
         self._folder = folder
         self._process: Process | None = None
         self._lock = asyncio.Lock()
@@ -83,7 +83,7 @@ class Worker:
             await self.stop()
             raise Refused("the calculation ended unexpectedly: try again", [])
         answer = json.loads(line)
-        self.read |= {*answer["read"]}
+        self.read |= answer["read"]
         if "value" in answer:
             return answer["value"]
         raise Refused(answer.get("refused", ""), answer.get("problems", []))
