@@ -107,20 +107,20 @@ class Routes:
         about = self.session.about()
         if not options.pop("with_job", False):
             about["job"] = None
-        return _json(await self.session.front.ask("trial", **about, options=options))
+        return _json(await self.session.pictures.ask("trial", **about, options=options))
 
     async def picture(self, request: Request) -> Response:
         """The runs of one sensor and speed, the weights, the discs."""
         name, asked = request.path_params["name"], request.query_params
         if name == "runs":
             place = {key: asked[key] for key in ("speed", "sensor")}
-            return _svg(await self.session.front.ask("channel", **self.session.about(), **place))
+            return _svg(await self.session.pictures.ask("channel", **self.session.about(), **place))
         return _svg(await self.session.picture(name))
 
     async def convention(self, request: Request) -> Response:
         """One of the four drawings: lead-with, lead-against, lag-with, lag-against."""
         phase, _, side = request.path_params["name"].partition("-")
-        return _svg(await self.session.front.ask("convention", phase=phase, angles=f"{side} rotation"))
+        return _svg(await self.session.pictures.ask("convention", phase=phase, angles=f"{side} rotation"))
 
     async def sheet(self, request: Request) -> Response:
         """The balancing sheet."""
@@ -131,8 +131,7 @@ class Routes:
         return PlainTextResponse(await self._printed("whole", request), headers=HEADERS)
 
     async def _printed(self, do: str, request: Request) -> str:
-        kind = request.query_params.get("kind", self.session.best)
-        return str(await self.session.aside.ask(do, **self.session.about(), kind=kind))
+        return await self.session.printed(do, request.query_params.get("kind", self.session.best))
 
 
 def application(session: Session, token: str, own: str, ready: Callable[[], object]) -> Starlette:

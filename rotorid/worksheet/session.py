@@ -33,14 +33,14 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    front, aside
-        What answers at once, and what may take its time.
+    front, pictures, aside
+        What answers at once, what draws, and what may take its time.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.aside = (Worker(files.job.parent) for _ in range(2))
+        self.front, self.pictures, self.aside = self._workers = [Worker(files.job.parent) for _ in range(3)]
         self._of_files = 1
         self._notice = ""
         self._results = dict(_NOTHING)
@@ -50,15 +50,15 @@ class Session:
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Compute, and look for changes from outside, until the page is closed."""
-        await self.front.start()
-        await self.aside.start()
+        for worker in self._workers:
+            await worker.start()
         self.changed()
         watching = asyncio.ensure_future(self._watch())
         yield
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        await asyncio.gather(self.front.stop(), self.aside.stop())
+        await asyncio.gather(*(worker.stop() for worker in self._workers))
 
     def state(self) -> dict[str, Any]:
         """All that a window shows."""
@@ -104,8 +104,12 @@ class Session:
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
         kind = {"overview": "answer", "discs": "pieces", "trim": "trim"}[name]
-        worker = self.front if kind == "answer" else self.aside  # which may be choosing pieces for long
-        return str(await worker.ask("picture", **self.about(), kind=kind))
+        return await self.printed("picture", kind)
+
+    async def printed(self, do: str, kind: str) -> str:
+        """A picture or a text of one of the balances."""
+        worker = self.pictures if kind == "answer" else self.aside  # which may be choosing pieces for long
+        return str(await worker.ask(do, **self.about(), kind=kind))
 
     async def append(self, name: str, data: str, run: str) -> list[str | None]:
         """Add the rows of another runs table to that of the job, all as one run where it is named.
