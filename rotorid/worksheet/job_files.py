@@ -300,9 +300,12 @@ class JobFiles:
         except (InputError, PermissionError) as error:
             done = [path for path in kept if kept[path] == self._read(path) != known.get(path)]
             write_files({path: data for path in done if (data := known.get(path)) is not None})
-            if isinstance(error.__cause__ or error, PermissionError):
-                raise ValueError(_is_open(next(iter(files)), "Excel", " or protected")) from error
-            raise
+            cause, first = error.__cause__ or error, next(iter(files))
+            if isinstance(cause, PermissionError):
+                raise ValueError(_is_open(first, "Excel", " or protected")) from error
+            raise ValueError(
+                f"{first.name} cannot be written ({getattr(cause, 'strerror', cause)}): nothing was changed"
+            ) from error
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:

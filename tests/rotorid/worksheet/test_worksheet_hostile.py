@@ -153,3 +153,32 @@ def test_a_body_of_any_form_is_refused_with_one_sentence(tmp_path, serve, body, 
     status, answer = served.ask("/edit", body)
     assert status == 400
     assert answer["error"].count("\n") == 0
+
+
+def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_path):
+    import numpy as np
+
+    from balancing.data.reading_errors import error_model, mean_covariance
+    from rotorid.workflows import balance
+    from rotorid.workflows.vibration.runs_so_far import runs_so_far
+
+    header = "run,speed_rpm,sensor,repeat,amplitude_um_pp,phase_deg\n"
+    rows = [
+        f"{run},1000,{sensor},{k},{size + k * scatter},{phase}\n"
+        for run, size, phase in (("first", 10, 0), ("trial", 12, 40))
+        for sensor, scatter in (("A", 0.1), ("B", 1.0))
+        for k in (1, 2, 3)
+    ]
+    (tmp_path / "runs.csv").write_text(header + "".join(rows))
+    (tmp_path / "weights.csv").write_text("run,plane,mass_g,angle_deg\ntrial,left,10,0\n")
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'runs = "runs.csv"\nweights = "weights.csv"\nphase = "lag"\nangles = "with rotation"\n'
+        "[slow_roll.A]\namplitude = 8\nphase_deg = 0\n[slow_roll.B]\namplitude = 2\nphase_deg = 9\n"
+    )
+    trials = balance(job).job.trials
+    covariance = mean_covariance(trials, error_model(trials))
+    for channel in runs_so_far(job).channels:
+        at = trials.sensors.index(channel.sensor)
+        np.testing.assert_allclose(channel.trials.mean[:, 0, 0], trials.mean[:, 0, at], rtol=1e-12)
+        np.testing.assert_allclose(channel.covariance[:, 0, 0], covariance[:, 0, at], rtol=1e-9)
