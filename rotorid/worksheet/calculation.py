@@ -42,8 +42,9 @@ def main() -> None:
     sys.stdout = sys.stderr  # nothing that is printed may come between the answers
     for line in sys.stdin:
         request = json.loads(line)
-        answer = _answered(request.pop("do"), request.pop("folder"), request)
-        print(json.dumps(answer), file=answers, flush=True)
+        print(
+            json.dumps(_answered(request.pop("do"), request.pop("folder"), request)), file=answers, flush=True
+        )
 
 
 def _inside(path: Path) -> None:

@@ -165,9 +165,8 @@ class JobFiles:
     def place(self, file: str, row: int) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
-            found = (self._now.paths.get(key, self.job), self.job.parent / file)
-            one, other = (os.path.dirname(os.path.realpath(path)) for path in found)
-            if Path(file).name == table.name and one == other:
+            pair = self._now.paths.get(key, self.job), self.job.parent / file
+            if Path(file).name == table.name and len({os.path.realpath(path.parent) for path in pair}) == 1:
                 return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
@@ -296,7 +295,7 @@ class JobFiles:
             if isinstance(cause, PermissionError):
                 raise ValueError(_is_open(first, "Excel", " or protected")) from error
             raise ValueError(
-                f"{first.name} cannot be written ({getattr(cause, 'strerror', cause)}): nothing was changed"
+                f"{first.name} cannot be written: {getattr(cause, 'strerror', cause)}"
             ) from error
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:

@@ -224,8 +224,7 @@ def _channels(
     for rows in _rows_by_channel(table, conventions.speed_tolerance_percent):
         trials = read(replace(grid, rows=tuple(grid.rows[i] for i in rows)))
         if trials is not None:
-            # repeats tell errors of all channels together, as far as all of them are there
-            model = error_model(trials if whole is None else whole)
+            model = error_model(trials if whole is None else whole)  # repeats of all channels count
             yield Channel(table.shown("speed", rows[0]), trials, mean_covariance(trials, model))
 
 
