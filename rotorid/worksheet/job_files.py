@@ -294,9 +294,7 @@ class JobFiles:
             cause, first = error.__cause__ or error, next(iter(files))
             if isinstance(cause, PermissionError):
                 raise ValueError(_is_open(first, "Excel", " or protected")) from error
-            raise ValueError(
-                f"{first.name} cannot be written: {getattr(cause, 'strerror', cause)}"
-            ) from error
+            raise ValueError(f"{first.name} is not written: {getattr(cause, 'strerror', cause)}") from error
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:
