@@ -107,7 +107,7 @@ class Routes:
         about = self.session.about()
         if not options.pop("with_job", False):
             about["job"] = None
-        return _json(await self.session.front.ask("trial", **about, options=options))
+        return _json(await self.session.pictures.ask("trial", **about, options=options))
 
     async def picture(self, request: Request) -> Response:
         """The runs of one sensor and speed, the weights, the discs."""
@@ -134,8 +134,7 @@ class Routes:
         return PlainTextResponse(await self._printed("whole", request), headers=HEADERS)
 
     async def _printed(self, do: str, request: Request) -> str:
-        kind = request.query_params.get("kind", self.session.best)
-        return str(await self.session.aside.ask(do, **self.session.about(), kind=kind))
+        return await self.session.printed(do, request.query_params.get("kind", self.session.best))
 
 
 def application(session: Session, token: str, own: str, ready: Callable[[], object]) -> Starlette:

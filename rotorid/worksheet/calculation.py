@@ -33,8 +33,6 @@ UNCHECKED = " before the check run"
 """Behind a kind: as if there were no check run, which somebody is typing."""
 _kept: dict[str, tuple[int, Balance]] = {}
 """The newest of each kind, with the version of the files: pictures and sheets are made of it."""
-_read: set[str] = set()
-"""Names of the files that were read."""
 
 
 def main() -> None:
@@ -42,20 +40,20 @@ def main() -> None:
     from rotorid.tables.reader.input_file import reading
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    reading.set(_noted)
+    reading.set(_inside)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     sys.stdout = sys.stderr  # nothing that is printed may come between the answers
     for line in sys.stdin:
         request = json.loads(line)
-        answer = {**_answered(request.pop("do"), request.pop("folder"), request), "read": sorted(_read)}
-        print(json.dumps(answer), file=answers, flush=True)
+        print(
+            json.dumps(_answered(request.pop("do"), request.pop("folder"), request)), file=answers, flush=True
+        )
 
 
-def _noted(path: Path) -> None:
+def _inside(path: Path) -> None:
     """Refuse a file outside of the folder, by whatever file it is named."""
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(".")):
         raise OSError(errno.EACCES, "it is outside the folder of the job, where the worksheet reads nothing")
-    _read.add(str(path))
 
 
 def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import os
 import re
 import time
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -75,10 +75,6 @@ class FilesVersion:
     def _open(self, key: str, path: Path) -> None:
         others = [other for other in self.tables if self.paths.get(other) == path]
         try:
-            if not _is_inside(path, self.job):
-                raise ValueError(
-                    f"{path.name} is not in the folder of the job: copy it there to edit it here"
-                )
             self.data[path], self.paths[key] = None, path  # while it cannot be read
             self.data[path] = self._read(path)
             if others:
@@ -138,7 +134,6 @@ class JobFiles:
 
     def __init__(self, given: Path) -> None:
         self.job = _job_in(Path(given)).absolute()
-        self._others: dict[Path, object] = {}
         self._ids = itertools.count(1)
         self._known: dict[str, Cells] = {}
         self._stamps: dict[Path, object] = {}
@@ -170,14 +165,13 @@ class JobFiles:
     def place(self, file: str, row: int) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
-            found = (self._now.paths.get(key, self.job), self.job.parent / file)
-            one, other = (os.path.dirname(os.path.realpath(path)) for path in found)
-            if Path(file).name == table.name and one == other:
+            pair = self._now.paths.get(key, self.job), self.job.parent / file
+            if Path(file).name == table.name and len({os.path.realpath(path.parent) for path in pair}) == 1:
                 return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
-    def look(self, others: Iterable[str] = ()) -> list[str]:
-        """Names of the files that another program has changed since the last look, of `others` too."""
+    def look(self) -> list[str]:
+        """Names of the files that another program has changed since the last look."""
         for path, known in self._now.data.items():
             stamp = _stamp(path)
             if stamp is None or stamp != self._stamps.get(path):
@@ -190,11 +184,6 @@ class JobFiles:
                         self._settle({}, {}, {})
                         break
                     self._stamps[path] = stamp
-        for path in {self.job.parent / name for name in others} - self._now.data.keys():
-            stamp = _stamp(path, 0)
-            if stamp != self._others.setdefault(path, stamp):
-                self._noticed.append(path.name)
-            self._others[path] = stamp
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
         return names
 
@@ -251,6 +240,8 @@ class JobFiles:
         others.append(steps.pop())
 
     def _read(self, path: Path) -> bytes | None:
+        if path != self.job and not _is_inside(path, self.job):
+            raise ValueError(f"{path.name} is not in the folder of the job: copy it there to edit it here")
         try:
             return first_bytes(path, MOST_BYTES + 1)  # as it is now, whatever was read before
         except (FileNotFoundError, NotADirectoryError):
@@ -300,9 +291,10 @@ class JobFiles:
         except (InputError, PermissionError) as error:
             done = [path for path in kept if kept[path] == self._read(path) != known.get(path)]
             write_files({path: data for path in done if (data := known.get(path)) is not None})
-            if isinstance(error.__cause__ or error, PermissionError):
-                raise ValueError(_is_open(next(iter(files)), "Excel", " or protected")) from error
-            raise
+            cause, first = error.__cause__ or error, next(iter(files))
+            if isinstance(cause, PermissionError):
+                raise ValueError(_is_open(first, "Excel", " or protected")) from error
+            raise ValueError(f"{first.name} is not written: {getattr(cause, 'strerror', cause)}") from error
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:
@@ -368,13 +360,13 @@ def _is_inside(path: Path, job: Path) -> bool:
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(job.parent))
 
 
-def _stamp(path: Path, fresh: float = FRESH) -> object:
+def _stamp(path: Path) -> object:
     """What tells that a file is as it was; None where nothing does."""
     try:
         found = path.stat()
     except OSError:
         return ()
-    old = not fresh or time.time() - found.st_mtime > fresh
+    old = time.time() - found.st_mtime > FRESH
     return (found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino) if old else None
 
 

@@ -41,7 +41,7 @@ class Session:
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.drawing, self.aside = (Worker(files.job.parent) for _ in range(3))
+        self.front, self.drawing, self.aside = self._workers = [Worker(files.job.parent) for _ in range(3)]
         self._of_files = 1
         self._notice = ""
         self._behind = ""
@@ -58,7 +58,7 @@ class Session:
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        await asyncio.gather(*(worker.stop() for worker in (self.front, self.drawing, self.aside)))
+        await asyncio.gather(*(worker.stop() for worker in self._workers))
 
     def state(self) -> dict[str, Any]:
         """All that a window shows."""
@@ -103,8 +103,13 @@ class Session:
 
     async def picture(self, name: str) -> str:
         """One of the pictures, as SVG."""
-        worker, kind = {"overview": (self.drawing, "answer"), "discs": (self.aside, "pieces")}[name]
-        return str(await worker.ask("picture", **self.about(), kind=kind + self._behind))
+        kind = {"overview": "answer", "discs": "pieces"}[name]
+        return await self.printed("picture", kind + self._behind)
+
+    async def printed(self, do: str, kind: str) -> str:
+        """A picture or a text of one of the balances."""
+        worker = self.drawing if kind.startswith("answer") else self.aside  # which may take long
+        return str(await worker.ask(do, **self.about(), kind=kind))
 
     async def append(self, name: str, data: str, run: str) -> list[str | None]:
         """Add the rows of another runs table to that of the job, all as one run where it is named.
@@ -137,7 +142,7 @@ class Session:
     async def _watch(self) -> None:
         while True:
             await asyncio.sleep(LOOK)
-            if names := self.files.look(self.front.read | self.aside.read):
+            if names := self.files.look():
                 verb = "was" if len(names) == 1 else "were"
                 self.changed(f"{' and '.join(names)} {verb} changed by another program")
 
@@ -176,9 +181,9 @@ class Session:
         except Refused as error:
             found = None
             said = {"problems": [self._problem(one) for one in error.problems], "refused": str(error)}
-        if name != "answer" or keep:
+        if keep or name == "runs":
             said = {}
-        elif found is not None:
+        elif name == "answer" and found is not None:
             said = {"problems": [], "refused": ""}
         self._publish(**{name: found}, **said)
         return found is not None

@@ -17,10 +17,9 @@ def settings_in(data: bytes) -> dict[str, Any]:
     """What a job file says, in types of JSON; ValueError if it is no TOML."""
     try:
         plain = json.dumps(_loads(data.decode("utf-8-sig")), default=str)
-        found: dict[str, Any] = json.loads(plain, parse_constant=str)
+        return dict(json.loads(plain, parse_constant=str))
     except RecursionError as error:
         raise ValueError(str(error)) from error
-    return found
 
 
 def setting(settings: Mapping[str, Any], key: Sequence[str]) -> Any:  # noqa: ANN401  any type of JSON

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from balancing.data.trials import Trials
     from rotorid.base.arrays import FloatArray
-    from rotorid.tables.reader.columns import Table
+    from rotorid.tables.reader.columns import Source, Table
     from rotorid.tables.reader.grid import Grid
     from rotorid.tables.reader.settings_keys import Said
     from rotorid.tables.runs.stated_conventions import Conventions
@@ -182,9 +182,10 @@ def runs_so_far(job: Path) -> RunsSoFar:
     if mounting is not None and "run" in mounting.header:
         at = mounting.header.index("run")
         mounted = {str(cells[at]) for _, cells in mounting.rows}
+    slow = written.tables.get("slow_roll") or _path(job, said, "slow_roll") or said["slow_roll"]
     runs = tuple(dict.fromkeys(run for run in table.texts("run") if run))
     baseline = next((run for run in runs if run not in mounted), None)
-    return RunsSoFar(runs, baseline, tuple(_channels(grid, table, conventions, said)))
+    return RunsSoFar(runs, baseline, tuple(_channels(grid, table, conventions, said, slow)))
 
 
 def _finished(grid: Grid) -> Grid:
@@ -204,18 +205,29 @@ def _path(job: Path, said: Mapping[str, Any], key: str) -> Path | None:
     return job.parent / said[key] if isinstance(said[key], str) else None
 
 
-def _channels(grid: Grid, table: Table, conventions: Conventions, said: Said) -> Iterator[Channel]:
+def _channels(
+    grid: Grid, table: Table, conventions: Conventions, said: Said, slow: Source | Mapping[str, Said] | None
+) -> Iterator[Channel]:
     """Each sensor at each speed that can be read by itself."""
     from balancing.data.reading_errors import error_model, mean_covariance
     from rotorid.tables.reader.problems import Problems
+    from rotorid.tables.runs.slow_roll import make_slow_roll, subtract_slow_roll
     from rotorid.tables.runs.trials import make_trials
 
-    for rows in _rows_by_channel(table, conventions.speed_tolerance_percent):
-        part = replace(grid, rows=tuple(grid.rows[i] for i in rows))
+    def read(part: Grid) -> Trials | None:
         trials = make_trials(part, None, conventions, said["errors"], Problems())
+        if trials is None:
+            return None
+        trials = replace(trials, labels=conventions.on(trials.labels))
+        roll = None if slow is None else make_slow_roll(slow, trials, conventions, Problems())
+        return trials if roll is None else subtract_slow_roll(trials, roll)
+
+    whole = read(grid)
+    for rows in _rows_by_channel(table, conventions.speed_tolerance_percent):
+        trials = read(replace(grid, rows=tuple(grid.rows[i] for i in rows)))
         if trials is not None:
-            trials = replace(trials, labels=conventions.on(trials.labels))
-            yield Channel(table.shown("speed", rows[0]), trials, mean_covariance(trials, error_model(trials)))
+            model = error_model(trials if whole is None else whole)  # repeats of all channels count
+            yield Channel(table.shown("speed", rows[0]), trials, mean_covariance(trials, model))
 
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[int]]:

@@ -150,7 +150,8 @@ def test_nothing_outside_the_folder_is_read(tmp_path, serve):
     job.write_text(job.read_text().replace('"runs.csv"', '"../outside.csv"'))
     results = serve(job).settled()["results"]
     assert results["answer"] is None
-    assert "outside the folder" in results["problems"][0]["text"]
+    (problem,) = results["problems"]
+    assert "outside the folder" in problem["text"]
 
 
 def test_two_windows_see_each_other_and_lose_nothing(tmp_path, serve):

@@ -1,0 +1,176 @@
+"""The worksheet under files, requests and interruptions that nobody means well."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from worksheet.served import Served
+
+from rotorid.samples import sample_data
+
+pytest.importorskip("starlette", reason="without the extra rotorid[worksheet]")
+pytest.importorskip("uvicorn", reason="without the extra rotorid[worksheet]")
+pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
+
+
+@pytest.fixture
+def serve():
+    running = []
+
+    def start(job):
+        running.append(Served(job))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.close()
+
+
+def copy(tmp_path, sample="turbo_job"):
+    return shutil.copytree(sample_data() / sample, tmp_path / sample)
+
+
+def noticed(served, version):
+    """The state, settled, after a change from outside."""
+    state = served.state(version)
+    while not state["notice"]:
+        state = served.state(state["version"])
+    return served.settled()
+
+
+def corrections(state):
+    return state["results"]["answer"]["document"]["corrections"]
+
+
+@pytest.mark.parametrize("wait", [0.0, 1.5])
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl+C as terminals of POSIX send it")
+def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
+    code = "import os; os.setsid(); from rotorid.cli import main; main()"
+    command = [sys.executable, "-c", code, "worksheet", str(copy(tmp_path) / "job.toml"), "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.readline()
+    time.sleep(wait)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.communicate(timeout=20) == ("", "")
+    assert process.returncode == 130
+
+
+def test_an_interrupt_answers_the_windows_that_wait(tmp_path):
+    served = Served(copy(tmp_path) / "job.toml")
+    version, got = served.settled()["version"], []
+    waiting = threading.Thread(target=lambda: got.append(served.ask(f"/state?after={version}")[0]))
+    waiting.start()
+    time.sleep(0.5)
+    served.process.send_signal(signal.SIGINT)
+    assert served.process.communicate(timeout=20) == ("", "")
+    waiting.join(5)
+    assert got == [200]
+
+
+def test_another_folder_of_the_same_name_is_computed_anew(tmp_path, serve):
+    folder = copy(tmp_path)
+    served = serve(folder / "job.toml")
+    state = served.settled()
+    shutil.copytree(folder, tmp_path / "copy")
+    folder.rename(tmp_path / "old")
+    (tmp_path / "copy").rename(folder)
+    row = state["tables"]["runs"]["rows"][0]
+    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": "89", "new": "120"}
+    assert served.edit(edit)[0] == 200
+    assert corrections(served.settled()) != corrections(state)
+
+
+@pytest.mark.parametrize("kind", ["loop", "folder", "outside"])
+def test_a_table_that_cannot_be_read_any_more_leaves_no_old_answer(tmp_path, serve, kind):
+    folder = copy(tmp_path)
+    runs, text = folder / "runs.csv", (folder / "runs.csv").read_text()
+    (tmp_path / "outside.csv").write_text(text.replace("3.36,89", "3.36,95"))
+    served = serve(folder / "job.toml")
+    state = served.settled()
+    runs.unlink()
+    if kind == "folder":
+        runs.mkdir()
+    else:
+        runs.symlink_to(runs if kind == "loop" else tmp_path / "outside.csv")
+    now = noticed(served, state["version"])
+    assert (now["results"]["answer"], now["results"]["runs"]) == (None, None)
+    assert len(now["results"]["problems"]) == 1
+    assert now["tables"]["runs"]["read_only"]
+    (runs.rmdir if kind == "folder" else runs.unlink)()
+    runs.write_text(text)
+    assert corrections(noticed(served, now["version"])) == corrections(state)
+
+
+@pytest.mark.parametrize("text", ['runs = "a\\u0000b"', "x = " + "[" * 3000 + "]" * 3000, "runs = "])
+def test_a_job_broken_by_hand_and_mended(tmp_path, serve, text):
+    job = copy(tmp_path) / "job.toml"
+    served, good = serve(job), job.read_text()
+    state = served.settled()
+    job.write_text(text)
+    broken = noticed(served, state["version"])
+    assert broken["results"]["answer"] is None
+    assert broken["results"]["problems"]
+    job.write_text(good)
+    assert corrections(noticed(served, broken["version"])) == corrections(state)
+
+
+def test_a_rotor_file_names_nothing_outside(tmp_path, serve):
+    samples, folder = sample_data() / "compressor", tmp_path / "job"
+    folder.mkdir()
+    for name in ("shaft.csv", "bearing.csv", "seal.csv"):
+        shutil.copy(samples / name, folder / name)
+    shutil.copy(samples / "shaft.csv", tmp_path / "outside.csv")
+    rotor = (samples / "rotor.toml").read_text()
+    (folder / "rotor.toml").write_text(rotor.replace('"shaft.csv"', '"../outside.csv"'))
+    (folder / "runs.csv").write_text("run,speed_rpm,sensor,amplitude_um,phase_deg\nfirst,3000,A,30,50\n")
+    (folder / "job.toml").write_text(
+        'runs = "runs.csv"\nrotor = "rotor.toml"\nphase = "lag"\nangles = "with rotation"\n'
+        "[planes.left]\nnode = 3\n[sensors.A]\nnode = 4\nangle_deg = 0\n"
+    )
+    served = serve(folder / "job.toml")
+    state = served.settled()
+    assert state["results"]["answer"] is None
+    assert "outside the folder" in str(state["results"]["problems"])
+
+
+@pytest.mark.parametrize("body", ["[" * 100_000, '{"edits": null}', "{", '{"edits":[{"key":[],"new":1}]}'])
+def test_a_body_of_any_form_is_refused_with_one_sentence(tmp_path, serve, body, monkeypatch):
+    served = serve(copy(tmp_path) / "job.toml")
+    monkeypatch.setattr("worksheet.served.json.dumps", lambda sent: sent)
+    status, answer = served.ask("/edit", body)
+    assert status == 400
+    assert answer["error"].count("\n") == 0
+
+
+def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_path):
+    import numpy as np
+
+    from balancing.data.reading_errors import error_model, mean_covariance
+    from rotorid.workflows import balance
+    from rotorid.workflows.vibration.runs_so_far import runs_so_far
+
+    header = "run,speed_rpm,sensor,repeat,amplitude_um_pp,phase_deg\n"
+    rows = [
+        f"{run},1000,{sensor},{k},{size + k * scatter},{phase}\n"
+        for run, size, phase in (("first", 10, 0), ("trial", 12, 40))
+        for sensor, scatter in (("A", 0.1), ("B", 1.0))
+        for k in (1, 2, 3)
+    ]
+    (tmp_path / "runs.csv").write_text(header + "".join(rows))
+    (tmp_path / "weights.csv").write_text("run,plane,mass_g,angle_deg\ntrial,left,10,0\n")
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'runs = "runs.csv"\nweights = "weights.csv"\nphase = "lag"\nangles = "with rotation"\n'
+        "[slow_roll.A]\namplitude = 8\nphase_deg = 0\n[slow_roll.B]\namplitude = 2\nphase_deg = 9\n"
+    )
+    trials = balance(job).job.trials
+    covariance = mean_covariance(trials, error_model(trials))
+    for channel in runs_so_far(job).channels:
+        at = trials.sensors.index(channel.sensor)
+        np.testing.assert_allclose(channel.trials.mean[:, 0, 0], trials.mean[:, 0, at], rtol=1e-12)
+        np.testing.assert_allclose(channel.covariance[:, 0, 0], covariance[:, 0, at], rtol=1e-9)
