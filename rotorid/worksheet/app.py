@@ -107,7 +107,7 @@ class Routes:
         about = self.session.about()
         if not options.pop("with_job", False):
             about["job"] = None
-        return _json(await self.session.pictures.ask("trial", **about, options=options))
+        return _json(await self.session.drawing.ask("trial", **about, options=options))
 
     async def picture(self, request: Request) -> Response:
         """The runs of one sensor and speed, the weights, the discs."""

@@ -33,6 +33,8 @@ UNCHECKED = " before the check run"
 """Behind a kind: as if there were no check run, which somebody is typing."""
 _kept: dict[str, tuple[int, Balance]] = {}
 """The newest of each kind, with the version of the files: pictures and sheets are made of it."""
+_read: dict[str, int] = {}
+"""Names of the files that were read, and when each was changed before that (ns)."""
 
 
 def main() -> None:
@@ -40,20 +42,20 @@ def main() -> None:
     from rotorid.tables.reader.input_file import reading
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    reading.set(_inside)
+    reading.set(_noted)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     sys.stdout = sys.stderr  # nothing that is printed may come between the answers
     for line in sys.stdin:
         request = json.loads(line)
-        print(
-            json.dumps(_answered(request.pop("do"), request.pop("folder"), request)), file=answers, flush=True
-        )
+        answer = {**_answered(request.pop("do"), request.pop("folder"), request), "read": _read}
+        print(json.dumps(answer), file=answers, flush=True)
 
 
-def _inside(path: Path) -> None:
+def _noted(path: Path) -> None:
     """Refuse a file outside of the folder, by whatever file it is named."""
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(".")):
         raise OSError(errno.EACCES, "it is outside the folder of the job, where the worksheet reads nothing")
+    _read[str(path)] = path.stat().st_mtime_ns if path.exists() else 0
 
 
 def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]:

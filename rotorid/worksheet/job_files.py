@@ -26,6 +26,7 @@ from rotorid.worksheet.workbook_cells import WorkbookVersion
 MOST_STEPS, MOST_TRIES = 200, 5
 FRESH = 2.0
 """Seconds after a change in which another one may leave a file's time as it is."""
+_NONE: Mapping[str, int] = {}
 Contents = Mapping[Path, bytes | None]
 """What files hold; None: there is no such file."""
 
@@ -134,6 +135,7 @@ class JobFiles:
 
     def __init__(self, given: Path) -> None:
         self.job = _job_in(Path(given)).absolute()
+        self._others: dict[str, int] = {}
         self._ids = itertools.count(1)
         self._known: dict[str, Cells] = {}
         self._stamps: dict[Path, object] = {}
@@ -170,8 +172,8 @@ class JobFiles:
                 return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
         return None
 
-    def look(self) -> list[str]:
-        """Names of the files that another program has changed since the last look."""
+    def look(self, others: Mapping[str, int] = _NONE) -> list[str]:
+        """Names of the files that another program has changed since the last look; of others by the time."""
         for path, known in self._now.data.items():
             stamp = _stamp(path)
             if stamp is None or stamp != self._stamps.get(path):
@@ -184,6 +186,12 @@ class JobFiles:
                         self._settle({}, {}, {})
                         break
                     self._stamps[path] = stamp
+        for name, read in others.items():
+            path = self.job.parent / name
+            changed = path.stat().st_mtime_ns if path.exists() else 0
+            if path not in self._now.data and changed != self._others.get(name, read):
+                self._noticed.append(path.name)
+            self._others[name] = changed
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
         return names
 

@@ -142,7 +142,7 @@ class Session:
     async def _watch(self) -> None:
         while True:
             await asyncio.sleep(LOOK)
-            if names := self.files.look():
+            if names := self.files.look(self.front.read | self.aside.read):
                 verb = "was" if len(names) == 1 else "were"
                 self.changed(f"{' and '.join(names)} {verb} changed by another program")
 

@@ -31,9 +31,16 @@ class Refused(ValueError):
 
 
 class Worker:
-    """One process of `calculation` in the folder of a job, one request at a time."""
+    """One process of `calculation` in the folder of a job, one request at a time.
+
+    Attributes
+    ----------
+    read
+        Names of all files that it has read so far, and when each was changed before that (ns).
+    """
 
     def __init__(self, folder: Path) -> None:
+        self.read: dict[str, int] = {}
         self._folder = folder
         self._process: Process | None = None
         self._lock = asyncio.Lock()
@@ -76,6 +83,7 @@ class Worker:
             await self.stop()
             raise Refused("the calculation ended unexpectedly: try again", [])
         answer = json.loads(line)
+        self.read |= answer["read"]
         if "value" in answer:
             return answer["value"]
         raise Refused(answer.get("refused", ""), answer.get("problems", []))

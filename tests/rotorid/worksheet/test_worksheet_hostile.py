@@ -119,7 +119,7 @@ def test_a_job_broken_by_hand_and_mended(tmp_path, serve, text):
     assert corrections(noticed(served, broken["version"])) == corrections(state)
 
 
-def test_a_rotor_file_names_nothing_outside(tmp_path, serve):
+def test_a_rotor_file_names_nothing_outside_and_its_tables_are_watched(tmp_path, serve):
     samples, folder = sample_data() / "compressor", tmp_path / "job"
     folder.mkdir()
     for name in ("shaft.csv", "bearing.csv", "seal.csv"):
@@ -136,6 +136,14 @@ def test_a_rotor_file_names_nothing_outside(tmp_path, serve):
     state = served.settled()
     assert state["results"]["answer"] is None
     assert "outside the folder" in str(state["results"]["problems"])
+    (folder / "rotor.toml").write_text(rotor)
+    state = noticed(served, state["version"])
+    shaft = folder / "shaft.csv"
+    lines = shaft.read_text().splitlines(keepends=True)
+    shaft.write_text("".join(lines[:-1]))
+    now = noticed(served, state["version"])
+    assert now["notice"] == "shaft.csv was changed by another program"
+    assert now["results"] != state["results"]
 
 
 @pytest.mark.parametrize("body", ["[" * 100_000, '{"edits": null}', "{", '{"edits":[{"key":[],"new":1}]}'])
