@@ -13,9 +13,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
-from rotorid.tables.reader import units
 from rotorid.workflows.motion.moving_system import moving
-from rotorid.workflows.option_quantities import quantity
 from rotorid.workflows.option_values import (
     FASTEST,
     Nodes,
@@ -408,6 +406,9 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
 def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     """Read "7=20um@90" as x + iy in m, by node."""
     import numpy as np
+
+    from rotorid.tables.reader import units
+    from rotorid.workflows.option_quantities import quantity
 
     def read(_: str, value: str) -> complex:
         size, _, angle = value.partition("@")
