@@ -33,6 +33,11 @@ def test_an_import_does_not_load_what_only_some_commands_need(package):
     assert not loaded & set(HEAVY)
 
 
+def test_the_command_line_starts_without_numerics():
+    loaded = run_python("import sys, rotorid.cli; print(sorted({'numpy', 'fem', 'balancing'} & {*sys.modules}))")
+    assert loaded == "[]\n"
+
+
 def test_only_what_moves_loads_the_compiler():
     code = "import sys, fem, rotorid.workflows.critical, rotorid.tables.schema; print('numba' in sys.modules)"
     assert run_python(code) == "False\n"

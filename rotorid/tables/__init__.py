@@ -2,51 +2,85 @@
 
 Everything behind it is plain data in SI, with positive phase = lead and angles with the rotation. Every
 complaint about a file names the file, row and column, what was found and what was expected (`InputError`).
+Every name below is loaded when it is first used.
 """
 
-from rotorid.tables.data.measurements import read_measurements
-from rotorid.tables.data.modes_table import MeasuredModes, read_compliance, read_modes
-from rotorid.tables.data.records import read_record
-from rotorid.tables.job.job_file import Job, job_from_files, read_job
-from rotorid.tables.models.harmonic_file import HarmonicFile, read_harmonic_model
-from rotorid.tables.models.ode_file import read_ode_model
-from rotorid.tables.models.small_model_file import read_small_model
-from rotorid.tables.reader.problems import InputError, Problem, TableWarning
-from rotorid.tables.reader.table_writing import write_table
-from rotorid.tables.rotor.bow_table import read_bow
-from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
-from rotorid.tables.rotor.rotor_writing import write_rotor
-from rotorid.tables.rotor.unbalance_table import read_unbalance
-from rotorid.tables.runs.influence_table import influence_frame, read_influence, write_influence
-from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors
-from rotorid.tables.runs.trials import read_trials
+from __future__ import annotations
 
-__all__ = [
-    "Conventions",
-    "HarmonicFile",
-    "InputError",
-    "Job",
-    "MeasuredModes",
-    "Problem",
-    "StatedErrors",
-    "TableWarning",
-    "influence_frame",
-    "job_from_files",
-    "read_bow",
-    "read_compliance",
-    "read_harmonic_model",
-    "read_influence",
-    "read_job",
-    "read_measurements",
-    "read_modes",
-    "read_ode_model",
-    "read_record",
-    "read_rotor",
-    "read_small_model",
-    "read_trials",
-    "read_unbalance",
-    "rotor_files",
-    "write_influence",
-    "write_rotor",
-    "write_table",
-]
+from importlib import import_module
+
+TYPE_CHECKING = False  # as in rotorid
+if TYPE_CHECKING:
+    from typing import Any
+
+    from rotorid.tables.data.measurements import read_measurements as read_measurements
+    from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
+    from rotorid.tables.data.modes_table import read_compliance as read_compliance
+    from rotorid.tables.data.modes_table import read_modes as read_modes
+    from rotorid.tables.data.records import read_record as read_record
+    from rotorid.tables.job.job_file import Job as Job
+    from rotorid.tables.job.job_file import job_from_files as job_from_files
+    from rotorid.tables.job.job_file import read_job as read_job
+    from rotorid.tables.models.harmonic_file import HarmonicFile as HarmonicFile
+    from rotorid.tables.models.harmonic_file import read_harmonic_model as read_harmonic_model
+    from rotorid.tables.models.ode_file import read_ode_model as read_ode_model
+    from rotorid.tables.models.small_model_file import read_small_model as read_small_model
+    from rotorid.tables.reader.problems import InputError as InputError
+    from rotorid.tables.reader.problems import Problem as Problem
+    from rotorid.tables.reader.problems import TableWarning as TableWarning
+    from rotorid.tables.reader.table_writing import write_table as write_table
+    from rotorid.tables.rotor.bow_table import read_bow as read_bow
+    from rotorid.tables.rotor.rotor_file import read_rotor as read_rotor
+    from rotorid.tables.rotor.rotor_file import rotor_files as rotor_files
+    from rotorid.tables.rotor.rotor_writing import write_rotor as write_rotor
+    from rotorid.tables.rotor.unbalance_table import read_unbalance as read_unbalance
+    from rotorid.tables.runs.influence_table import influence_frame as influence_frame
+    from rotorid.tables.runs.influence_table import read_influence as read_influence
+    from rotorid.tables.runs.influence_table import write_influence as write_influence
+    from rotorid.tables.runs.stated_conventions import Conventions as Conventions
+    from rotorid.tables.runs.stated_conventions import StatedErrors as StatedErrors
+    from rotorid.tables.runs.trials import read_trials as read_trials
+
+_HOME = {
+    "read_measurements": "data.measurements",
+    "MeasuredModes": "data.modes_table",
+    "read_compliance": "data.modes_table",
+    "read_modes": "data.modes_table",
+    "read_record": "data.records",
+    "Job": "job.job_file",
+    "job_from_files": "job.job_file",
+    "read_job": "job.job_file",
+    "HarmonicFile": "models.harmonic_file",
+    "read_harmonic_model": "models.harmonic_file",
+    "read_ode_model": "models.ode_file",
+    "read_small_model": "models.small_model_file",
+    "InputError": "reader.problems",
+    "Problem": "reader.problems",
+    "TableWarning": "reader.problems",
+    "write_table": "reader.table_writing",
+    "read_bow": "rotor.bow_table",
+    "read_rotor": "rotor.rotor_file",
+    "rotor_files": "rotor.rotor_file",
+    "write_rotor": "rotor.rotor_writing",
+    "read_unbalance": "rotor.unbalance_table",
+    "influence_frame": "runs.influence_table",
+    "read_influence": "runs.influence_table",
+    "write_influence": "runs.influence_table",
+    "Conventions": "runs.stated_conventions",
+    "StatedErrors": "runs.stated_conventions",
+    "read_trials": "runs.trials",
+}
+
+__all__ = [*_HOME]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - PEP 562
+    if name in _HOME:
+        value = getattr(import_module(f"rotorid.tables.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'rotorid.tables' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -13,14 +13,16 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rotorid.tables.job.job_as_written import JobTables
 from rotorid.tables.job.job_keys import CELLS, FORBIDDEN, TABLES
 from rotorid.tables.reader.columns import REMARKS
 from rotorid.tables.reader.decimal_numbers import decimal_comma, parse_number
 from rotorid.tables.reader.excel_pages import Line
 from rotorid.tables.reader.grid import Cell, Grid, Row, Shown, show
+
+if TYPE_CHECKING:
+    from rotorid.tables.job.job_as_written import JobTables
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""
