@@ -31,8 +31,8 @@ KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True
 """Balances of one job, by the options of `rotorid balance`."""
 UNCHECKED = " before the check run"
 """Behind a kind: as if there were no check run, which somebody is typing."""
-_kept: dict[str, tuple[int, Balance]] = {}
-"""The newest of each kind, with the version of the files: pictures and sheets are made of it."""
+_kept: dict[str, tuple[int, Balance, list[str]]] = {}
+"""The newest of each kind: version of the files, result (for pictures and sheets), what was warned of."""
 _read: dict[str, int] = {}
 """Names of the files that were read, and when each was changed before that (ns)."""
 
@@ -72,14 +72,17 @@ def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]
 
 def _balance(job: str, version: int, kind: str) -> Balance:
     """The job as it is now, balanced; once for each version of its files."""
+    from rotorid.base.answer import kinds
     from rotorid.workflows import BalanceOptions, balance
 
-    known = _kept.get(kind)
-    if known is None or known[0] != version:
+    if kind not in _kept or _kept[kind][0] != version:
         options = BalanceOptions(**KINDS[kind.removesuffix(UNCHECKED)])
-        read = _without_check(Path(job)) if kind.endswith(UNCHECKED) else Path(job)
-        known = _kept[kind] = version, balance(read, options)
-    return known[1]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = balance(_without_check(Path(job)) if kind.endswith(UNCHECKED) else Path(job), options)
+        said = kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
+        _kept[kind] = version, found, said
+    return _kept[kind][1]
 
 
 def _without_check(path: Path) -> Job:
@@ -111,14 +114,9 @@ def told(outcome: Outcome) -> dict[str, Any]:
 
 def balanced(job: str, version: int, kind: str) -> dict[str, Any]:
     """Weights, pieces in holes, or a trim; what was warned of when the files were read stands first."""
-    from rotorid.base.answer import kinds
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        found = told(_balance(job, version, kind))
-    said = kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
+    found, said = told(_balance(job, version, kind)), _kept[kind][2]
     if kind.endswith(UNCHECKED):
-        said.insert(0, "the check run is not finished: the answer is that of the runs before it")
+        said = ["the check run is not finished: the answer is that of the runs before it", *said]
     return {**found, "warnings": [*said, *found["warnings"]]}
 
 

@@ -121,7 +121,9 @@ class Session:
         """
         read = await self.front.ask("rows", name=name, data=data)
         tables = self.files.state()["tables"]
-        own = tables["runs"]["header"] if "runs" in tables else []
+        if "runs" not in tables:
+            raise ValueError("the job has no runs yet: make their table first")
+        own = tables["runs"]["header"]
         names = [column if column in own else "" for column in read["header"]]
         if lost := [column for column in own[:5] if column not in names and not (column == "run" and run)]:
             raise ValueError(
@@ -152,29 +154,23 @@ class Session:
         if not state["exists"]:
             self._publish(**_NOTHING)
             return
+        checked, self._behind = "check" in state["tables"], ""
         await self._part("runs", self.front.ask("so_far", **about))
-        self._behind = ""
         found = await self._part("answer", self.front.ask("balanced", **about, kind="answer"))
-        if not found and "check" in state["tables"]:
+        if not found and checked:
             self._behind = UNCHECKED
             asked = self.front.ask("balanced", **about, kind="answer" + UNCHECKED)
             found = await self._part("answer", asked, keep=True)
-        if not found:
-            self._publish(busy="")
-            return
-        self._publish(pictures={"overview": str(self.version)})
-        if "check" in state["tables"] and not self._behind:
+        if found and checked and not self._behind:
             self._publish(busy="computing the trim")
             await self._part("trim", self.aside.ask("balanced", **about, kind="trim"))
-        if any(_holes(plane) for plane in state["settings"].get("planes", {}).values()):
+        if found and any(_holes(plane) for plane in state["settings"].get("planes", {}).values()):
             self._publish(busy="choosing pieces for the holes")
-            if await self._part("pieces", self.aside.ask("balanced", **about, kind="pieces" + self._behind)):
-                pictures = {"overview": str(self.version), "discs": str(self.version)}
-                self._publish(pictures=pictures)
+            await self._part("pieces", self.aside.ask("balanced", **about, kind="pieces" + self._behind))
         self._publish(busy="")
 
     async def _part(self, name: str, asked: Any, *, keep: bool = False) -> bool:  # noqa: ANN401 - of `ask`
-        """Publish one part, or why there is none (`keep` what was said); whether there is one."""
+        """Publish a part with its picture, or why there is none (`keep` what was said); whether there is."""
         said: dict[str, Any] = {}
         try:
             found = await asked
@@ -185,6 +181,8 @@ class Session:
             said = {}
         elif name == "answer" and found is not None:
             said = {"problems": [], "refused": ""}
+        if found is not None and (shown := {"answer": "overview", "pieces": "discs"}.get(name)):
+            said["pictures"] = {**self._results["pictures"], shown: str(self._of_files)}
         self._publish(**{name: found}, **said)
         return found is not None
 

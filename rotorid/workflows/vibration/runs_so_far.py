@@ -65,25 +65,24 @@ class RunsSoFar:
 
     Attributes
     ----------
-    runs
-        Names, in the order of the table.
     baseline
         The first run without a row in the weights table, or None.
+    trials
+        Names of the runs that have one, in the order of their table.
     channels
         Sensors and speeds that have readings.
     """
 
-    runs: tuple[str, ...]
     baseline: str | None
+    trials: tuple[str, ...]
     channels: tuple[Channel, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types: the effect of each run beside the baseline."""
-        others = [run for run in self.runs if run != self.baseline]
+        """As JSON types: the effect of each trial run beside the baseline."""
         return {
             "baseline": self.baseline,
             "channels": [{"speed": one.speed, "sensor": one.sensor} for one in self.channels],
-            "runs": [effect for run in others if (effect := self._effect(run))],
+            "runs": [effect for run in self.trials if (effect := self._effect(run))],
         }
 
     def _effect(self, run: str) -> dict[str, Any] | None:
@@ -176,7 +175,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     table = None if grid is None else make_table(grid, COLUMNS, Problems())
     if grid is None or table is None:
         problems.stop()
-        return RunsSoFar((), None, ())
+        return RunsSoFar(None, (), ())
     weights, mounted = sources["weights"], set[str]()
     mounting = None if weights is None else read_grid(weights, "weights", Problems(), may_be_empty=True)
     if mounting is not None and "run" in mounting.header:
@@ -185,7 +184,8 @@ def runs_so_far(job: Path) -> RunsSoFar:
     slow = written.tables.get("slow_roll") or _path(job, said, "slow_roll") or said["slow_roll"]
     runs = tuple(dict.fromkeys(run for run in table.texts("run") if run))
     baseline = next((run for run in runs if run not in mounted), None)
-    return RunsSoFar(runs, baseline, tuple(_channels(grid, table, conventions, said, slow)))
+    trials = tuple(run for run in runs if run in mounted)
+    return RunsSoFar(baseline, trials, tuple(_channels(grid, table, conventions, said, slow)))
 
 
 def _finished(grid: Grid) -> Grid:

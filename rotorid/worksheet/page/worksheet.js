@@ -1,5 +1,4 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
-
 For tests: data-cell "runs|RUN|SPEED|SENSOR|COLUMN" is a reading ("check|…"; SPEED "1220 (2)": second repeat),
 "weights|ROWID|COLUMN" a weight ("check_weights|…"); data-key a key of the job, or, of a .value, the path in
 the document of data-doc around it (answer, pieces, trim), its number in data-value; data-run a run's card or
@@ -378,8 +377,9 @@ function renderAnswer() {
 async function draw(id, address) {
   const slot = $(id);
   slot.hidden = !address;
-  if (!address || slot.address === address) return;
+  if (slot.address === address) return;
   slot.address = address;
+  if (!address) return slot.replaceChildren(); // no old picture stands beside new numbers
   await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
   if (slot.address !== address) return;
   const svg = await ask(address).then((found) => found.text(), () => "");
@@ -396,7 +396,7 @@ function renderHeader() {
 function render() {
   renderHeader();
   $("job").textContent = `${state.folder} / ${state.job}`;
-  $("busy").textContent = state.results.busy;
+  $("answer").className = ($("busy").textContent = state.results.busy) === "computing" ? "old" : "";
   show("notice", state.notice && h("p", {}, state.notice));
   for (const id of ["undo", "redo"]) $(id).disabled = !state[id];
   for (const part of [renderMachine, renderConventions, renderRuns, renderNow, renderAnswer]) part();
@@ -476,10 +476,10 @@ const submitted = {
       const given = dataset.unit ? number(text) + dataset.unit : number(text) || text;
       if (text && !options.with_job) options[name] = given;
     }
-    const told = await ask("/trial", { options }).then((one) => one.json(), (no) => ({ notes: no.message }));
-    const words = [told.judgement, told.found, told.warnings, told.notes].flat();
-    show("trial-answer", words.map((one) => one && h("p", {}, one)));
-    $("trial-picture").innerHTML = told.picture || "";
+    const { judgement, found, warnings, notes, picture = "" } = await ask("/trial", { options })
+      .then((one) => one.json(), (no) => ({ notes: no.message }));
+    show("trial-answer", [judgement, found, warnings, notes].flat().map((one) => one && h("p", {}, one)));
+    $("trial-picture").innerHTML = picture;
   },
 };
 for (const id of Object.keys(submitted)) $(id).onsubmit = (event) => submitted[id](event.preventDefault());
