@@ -6,12 +6,10 @@ Every name below is loaded when it is first used.
 
 from __future__ import annotations
 
-from importlib import import_module
+from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False  # typing takes longer than all before the command line's answer to Ctrl-C
 if TYPE_CHECKING:
-    from typing import Any
-
     from rotorid.harmonic import Experiments as Experiments
     from rotorid.harmonic import Identification as Identification
     from rotorid.harmonic import harmonic_model as harmonic_model
@@ -108,14 +106,4 @@ _HOME = {
 
 __all__ = ["__version__", *_HOME]
 
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - PEP 562
-    if name in _HOME:
-        value = getattr(import_module(f"rotorid.{_HOME[name]}"), name)
-        globals()[name] = value
-        return value
-    raise AttributeError(f"module 'rotorid' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = lazy_names(__name__, _HOME)

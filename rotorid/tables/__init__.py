@@ -7,12 +7,10 @@ Every name below is loaded when it is first used.
 
 from __future__ import annotations
 
-from importlib import import_module
+from rotorid.base.lazy_names import lazy_names
 
-TYPE_CHECKING = False  # as in rotorid
+TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Any
-
     from rotorid.tables.data.measurements import read_measurements as read_measurements
     from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
     from rotorid.tables.data.modes_table import read_compliance as read_compliance
@@ -73,14 +71,4 @@ _HOME = {
 
 __all__ = [*_HOME]
 
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - PEP 562
-    if name in _HOME:
-        value = getattr(import_module(f"rotorid.tables.{_HOME[name]}"), name)
-        globals()[name] = value
-        return value
-    raise AttributeError(f"module 'rotorid.tables' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = lazy_names(__name__, _HOME)
