@@ -68,10 +68,15 @@ class Served:
         self.process.wait()
 
     def close(self):
+        """End it; one that has ended by itself says so, and why."""
+        ended = self.process.poll()
         self.process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(10)
         self.process.kill()
         self.process.wait()
+        said = self.process.stderr.read()
         self.process.stdout.close()
         self.process.stderr.close()
+        if ended not in (None, 130, -9):  # Ctrl+C, and kill -9
+            raise AssertionError(f"the worksheet ended with {ended}: {said}")
