@@ -359,9 +359,15 @@ class Correction(Answered):
         if self.mounted is None or self.to_add is None:
             return {"mounted_in_last_run": None, "add_to_mounted": None}
         run, planes, weights = self.mounted
+        added = weight_rows(self.labels, planes, self.to_add)
+        for row, at in zip(added, self.places(planes, self.to_add).tolist(), strict=True):
+            if row["plane"] in self.remove:
+                row.update(action="remove", remove_at_deg=at)
+            elif self.remove:
+                row.update(action="add", remove_at_deg=None)
         return {
             "mounted_in_last_run": {"run": run, "weights": weight_rows(self.labels, planes, weights)},
-            "add_to_mounted": weight_rows(self.labels, planes, self.to_add),
+            "add_to_mounted": added,
         }
 
     def _limits(self) -> dict[str, Any] | None:

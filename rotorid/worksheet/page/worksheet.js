@@ -1,8 +1,7 @@
 /* The worksheet's page: it shows the state that the server sends, and sends every cell that changes.
-For tests: data-cell "runs|RUN|SPEED|SENSOR|COLUMN" is a reading ("check|…"; SPEED "1220 (2)": second repeat),
-"weights|ROWID|COLUMN" a weight ("check_weights|…"); data-key a key of the job, or, of a .value, the path in
-the document of data-doc around it (answer, pieces, trim), its number in data-value; data-run a run's card or
-gauge; data-type, -remove, -add, -import, -keep and -write are on buttons. */
+For tests: data-cell "runs|RUN|SPEED|SENSOR|COLUMN" is a reading ("check|…"; "1220 (2)": a repeat), and
+"weights|ROWID|COLUMN" a weight ("check_…"); data-key a key of the job or, of a .value, the path in the document
+of data-doc, its number in data-value; data-run a run's card or gauge; others (data-add, …) are on buttons. */
 const $ = (id) => document.getElementById(id);
 let token = location.hash.slice(1);
 const typed = new Map(); // key of a cell → its change, until the state has it; with `why` if it was refused
@@ -276,8 +275,7 @@ function renderConventions() {
   show("conventions", four.map((name) => {
     const [way, side] = [name.split("-")[0], `${name.split("-")[1]} rotation`];
     const edits = [{ key: ["phase"], old: phase, new: way }, { key: ["angles"], old: angles, new: side }];
-    const words = h("b", {}, `Phase ${way}s, angles ${side}`);
-    return button([words, h("span", { id: `drawing-${name}`, own: "" })],
+    return button([h("b", {}, `Phase ${way}s, angles ${side}`), h("span", { id: `drawing-${name}`, own: true })],
       () => edit(...edits), { id: `convention-${name}`, "aria-pressed": phase === way && angles === side });
   }));
   four.forEach((name) => draw(`drawing-${name}`, `/convention/${name}`));
@@ -285,18 +283,23 @@ function renderConventions() {
 
 function renderRuns() {
   const trials = runs().filter((run) => run !== baseline());
+  const free = ["", ...trials].map((_, i) => `trial ${i + 1}`).find((name) => !trials.includes(name));
   const checks = valuesOf("run", "check");
-  const begin = () => edit(create("check", data.runs), ...addRows("check", "check", usual()));
-  const rows = () => planes().map((plane) => add("check_weights", { run: checks[0], plane }));
-  const others = () => edit(create("check_weights", data.weights), ...rows());
+  const { weight, angle } = data.weights?.names || {};
+  const pieces = state.results.pieces?.document.mounting.planes; // these are mounted, not the weights
+  const rows = (pieces || planes().map((plane) => ({ plane }))).map(({ plane, mass, angle_deg: at }) => add(
+    "check_weights", { run: checks[0] || "check", plane, [weight]: mass?.toPrecision(5), [angle]: at?.toFixed(1) }));
+  const others = () => [create("check_weights", data.weights), ...rows];
+  const begin = () => edit(create("check", data.runs), ...addRows("check", "check", usual()),
+    ...(pieces ? others() : []));
   $("new-run").hidden = !data.runs;
-  put($("new-name"), "value", `trial ${trials.length + 1}`);
+  put($("new-name"), "value", free);
   show("baseline", data.runs ? card("runs", baseline()) : "First make the table, in step 1.");
   show("runs", trials.map((run) => card("runs", run)));
   show("check", checks.map((run) => card("check", run)),
     data.runs && !data.check && button("Add a check run", begin, { id: "add-check" }),
     data.check && data.weights && !data.check_weights && h("p", {}, "Mounted as proposed? ",
-      button("No, other weights were mounted", others, { id: "check-others" })));
+      button("No, other weights were mounted", () => edit(...others()), { id: "check-others" })));
 }
 
 /* The answer: every number of a document stands with its path. */
@@ -307,30 +310,37 @@ function value(doc, path, std) {
   return h("span", { class: "value", "data-key": path, "data-value": raw, title: raw }, `${text}`);
 }
 
-/* Rows of a list in a document; a column is [heading, key, key of its ±]. */
-function listing(doc, path, columns, order) {
+/* Rows of a list in a document, largest `size` first; a column is [key, heading, key of its ±]. */
+function listing(doc, path, columns, size = () => 0, count = Infinity) {
   const rows = at(doc, path.split("."));
-  const heads = columns.filter(([, key]) => rows.some((row) => key in row));
-  return table([heads], (order || Object.keys(rows)).map((i) => h("tr", {}, heads.map(([, key, std]) => {
+  const heads = columns.filter(([key]) => rows.some((row) => key in row));
+  const order = Object.keys(rows).sort((a, b) => size(rows[b]) - size(rows[a])).slice(0, count);
+  return table([heads.map(([key, name = key]) => [name])], order.map((i) => h("tr", {}, heads.map((head) => {
+    const [own, , std] = head;
+    const key = own === "angle_deg" && Number.isFinite(rows[i].remove_at_deg) ? "remove_at_deg" : own;
     const more = rows[i][std] && [" ± ", value(doc, `${path}.${i}.${std}`, rows[i][std])];
     return h("td", {}, value(doc, `${path}.${i}.${key}`, rows[i][std]), more);
   }))));
 }
 
+const judged = (text) => h("p", { class: /^(do not|measure|fail)/im.test(text) ? "why" : "judgement" }, text);
+
 function answer(name, title, { document: doc, judgement, warnings, notes }) {
-  const [weight, unit] = [doc.conventions.weight_unit, doc.conventions.vibration_unit].map(unitOf);
-  const after = `after, ${unit}`;
-  const holes = doc.mounting?.holes;
-  const list = name === "trim" ? "add_to_mounted" : holes ? "mounting.holes" : "corrections";
-  const what = holes ? [["hole", "hole"], [weight, "pieces"]] : [[weight, "mass", "mass_std"]];
-  const left = doc.mounting ? "mounting.residuals" : "residuals";
-  const rows = at(doc, left.split("."));
-  const largest = Object.keys(rows).sort((a, b) => rows[b].after - rows[a].after).slice(0, 5);
-  const places = [["largest", "sensor"], ["rpm", "speed_rpm"], ["before", "before"], [after, "after"]];
-  return h("section", { key: name, "data-doc": name }, h("h3", {}, title), h("p", {}, judgement),
-    listing(doc, list, [["plane", "plane"], ["", "action"], ...what, ["at °", "angle_deg", "angle_std_deg"]]),
-    listing(doc, left, places, largest), doc.check && h("p", {}, "Check run: ", value(doc, "check.verdict"),
-      "; rms ", value(doc, "check.rms_before"), " → ", value(doc, "check.rms_achieved")),
+  const { conventions: said, mounting: pieces, mounted_in_last_run: last } = doc;
+  const [weight, unit] = [said.weight_unit, said.vibration_unit].map(unitOf);
+  const columns = [["if"], ["plane"], ["action", ""], ["hole"], ["pieces"], ["mass", weight, "mass_std"],
+    ["angle_deg", "at °", "angle_std_deg"]];
+  const place = [["sensor", "largest"], ["speed_rpm", "rpm"], ["before"], ["after", `after, ${unit}`]];
+  const limits = [["name", "limit of"], ["speed_rpm", "rpm"], ["size"], ["limit"], ["verdict", ""]];
+  return h("section", { key: name, "data-doc": name }, h("h3", {}, title), judged(judgement),
+    listing(doc, pieces ? "mounting.holes" : "corrections", columns),
+    h("p", {}, pieces?.on_top_of ? `Beside those of ${pieces.on_top_of}. ` : `For ${doc.corrections_refer_to}. `,
+      `Angles count ${said.angles}, phase ${said.phase}. ± is one standard deviation.`),
+    !pieces && last?.weights.some(({ mass }) => mass) && [
+      h("b", {}, `If the weights of ${last.run} stay, instead:`), listing(doc, "add_to_mounted", columns)],
+    !pieces && doc.other_readings.length > 0 && listing(doc, "other_readings", columns),
+    doc.verdict && listing(doc, "verdict.rows", limits, (row) => row.size / row.limit, 5),
+    listing(doc, pieces ? "mounting.residuals" : "residuals", place, (row) => row.after, 5),
     warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)),
     notes.map((one) => h("p", {}, `Note: ${one}`)));
 }
@@ -350,8 +360,8 @@ function renderNow() {
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
   const empty = allRows("runs").filter(isEmpty);
-  show("now", h("h2", {}, best ? "Answer" : "So far"), best && h("p", { class: "judgement" }, best.judgement),
-    h("div", { class: "why" }, list([...problems(false), ...refused])), why && h("p", {}, why),
+  show("now", h("h2", {}, best ? "Answer" : "So far"), best && judged(best.judgement),
+    h("div", { class: "why" }, list([...problems(false), ...refused]), why && `No answer: ${why}`),
     left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
     empty.length > 0 && button("Not measured: remove the empty rows",
       () => edit(...remove("runs", empty)), { id: "drop-empty" }));
@@ -359,7 +369,7 @@ function renderNow() {
 
 function renderAnswer() {
   const { runs: found, pictures, ...documents } = state.results;
-  const titles = { trim: "Trim: add to what is mounted", pieces: "Pieces in the holes", answer: "Weights" };
+  const titles = { trim: "Trim, with the check run", pieces: "Pieces in the holes", answer: "Weights" };
   for (const key of ["speed", "sensor"]) {
     const values = each((found?.channels || []).map((one) => one[key]));
     show(`channel-${key}`, values.map((one) => h("option", { key: one }, one)));
@@ -436,6 +446,7 @@ document.addEventListener("paste", (event) => {
   const text = event.clipboardData.getData("text").replace(/[\r\n]+$/, "");
   const lines = text.split(/\r?\n/).map((line) => line.split(text.includes("\t") ? "\t" : ";"));
   if (!target.cell?.row || (lines.length < 2 && lines[0].length < 2)) return;
+  while (target.cell.what !== "plane" && lines[1] && lines[0].every((it) => isNaN(number(it)))) lines.shift();
   event.preventDefault();
   const rows = [...target.closest("tbody").rows].slice(target.closest("tr").sectionRowIndex);
   const inputAt = (i, j) => rows[i]?.cells[target.parentNode.cellIndex + j]?.querySelector("input");
@@ -472,9 +483,8 @@ const submitted = {
   },
   async trial() {
     const options = { with_job: $("trial-with-job").checked };
-    for (const { name, value: text, dataset } of $("trial").querySelectorAll("[name]")) {
-      const given = dataset.unit ? number(text) + dataset.unit : number(text) || text;
-      if (text && !options.with_job) options[name] = given;
+    for (const { name, value: it, dataset } of $("trial").querySelectorAll("[name]")) {
+      if (it && !options.with_job) options[name] = dataset.unit ? number(it) + dataset.unit : number(it) || it;
     }
     const { judgement, found, warnings, notes, picture = "" } = await ask("/trial", { options })
       .then((one) => one.json(), (no) => ({ notes: no.message }));

@@ -94,12 +94,14 @@ def phases(folder):
     return [row["phase_deg"] for row in rows(folder / "runs.csv")]
 
 
-def corrections(job):
+def document(job, *options):
     """What the command line says."""
-    command = [sys.executable, "-m", "rotorid", "balance", str(job), "--json"]
-    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)[
-        "corrections"
-    ]
+    command = [sys.executable, "-m", "rotorid", "balance", str(job), "--json", *options]
+    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+
+def corrections(job):
+    return document(job)["corrections"]
 
 
 def shown(window, told):
@@ -126,6 +128,7 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     window.wait(lambda: window.texts("#trial-answer p"), "a trial weight")
     served.settled()
     window.wait(lambda: not window.text("#busy"), "all is computed")
+    assert len(window.texts("#conventions svg")) == 8  # two drawings each, which no edit takes away
 
     assert {path.name for path in folder.iterdir()} == {"job.toml", "runs.csv", "weights.csv"}
     settings = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))
@@ -257,6 +260,53 @@ def test_a_block_from_excel_is_one_step(turbo, serve, windows):
     window.wait(lambda: window.texts(cells) == held, "one step takes it back")
     window.saved()
     assert (turbo / "runs.csv").read_bytes() == before
+
+
+def test_headings_of_a_block_are_no_readings(turbo, serve, windows):
+    window = windows[0]
+    window.open(serve(turbo / "job.toml").address)
+    window.clipboard("Amplitude\tPhase\r\nµm\t°\r\n3,5\t91\r\n")
+    window.go(FIRST.replace("phase_deg", "amplitude_um_pp"))
+    window.hold(CONTROL, "v")
+    window.wait(lambda: window.text(FIRST) == "91", "the block is there")
+    window.saved()
+    assert (turbo / "runs.csv").read_text().splitlines()[1] == "baseline,1220,probe 1,3.5,91"
+
+
+def test_material_is_removed_where_the_command_line_says(turbo, serve, windows):
+    """And what to add if the last run's weights stay, and the limits, stand beside the weights."""
+    window, job = windows[0], turbo / "checked.toml"
+    planes = '[planes.left]\nremove = true\n[sensors."probe 1"]\nlimit = 0.4\n'
+    job.write_text(job.read_text(encoding="utf-8") + planes, encoding="utf-8")
+    window.open(serve(job).address)
+    for name, options in (("answer", ()), ("trim", ("--refine",))):
+        window.wait(lambda name=name: window.texts(f'[data-doc="{name}"]'), name)
+        told, found = document(job, *options), window.document(name)
+        for listed in ("corrections", "add_to_mounted"):
+            for place, row in enumerate(told[listed]):
+                key, other = ("angle_deg", "remove_at_deg")[:: -1 if row["plane"] == "left" else 1]
+                assert float(found[f"{listed}.{place}.{key}"]) == row[key]
+                assert f"{listed}.{place}.{other}" not in found
+                assert found[f"{listed}.{place}.action"] == row["action"]
+        drilled = told["add_to_mounted"][0]
+        assert (drilled["remove_at_deg"] - drilled["angle_deg"]) % 360 == pytest.approx(180)
+        assert {row["verdict"] for row in told["verdict"]["rows"]} == {"pass", "fail"}
+        shown = {text for key, text in found.items() if key.startswith("verdict.rows.")}
+        assert {"pass", "fail"} < shown
+    assert window.text("#now .why").startswith("Fail")
+
+
+def test_a_check_run_is_that_of_the_pieces_in_the_holes(turbo, serve, windows):
+    window, job = windows[0], turbo / "holes.toml"
+    window.open(serve(job).address)
+    window.wait(lambda: window.texts('[data-doc="pieces"]'), "pieces")
+    told = document(job, "--split")
+    window.driver.execute_script("document.querySelector('#add-check').click()")
+    window.wait(lambda: window.texts('#check [data-cell^="check_weights|"]'), "the pieces are mounted")
+    table = turbo / tomllib.loads(job.read_text(encoding="utf-8"))["check_weights"]
+    mounted = [[row["plane"], float(row["unbalance_g_mm"])] for row in rows(table)]
+    planes = told["mounting"]["planes"]
+    assert mounted == [[row["plane"], pytest.approx(row["mass"], rel=1e-4)] for row in planes]
 
 
 @pytest.mark.parametrize("job", ["new", "holes.toml", "checked.toml"])
