@@ -13,23 +13,6 @@ from worksheet.served import Served
 
 from rotorid.samples import sample_data
 
-pytest.importorskip("starlette", reason="without the extra rotorid[worksheet]")
-pytest.importorskip("uvicorn", reason="without the extra rotorid[worksheet]")
-pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
-
-
-@pytest.fixture
-def serve():
-    running = []
-
-    def start(job):
-        running.append(Served(job))
-        return running[-1]
-
-    yield start
-    for one in running:
-        one.close()
-
 
 def copy(tmp_path, sample="turbo_job"):
     return shutil.copytree(sample_data() / sample, tmp_path / sample)

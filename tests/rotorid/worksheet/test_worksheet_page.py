@@ -13,16 +13,11 @@ from pathlib import Path
 
 import browser as chromium
 import pytest
-from worksheet.served import Served
 from worksheet.stranger import stranger
 from worksheet.typed_job import rows, type_job
 from worksheet.window import CONTROL, DOWN, ENTER, TAB, UP, Window
 
 from rotorid.samples import sample_data
-
-pytest.importorskip("starlette", reason="without the extra rotorid[worksheet]")
-pytest.importorskip("uvicorn", reason="without the extra rotorid[worksheet]")
-pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
 
 FINGER = 40  # pixels that a finger needs
 SIZES = {1366: 768, 1024: 768, 800: 1280}
@@ -69,19 +64,6 @@ def windows(browsers):
     yield [Window(one) for one in browsers]
     for one in browsers:
         one.driver.get("about:blank")  # nobody asks a program that has ended
-
-
-@pytest.fixture
-def serve():
-    running = []
-
-    def start(job, *options):
-        running.append(Served(job, *options))
-        return running[-1]
-
-    yield start
-    for one in running:
-        one.close()
 
 
 @pytest.fixture

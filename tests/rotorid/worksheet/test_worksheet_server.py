@@ -8,26 +8,8 @@ import threading
 import time
 
 import pytest
-from worksheet.served import Served
 
 from rotorid.samples import sample_data
-
-pytest.importorskip("starlette", reason="without the extra rotorid[worksheet]")
-pytest.importorskip("uvicorn", reason="without the extra rotorid[worksheet]")
-pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
-
-
-@pytest.fixture
-def serve():
-    running = []
-
-    def start(job, *options):
-        running.append(Served(job, *options))
-        return running[-1]
-
-    yield start
-    for one in running:
-        one.close()
 
 
 def copy(tmp_path, sample="turbo_job"):
@@ -54,23 +36,22 @@ def plain(document):
 
 
 @pytest.mark.parametrize(
-    ("name", "kind", "options"),
+    ("name", "kinds"),
     [
-        ("job.toml", "answer", ()),
-        ("holes.toml", "pieces", ("--split",)),
-        ("checked.toml", "answer", ()),
-        ("checked.toml", "trim", ("--refine",)),
+        ("job.toml", {"answer": ()}),
+        ("holes.toml", {"pieces": ("--split",)}),
+        ("checked.toml", {"answer": (), "trim": ("--refine",)}),
     ],
 )
-def test_every_number_is_that_of_the_command(tmp_path, serve, name, kind, options):
+def test_every_number_is_that_of_the_command(tmp_path, serve, name, kinds):
     job = copy(tmp_path) / name
-    found = serve(job).settled()["results"][kind]
-    document = plain(found["document"])
-    expected = command(job, *options)
-    for one in (document, expected):
-        one["provenance"].pop("options")
-        one.get("mounting", {}).pop("seconds", None)
-    assert document == expected
+    results = serve(job).settled()["results"]
+    for kind, options in kinds.items():
+        document, expected = plain(results[kind]["document"]), command(job, *options)
+        for one in (document, expected):
+            one["provenance"].pop("options")
+            one.get("mounting", {}).pop("seconds", None)
+        assert document == expected
 
 
 def test_an_edit_changes_one_line_and_every_number_follows(tmp_path, serve):
