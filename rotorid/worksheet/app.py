@@ -127,14 +127,12 @@ class Routes:
 
     async def sheet(self, request: Request) -> Response:
         """The balancing sheet."""
-        return Response(await self._printed("sheet", request), media_type="text/html", headers=HEADERS)
+        found = await self.session.printed("sheet", self.session.best)
+        return Response(found, media_type="text/html", headers=HEADERS)
 
     async def whole(self, request: Request) -> Response:
         """All tables, as the command line prints them."""
-        return PlainTextResponse(await self._printed("whole", request), headers=HEADERS)
-
-    async def _printed(self, do: str, request: Request) -> str:
-        return await self.session.printed(do, request.query_params.get("kind", self.session.best))
+        return PlainTextResponse(await self.session.printed("whole", self.session.best), headers=HEADERS)
 
 
 def application(session: Session, token: str, own: str, ready: Callable[[], object]) -> Starlette:

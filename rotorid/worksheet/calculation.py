@@ -177,17 +177,22 @@ def convention(phase: str, angles: str) -> str:
     return turning + _svg(explained.phase_figure(labels), f"A reading over time: {title}")
 
 
-def rows(name: str, data: str) -> dict[str, Any]:
-    """Header and rows of a runs table that is no file of the job, also as an instrument exports it."""
+def rows(name: str, data: str, phase: str) -> dict[str, Any]:
+    """Header and rows of a runs table that is no file of the job, also as an instrument exports it.
+
+    A file that says that its phases are others than the job's, `phase`, is refused.
+    """
+    from balancing.data.conventions import Labels
     from rotorid.tables.reader.grid import show
     from rotorid.tables.reader.input_file import each_file_once
     from rotorid.tables.reader.problems import Problems
     from rotorid.tables.runs.instrument_export import read_runs_grid
-    from rotorid.tables.runs.stated_conventions import Conventions
+    from rotorid.tables.runs.stated_conventions import Conventions, as_phase
 
     problems, path = Problems(), Path(name)
+    conventions = Conventions(Labels(phase=as_phase(phase)))
     with each_file_once({path: base64.b64decode(data)}):
-        grid = problems.need(read_runs_grid(path, Conventions(), problems))
+        grid = problems.need(read_runs_grid(path, conventions, problems))
     problems.stop()
     return {"header": list(grid.header), "rows": [[show(cell) for cell in cells] for _, cells in grid.rows]}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -13,6 +14,8 @@ from rotorid.worksheet.workers import Refused, Worker
 
 LOOK = 0.25
 """Seconds between two looks at the files."""
+_NEEDED = re.compile(r"(run|speed|sensor|amplitude|phase)(?!_std)(_|$)")
+"""Columns of a runs table without which its rows say nothing."""
 _NOTHING: dict[str, Any] = {
     "busy": "",
     "runs": None,
@@ -119,13 +122,16 @@ class Session:
         ValueError
             If it is none, or in other units than the job.
         """
-        read = await self.front.ask("rows", name=name, data=data)
-        tables = self.files.state()["tables"]
-        if "runs" not in tables:
+        state = self.files.state()
+        if "runs" not in state["tables"]:
             raise ValueError("the job has no runs yet: make their table first")
-        own = tables["runs"]["header"]
+        phase = state["settings"].get("phase", "lead")
+        read = await self.front.ask("rows", name=name, data=data, phase=phase)
+        own = state["tables"]["runs"]["header"]
         names = [column if column in own else "" for column in read["header"]]
-        if lost := [column for column in own[:5] if column not in names and not (column == "run" and run)]:
+        if lost := [
+            one for one in own if _NEEDED.match(one) and one not in names and not (one == "run" and run)
+        ]:
             raise ValueError(
                 f"{name}: a column {lost[0]} as in the runs of the job; it has {', '.join(read['header'])}"
             )

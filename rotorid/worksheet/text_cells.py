@@ -29,7 +29,7 @@ _MARKS = {"utf-16-le": codecs.BOM_UTF16_LE, "utf-16-be": codecs.BOM_UTF16_BE}
 
 
 class Cells:
-    """A table of a job, of which single cells can be changed.
+    """A table of a job: as it is here, one that can only be shown; of others single cells can be changed.
 
     Attributes
     ----------
@@ -71,11 +71,11 @@ class Cells:
 
     def cells(self, index: int) -> list[str]:
         """Cells of a line as they are now, as many as the header has."""
-        raise NotImplementedError
+        return self.rows[index][1] if index in self.rows else [""] * len(self.header)
 
     def put(self, index: int, column: str, text: str) -> None:
-        """Change one cell."""
-        raise NotImplementedError
+        """Change one cell; ValueError in a table that can only be shown."""
+        raise ValueError(self.read_only or f"{self.name} cannot be changed here")
 
     def insert(self, after: int, cells: Mapping[str, str], row_id: str) -> None:
         """Insert a row below a line."""

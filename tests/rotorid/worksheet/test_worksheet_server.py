@@ -373,3 +373,46 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(tmp_path, serve, 
     last = served.state()["tables"]["runs"]["rows"][-1]
     assert served.edit({"table": "runs", "delete": last["id"], "old": last["cells"]})[0] == 200
     assert served.settled()["results"]["answer"] is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "named", "status"), [("lag", "lag", 200), ("lag", "lead", 400), ("lead", "lag", 400)]
+)
+def test_a_file_whose_phases_are_others_than_the_jobs_is_not_taken_over(
+    tmp_path, serve, stated, named, status
+):
+    import base64
+
+    folder = copy(tmp_path, "bk_two_plane")
+    job = folder / "job.toml"
+    job.write_text(job.read_text().replace('phase = "lead"', f'phase = "{stated}"'))
+    before = (folder / "runs.csv").read_text()
+    text = f"Speed (rpm);Sensor;Amplitude;Phase {named} (°)\n3000;1;7,1;238\n3000;2;13,4;296\n"
+    data = base64.b64encode(text.encode()).decode()
+    found, answer = serve(job).ask("/import", {"name": "third.csv", "data": data, "run": "again"})
+    assert found == status, answer
+    after = (folder / "runs.csv").read_text()
+    assert (after == before) == (status == 400)
+    if status == 400:
+        assert f"expected phases that {stated}" in answer["error"]
+
+
+def test_a_column_without_which_rows_say_nothing_must_be_in_the_file_wherever_it_stands(tmp_path, serve):
+    import base64
+
+    folder = copy(tmp_path, "bk_two_plane")
+    lines = (folder / "runs.csv").read_text().splitlines()
+    repeats = [
+        line if line[0] == "#" else ("repeat," if line.startswith("run,") else "1,") + line for line in lines
+    ]
+    (folder / "runs.csv").write_text("\n".join(repeats) + "\n")
+    served = serve(folder / "job.toml")
+
+    def take(text):
+        data = base64.b64encode(text.encode()).decode()
+        return served.ask("/import", {"name": "third.csv", "data": data, "run": "again"})
+
+    status, answer = take("speed_Hz,sensor,amplitude,phase_deg\n50,1,7.1,238\n")
+    assert (status, "speed_rpm" in answer["error"]) == (400, True)
+    assert take("speed_rpm,sensor,amplitude,phase_deg\n3000,1,7.1,238\n")[0] == 200
+    assert (folder / "runs.csv").read_text().splitlines()[-1] == ",again,3000,1,7.1,238"
