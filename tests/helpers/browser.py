@@ -70,6 +70,18 @@ def on_ci():
     return os.environ.get("CI", "").lower() in ("1", "true", "yes")
 
 
+def session(folder):
+    """A browser for tests, which are skipped where there is none; on CI they fail then."""
+    import pytest
+
+    lacking = missing()
+    if lacking and on_ci():
+        pytest.fail(f"CI needs a browser: {lacking}")
+    if lacking:
+        pytest.skip(lacking)
+    return Browser(folder)
+
+
 @dataclass(frozen=True)
 class Visit:
     """What a page did while it was opened."""

@@ -16,12 +16,7 @@ MOST_PAGES = 12
 
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory):
-    lacking = chromium.missing()
-    if lacking and chromium.on_ci():
-        pytest.fail(f"CI needs a browser: {lacking}")
-    if lacking:
-        pytest.skip(lacking)
-    session = chromium.Browser(tmp_path_factory.mktemp("profile"))
+    session = chromium.session(tmp_path_factory.mktemp("profile"))
     yield session
     session.close()
 

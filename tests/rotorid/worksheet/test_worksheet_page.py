@@ -38,20 +38,11 @@ axe.run().then(found => done(found.violations), e => done([{impact: 'none', id: 
 """
 
 
-def session(folder):
-    lacking = chromium.missing()
-    if lacking and chromium.on_ci():
-        pytest.fail(f"CI needs a browser: {lacking}")
-    if lacking:
-        pytest.skip(lacking)
-    return chromium.Browser(folder)
-
-
 @pytest.fixture(scope="module")
 def browsers(tmp_path_factory):
     """Two, for two windows that both have the focus."""
     with contextlib.ExitStack() as stack:
-        both = [session(tmp_path_factory.mktemp("profile")) for _ in range(2)]
+        both = [chromium.session(tmp_path_factory.mktemp("profile")) for _ in range(2)]
         for one in both:
             stack.callback(one.close)
         yield both
