@@ -112,7 +112,7 @@ constraints:
 	$(UV_VENV)/bin/python -m pip -q install uv
 	$(UV_VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --upgrade --no-config --no-annotate \
 	  --custom-compile-command 'make constraints' --output-file constraints.txt pyproject.toml \
-	  --extra fast --extra instruments --extra worksheet --group dev --group bench --group peer --group peer-vectors --group house > /dev/null
+	  --extra fast --extra instruments --extra worksheet --extra fleet --extra cluster --group dev --group bench --group peer --group peer-vectors --group house > /dev/null
 
 $(VENV)/.pip: $(CONSTRAINTS)
 	$(call environment,$(VENV))
