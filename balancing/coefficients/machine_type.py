@@ -52,6 +52,20 @@ class MachineRecord(NamedTuple):
     covariance: FloatArray
 
 
+def record_of(machine: str, job: str, influence: Influence) -> MachineRecord:
+    """The coefficients of a job with their own covariances, zero where these are not known."""
+    S, C, P = influence.W.shape
+    V = np.zeros((S, C, P, 2, 2))
+    if influence.covariance is not None:
+        p = np.arange(P)
+        V = (
+            influence.covariance[..., 2:, 2:]
+            .reshape(S, C, P, 2, P, 2)[:, :, p, :, p]
+            .transpose(1, 2, 0, 3, 4)
+        )
+    return MachineRecord(machine, job, influence.W, V)
+
+
 @dataclass(frozen=True, eq=False)
 class MachineType:
     """Coefficients of a type.
@@ -87,7 +101,7 @@ class MachineType:
     @property
     def mean(self) -> ComplexArray:
         """Mean coefficients (S, C, P)."""
-        return self._complex(self.effects.mean)
+        return self.coefficients(self.effects.mean)
 
     def scatter(self, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
         """One standard deviation along a mean coefficient, relative to it, and across, in rad, (S, C, P)."""
@@ -118,8 +132,8 @@ class MachineType:
             mean, covariance = self.effects.given(self.groups.mean[m], self.groups.covariance(m))
         covariance = (covariance + self.effects.within) * self.widening
         values, vectors = np.linalg.eigh(covariance)
-        columns = self._complex((vectors * np.sqrt(values.clip(0.0))).T)
-        found = Influence(self.speeds, self.sensors, self.planes, self._complex(mean), labels=labels)
+        columns = self.coefficients((vectors * np.sqrt(values.clip(0.0))).T)
+        found = Influence(self.speeds, self.sensors, self.planes, self.coefficients(mean), labels=labels)
         return with_parameters(found, columns, 0.0)
 
     @property
@@ -129,7 +143,7 @@ class MachineType:
 
         return float(2 * fdtri(2, self.effects.groups - 1, 0.95) / chdtri(2, 0.05))
 
-    def _complex(self, values: FloatArray) -> ComplexArray:
+    def coefficients(self, values: FloatArray) -> ComplexArray:
         """Stretched (…, n) as coefficients (…, S, C, P)."""
         return unstretch(values).reshape(*values.shape[:-1], *self.turn.shape) * self.turn
 
@@ -190,20 +204,20 @@ def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) ->
     W, V = record.W, record.covariance
     other = np.conj(W) if trials is None else _lagging(kind, trials)
     mirror = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    yield kind.distance(other, V * mirror), "its phases lag where they are said to lead, or the reverse"
+    yield kind.distance(other, V * mirror), "its phases were of the other sense (lag for lead)"
     for names, axis, what in ((kind.sensors, 1, "sensors"), (kind.planes, 2, "planes")):
         for a, b in combinations(range(len(names)), 2):
             order = np.arange(len(names))
             order[[a, b]] = b, a
             exchanged = kind.distance(np.take(W, order, axis), np.take(V, order, axis))
-            yield exchanged, f"its {what} {names[a]} and {names[b]} are exchanged"
+            yield exchanged, f"its {what} {names[a]} and {names[b]} were exchanged"
 
     def turned(theta: float) -> float:
         return kind.distance(W * np.exp(1j * theta), _spun(V, np.array(theta)))
 
     theta = _least(turned)
-    degrees = round(np.degrees(-theta)) % 360
-    words = f"its phases lead {degrees}° more: another keyphasor mark, or another zero of the angles"
+    degrees = (round(np.degrees(theta)) + 180) % 360 - 180
+    words = f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
     yield turned(theta) + _ALIKE, words  # it has a number to choose
 
 

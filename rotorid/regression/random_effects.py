@@ -108,14 +108,14 @@ def grouped(y: FloatArray, error: FloatArray, group: IntArray) -> Groups:
         Number of each job's group, (J,), from 0 without gaps.
     """
     jobs = np.bincount(group)
-    member = (group == np.arange(len(jobs))[:, None]) / jobs[:, None]
-    mean = member @ y
+    mean, own = np.zeros((len(jobs), y.shape[1])), np.zeros((len(jobs), *error.shape[1:]))
+    np.add.at(mean, group, y / jobs[group, None])
+    np.add.at(own, group, error / jobs[group, None, None, None] ** 2)
     within = np.zeros((y.shape[1],) * 2)
     several = jobs[group] > 1
     if several.any():
         off = (y - mean[group]) * np.sqrt(jobs / np.maximum(jobs - 1, 1))[group, None]
         within = positive(shrunk(off[several], int(several.sum())) - _in_blocks(error[several].mean(axis=0)))
-    own = np.einsum("mj,j...->m...", member / jobs[:, None], error)
     return Groups(mean, own, jobs, within)
 
 
