@@ -12,12 +12,15 @@ from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination
 from rotorid.cli.verbose import verbosely
 from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
+from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show
 
 FleetArgument = Annotated[Path, typer.Argument(metavar="FLEET", help="Folder of the tables of the fleet.")]
 _NAMES = {"machine_type": ("--type",)}
 
-fleet = typer.Typer(no_args_is_help=True, help="Jobs of many machines as tables: add them, tell of them.")
+fleet = typer.Typer(
+    no_args_is_help=True, help="Jobs of many machines as tables, and coefficients of their type."
+)
 
 
 def _add(
@@ -44,8 +47,21 @@ def _show(fleet: FleetArgument, options: FleetShowOptions, to: Destination) -> N
     to.deliver("fleet", lambda: fleet_show(fleet, options))
 
 
+def _fit(fleet: FleetArgument, options: FleetFitOptions, to: Destination) -> None:
+    """Coefficients of a type: their mean, how machines differ, which machines are odd and why.
+
+    Example: rotorid fleet fit fans --type fan-132
+
+    Example: rotorid balance job.toml --type fans:fan-132
+
+    The second balances a machine of the type from its baseline alone.
+    """
+    to.deliver("coefficients", lambda: fleet_fit(fleet, options))
+
+
 for _name, _function in {
     "add": command(FleetAddOptions, names=_NAMES, least={"workers": 1}, to=("table", "json"))(_add),
     "show": command(FleetShowOptions, names=_NAMES, to=("output", "table", "json"))(_show),
+    "fit": command(FleetFitOptions, names=_NAMES)(_fit),
 }.items():
     fleet.command(_name, cls=Command)(verbosely(_function))

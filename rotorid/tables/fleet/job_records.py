@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from balancing.coefficients.influence import Influence
+from balancing.coefficients.machine_type import record_of
+from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.job.job_data import Job
@@ -22,6 +24,12 @@ QUANTITIES = {"length": "displacement", "velocity": "velocity", "acceleration": 
 def job_id(hashes: Iterable[str]) -> str:
     """The id of a job, 16 hex digits of the SHA-256 over those of its files in their order."""
     return hashlib.sha256("".join(hashes).encode()).hexdigest()[:16]
+
+
+def kind_of(labels: Labels) -> tuple[str, str]:
+    """What is read ("" unknown), and what weights are."""
+    unit, weights = labels.vibration_unit, "unbalance" if labels.unbalances else "mass"
+    return QUANTITIES.get(vibration(unit).kind, "") if unit else "", weights
 
 
 def job_rows(
@@ -72,8 +80,7 @@ def job_rows(
         "date": job.date or own["date"],
         "machine": job.machine or own["machine"],
         "machine_type": job.machine_type or own["machine_type"],
-        "quantity": QUANTITIES.get(vibration(labels.vibration_unit).kind, ""),
-        "weight_kind": "unbalance" if labels.unbalances else "mass",
+        **dict(zip(("quantity", "weight_kind"), kind_of(labels), strict=True)),
         "vibration_unit": labels.vibration_unit,
         "weight_unit": labels.weight_unit,
         "trial_runs": len(trials.runs),
@@ -123,8 +130,7 @@ def _coefficients(influence: Influence, *, stored: bool) -> Columns:
     W = influence.W.ravel()
     own: FloatArray = np.full((len(W), 2, 2), np.nan)
     if influence.covariance is not None:
-        S, C, P = influence.W.shape
-        own = influence.covariance.reshape(S, C, P + 1, 2, P + 1, 2)[s, c, p + 1, :, p + 1, :]
+        own = record_of("", "", influence).covariance.reshape(own.shape)
     return {
         "speed_rad_s": influence.speeds[s].tolist(),
         "sensor": _named(influence.sensors, c),

@@ -116,17 +116,22 @@ def found_job(file: Path, tree: Path, machine_type: str = "") -> FoundJob | None
         if not _OF_A_JOB & said.keys():
             return None
     parts = (file.relative_to(tree) if file != tree else Path(file.name)).parts
-    folder = file.parent.resolve().name
-    dates = map(_date, (file.name, folder, *reversed(parts[:-1])))
+    dates = map(_date, (file.name, file.parent.resolve().name, *reversed(parts[:-1])))
     named = {key: said.get(key) for key in TABLES}
     return FoundJob(
         file=file,
         path="/".join(parts),
-        machine=folder,
+        machine=machine_of(file),
         machine_type=machine_type or (parts[0] if len(parts) > 2 else ""),
         date=next((date for date in dates if date is not None), None),
         tables={key: file.parent / name for key, name in named.items() if isinstance(name, str)},
     )
+
+
+def machine_of(file: Path) -> str:
+    """The folder of a job, or the first above it whose name is not a date alone."""
+    names = (folder.name for folder in file.resolve().parents)
+    return next((name for name in names if _DATE.sub("", name).strip(" _-")), "")
 
 
 def _sheets(file: Path) -> set[str]:

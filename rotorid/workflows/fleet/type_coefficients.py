@@ -52,6 +52,8 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     """
     from rotorid.tables.fleet.fleet_store import FleetStore
     from rotorid.tables.fleet.job_records import kind_of
+    from rotorid.tables.fleet.job_search import machine_of
+    from rotorid.tables.reader.units import weight
 
     folder, _, name = address.rpartition(":")
     if not folder or not name:
@@ -59,7 +61,12 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     store, trials = FleetStore(Path(folder)), job.trials
     grid = Grid(trials.speeds, trials.sensors, job.used, *kind_of(trials.labels))
     known = known_type(store, name, grid, [hash_of(file) for file in job.files])
-    prior = known.kind.influence(trials.labels, job.machine)
+    if not job.planes:  # nothing but a baseline: in the unit of the others' weights
+        unit = weight(str(known.jobs["weight_unit"].mode()[0]))
+        labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
+        trials = replace(trials, labels=labels)
+    machine = job.machine or machine_of(job.files[0])
+    prior = known.kind.influence(trials.labels, machine)
     found, chance = update(prior, trials)
     if refined:
         if job.check is None:
@@ -67,9 +74,9 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
         mounted = None if job.check_mounted else correct(found)
         trials = together(trials, job.check, corrections=mounted)
         found, chance = update(prior, trials)
-    odd = f"an earlier job of {job.machine!r} does not fit the type {name!r}, and does not count"
-    warnings = (odd,) * any(record.machine == job.machine for record, _ in known.kind.odd)
-    notes = (*found.notes, _words(known, job), *known.notes)
+    odd = f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count"
+    warnings = (odd,) * any(record.machine == machine for record, _ in known.kind.odd)
+    notes = (*found.notes, _words(known, machine), *known.notes)
     return TypeKnowledge(
         replace(found, notes=notes, warnings=(*found.warnings, *warnings)),
         tuple(store.files("jobs", "coefficients")),
@@ -77,13 +84,13 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     )
 
 
-def _words(known: KnownType, job: Job) -> str:
+def _words(known: KnownType, machine: str) -> str:
     """Where the coefficients come from."""
     words = f"coefficients of the type {known.name!r}, {counted(len(known.kind.machines), 'machine')}"
-    if job.machine not in known.kind.machines:
+    if machine not in known.kind.machines:
         return words
-    own = int((known.jobs["machine"] == job.machine).sum())
-    return f"{words}, and of {counted(own, 'earlier job')} of {job.machine!r}"
+    own = int((known.jobs["machine"] == machine).sum())
+    return f"{words}, and of {counted(own, 'earlier job')} of {machine!r}"
 
 
 def _foreign(known: KnownType, trials: Trials, chance: float) -> str:

@@ -31,8 +31,7 @@ def type_picture(known: KnownType) -> Figure:
     sensors, planes = kind.sensors[:MOST], kind.planes[:MOST]
     figure = new_figure(2.6 * len(planes) + 0.8)
     axes = figure.subplots(len(planes), len(sensors), sharex=True, sharey=True, squeeze=False)
-    for p, c in np.ndindex(axes.shape):
-        ax = axes[p, c]
+    for (p, c), ax in np.ndenumerate(axes):
         plain(ax)
         for s, speed in enumerate(kind.speeds):
             style = look(s)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -101,8 +101,9 @@ def known_type(
     cells = store.table("coefficients", jobs=list(jobs.index)).join(jobs[_KIND], on="job")
     if grid is None or not grid.planes:
         usual = _usual(cells)
-        grid = usual if grid is None else replace(grid, planes=usual.planes)
-    records = _records(cells, jobs["machine"], grid)
+        own = {"planes": usual.planes, "weight_kind": usual.weight_kind}
+        grid = usual if grid is None else replace(grid, **own)
+    records = _records(cells, dict(jobs["machine"]), grid)
     kind = fit_type(records, grid.speeds, grid.sensors, grid.planes)
     own = jobs.loc[[record.job for record in records]]
     reasons = tuple(
@@ -112,7 +113,7 @@ def known_type(
     return KnownType(name, kind, own, grid, reasons, len(jobs) - len(records))
 
 
-def _records(cells: pd.DataFrame, machine: pd.Series[str], grid: Grid) -> list[MachineRecord]:
+def _records(cells: pd.DataFrame, machine: Mapping[Any, str], grid: Grid) -> list[MachineRecord]:
     """Of each job that has all coefficients of a grid; unknown errors count as none."""
     near = np.abs(cells["speed_rad_s"].to_numpy()[:, None] - grid.speeds)
     s = near.argmin(axis=1)
@@ -134,7 +135,7 @@ def _records(cells: pd.DataFrame, machine: pd.Series[str], grid: Grid) -> list[M
     W[at] = part["re"] + 1j * part["im"]
     each = part[["var_re", "cov_re_im", "cov_re_im", "var_im"]].fillna(0.0).to_numpy()
     V[at] = each.reshape(-1, 2, 2)
-    return [MachineRecord(str(machine[name]), str(name), W[k], V[k]) for k, name in enumerate(ids)]
+    return [MachineRecord(machine[name], name, W[k], V[k]) for k, name in enumerate(ids)]
 
 
 def _usual(cells: pd.DataFrame) -> Grid:
@@ -142,12 +143,16 @@ def _usual(cells: pd.DataFrame) -> Grid:
     if cells.empty:
         raise ValueError("no job of this type has coefficients: its runs do not determine them")
     alike = cells.assign(speed_rad_s=cells["speed_rad_s"].map("{:.3g}".format)).groupby("job")
-    keys = alike[["speed_rad_s", "sensor", "plane", *_KIND]].agg(lambda column: tuple(sorted(set(column))))
+    keys = alike[["speed_rad_s", "sensor", "plane", *_KIND]].agg(_different)
     first = keys.reset_index().groupby(list(keys), sort=False)["job"].agg(["size", "first"])
     of_job = cells.set_index("job")
     grids = [_grid(of_job.loc[[job]]) for job in first.sort_values("size", ascending=False)["first"][:_MOST]]
     machine = dict.fromkeys(of_job.index, "")
     return max(grids, key=lambda grid: (len(_records(cells, machine, grid)), len(grid.speeds)))
+
+
+def _different(column: pd.Series[str]) -> tuple[str, ...]:
+    return tuple(sorted(set(column)))
 
 
 def _grid(cells: pd.DataFrame) -> Grid:

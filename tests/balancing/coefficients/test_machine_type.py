@@ -121,7 +121,7 @@ def test_planes_that_were_exchanged_are_told():
 
 
 def test_scatter_is_what_was_drawn_and_own_jobs_narrow_it():
-    runs = drawn_type(4, machines=400)
+    runs = drawn_type(4, machines=400, noise=0.002)
     every = records(runs)
     kind = fit_type(every, runs[0].speeds, runs[0].sensors, runs[0].planes)
     along, across = kind.scatter(kind.effects.between)
