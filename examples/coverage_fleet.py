@@ -94,7 +94,7 @@ def shots(rng: np.random.Generator, drawn: Type, kind: MachineType, m: int) -> l
             errors=ReadingErrors(RUN, RUN),
         )
         try:
-            answer = correct(update(prior, trials)[0])
+            answer = correct(update(prior, trials)[0], refuse=False)
         except UndeterminedError:
             found.append(None)
             continue

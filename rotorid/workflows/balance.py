@@ -431,6 +431,7 @@ def _correct(job: Job, known: Known, planes: Sequence[str], options: BalanceOpti
         baseline,
         planes,
         _speeds(job, options),
+        refuse=options.machine_type is None,  # how a machine differs from its type is no error of readings
         method=options.method,
         limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,

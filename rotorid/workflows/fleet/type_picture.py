@@ -47,7 +47,7 @@ def type_picture(known: KnownType) -> Figure:
                 if s == 0:
                     note(ax, name, (far.real, far.imag), (4, 4))
         ax.set_title(f"{planes[p]} on {sensors[c]}", fontsize="medium")
-        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_aspect("equal", adjustable="box")
     for ax in axes[-1]:
         ax.set_xlabel("along the mean, % of it")
     for ax in axes[:, 0]:

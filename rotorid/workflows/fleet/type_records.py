@@ -101,8 +101,9 @@ def known_type(
     cells = store.table("coefficients", jobs=list(jobs.index)).join(jobs[_KIND], on="job")
     if grid is None or not grid.planes:
         usual = _usual(cells)
-        own = {"planes": usual.planes, "weight_kind": usual.weight_kind}
-        grid = usual if grid is None else replace(grid, **own)
+        if grid is None:
+            grid = usual
+        grid = replace(grid, planes=usual.planes, weight_kind=usual.weight_kind)
     records = _records(cells, dict(jobs["machine"]), grid)
     kind = fit_type(records, grid.speeds, grid.sensors, grid.planes)
     own = jobs.loc[[record.job for record in records]]
