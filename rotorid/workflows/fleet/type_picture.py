@@ -53,4 +53,5 @@ def type_picture(known: KnownType) -> Figure:
     for ax in axes[:, 0]:
         ax.set_ylabel("across, % of it")
     legend_below(figure, axes.flat)
+    figure.set_layout_engine("compressed")  # no gaps between square fields
     return figure
