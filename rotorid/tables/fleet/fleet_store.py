@@ -135,21 +135,24 @@ class FleetStore:
         """
         import pandas as pd
 
-        found = [self._read("jobs", batch).to_pandas().assign(**{_BATCH: batch}) for batch in self.batches()]
-        own = pd.concat(found) if found else schema("jobs").empty_table().to_pandas().assign(**{_BATCH: ""})
+        batches = [
+            self._read("jobs", batch).to_pandas().assign(**{_BATCH: batch}) for batch in self.batches()
+        ]
+        own: pd.DataFrame = pd.concat(batches) if batches else schema("jobs").empty_table().to_pandas()
         own = own.drop_duplicates(["machine", "path"], keep="last", ignore_index=True)
         if jobs is not None:
             own = own[own["job"].isin(list(jobs))]
         if machine_type is not None:
             own = own[own["machine_type"] == machine_type]
-        if name == "jobs":
-            return own.reset_index(drop=True)[list(columns or TABLES[name])]
+        if name == "jobs" or own.empty:
+            there = own if name == "jobs" else schema(name).empty_table().to_pandas()
+            return there.reset_index(drop=True)[list(columns or TABLES[name])]
         parts = [
             self._read(name, str(batch), columns=columns, filters=[("job", "in", list(part))])
             for batch, part in own.groupby(_BATCH)["job"]
         ]
-        whole = arrow().concat_tables(parts) if parts else schema(name).empty_table()
-        return pd.DataFrame(whole.to_pandas())
+        found: pd.DataFrame = arrow().concat_tables(parts).to_pandas()
+        return found
 
     def _file(self, name: str, batch: str, ending: str = ".parquet") -> Path:
         return self.folder / name / f"{batch}{ending}"

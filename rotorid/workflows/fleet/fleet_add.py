@@ -153,6 +153,7 @@ def fleet_add(
 def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Damaged]:
     """Jobs of trees, and files of which nobody can say what they are; workbooks that jobs name are none."""
     from rotorid.tables.fleet.job_search import found_job, job_files
+    from rotorid.tables.reader.excel_workbook import is_workbook
 
     found: dict[Path, FoundJob] = {}
     damaged: Damaged = {}
@@ -165,7 +166,8 @@ def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Da
                 continue
             if job is not None:
                 found.setdefault(file.resolve(), job)
-    named = {table.resolve() for job in found.values() for table in job.tables.values()}
+    tables = (table for job in found.values() for table in job.tables.values())
+    named = {table.resolve() for table in tables if is_workbook(table)}
     return [job for file, job in found.items() if file not in named], damaged
 
 

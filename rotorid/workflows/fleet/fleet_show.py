@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SHOWN = {"displacement": (1e6, "µm"), "velocity": (1e3, "mm/s"), "acceleration": (1.0, "m/s²")}
 """Shown = SI × number, and the unit, of each quantity."""
-_TITLES = {"machine_type": "type", "first_date": "first", "last_date": "last"}
+_TITLES = {"machine_type": "type", "first_date": "first", "last_date": "last", "coefficients": "coeff."}
 _MACHINE = "machine_type", "machine"
 
 
@@ -74,6 +74,8 @@ class FleetShown(Outcome):
             cells = zip(columns[name].values, units, strict=True)
             said = ["" if rms != rms else f"{rms * scale:.3g} {unit}" for rms, (scale, unit) in cells]
             columns[name] = Column(name, said, str, name.replace("_", " "))
+        if "machine" in by:  # each row is one
+            del columns["machines"]
         return text([*columns.values()], left=len(by), width=COLUMNS)
 
     def to_dict(self) -> dict[str, Any]:
