@@ -114,12 +114,12 @@ class TypeFound(Outcome):
         between, within = (
             _typical(*kind.scatter(part)) for part in (kind.effects.between, kind.effects.within)
         )
-        again = f"; from run to run of one by {within}" if jobs > len(kind.machines) else ""
+        again = f"; from run to run of one {within}" if jobs > len(kind.machines) else ""
         head = f"{self.known.name}: {counted(len(kind.machines), 'machine')}, {counted(jobs, 'job')}."
         once = "" if again else "each machine was balanced once: nothing tells how one changes by itself"
         odd = tuple(map(_odd_words, self._odd))
         return Answer(
-            f"{head} Coefficients differ between machines by {between}{again}.",
+            f"{head} Coefficients differ between machines {between}{again}.",
             text(self._columns, left=3, width=COLUMNS),
             warnings=odd,
             notes=((once,) if once else ()) + self.known.notes,
@@ -142,7 +142,9 @@ def _odd_words(one: Mapping[str, Any]) -> str:
 def _typical(along: FloatArray, across: FloatArray) -> str:
     """Root mean square over the coefficients, in words."""
     percent, degrees = 100 * np.sqrt(np.mean(along**2)), np.degrees(np.sqrt(np.mean(across**2)))
-    return f"{figures(float(percent), 2)} % and {figures(float(degrees), 2)}°"
+    if not along.any():
+        return "no more than the errors of their runs explain"
+    return f"by {figures(float(percent), 2)} % and {figures(float(degrees), 2)}°"
 
 
 @workflow

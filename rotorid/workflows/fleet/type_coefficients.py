@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 LEVEL = 0.001
 """Probability below which runs are not those of a machine of the type."""
 
+_RARE = 1e-12
+
 
 class TypeKnowledge(NamedTuple):
     """Coefficients with a baseline; files that they are from; why the machine is not of its type, or ""."""
@@ -102,5 +104,5 @@ def _foreign(known: KnownType, trials: Trials, chance: float) -> str:
             why = why_odd(kind, record_of("", "", measured), trials)
     return (
         f"Do not mount these weights: by its runs this machine is not of the type {known.name!r} (χ², "
-        f"probability {chance:.1g}){f'; it would fit if {why}' if why else ''}. Balance it without --type."
+        f"probability {f'{chance:.1g}' if chance > _RARE else f'below {_RARE:g}'}){f'; it would fit if {why}' if why else ''}. Balance it without --type."
     )

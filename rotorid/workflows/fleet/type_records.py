@@ -81,7 +81,7 @@ def known_type(
     name
         Of the type.
     grid
-        Where; None: where most jobs have them.
+        Where; None: where most of them are.
     without
         Hashes of files whose jobs are not to count.
 
@@ -140,7 +140,7 @@ def _records(cells: pd.DataFrame, machine: Mapping[Any, str], grid: Grid) -> lis
 
 
 def _usual(cells: pd.DataFrame) -> Grid:
-    """Where most jobs have coefficients, of the grids of single jobs."""
+    """Where jobs have most coefficients together, of the grids of single jobs."""
     if cells.empty:
         raise ValueError("no job of this type has coefficients: its runs do not determine them")
     alike = cells.assign(speed_rad_s=cells["speed_rad_s"].map("{:.3g}".format)).groupby("job")
@@ -149,7 +149,7 @@ def _usual(cells: pd.DataFrame) -> Grid:
     of_job = cells.set_index("job")
     grids = [_grid(of_job.loc[[job]]) for job in first.sort_values("size", ascending=False)["first"][:_MOST]]
     machine = dict.fromkeys(of_job.index, "")
-    return max(grids, key=lambda grid: (len(_records(cells, machine, grid)), len(grid.speeds)))
+    return max(grids, key=lambda grid: sum(record.W.size for record in _records(cells, machine, grid)))
 
 
 def _different(column: pd.Series[str]) -> tuple[str, ...]:
