@@ -102,7 +102,7 @@ def _foreign(known: KnownType, trials: Trials, chance: float) -> str:
         with suppress(UndeterminedError, ValueError):
             measured = on_grid(estimate_influence(trials), kind.speeds, kind.sensors, kind.planes)
             why = why_odd(kind, record_of("", "", measured), trials)
-    return (
-        f"Do not mount these weights: by its runs this machine is not of the type {known.name!r} (χ², "
-        f"probability {f'{chance:.1g}' if chance > _RARE else f'below {_RARE:g}'}){f'; it would fit if {why}' if why else ''}. Balance it without --type."
-    )
+    rare = f"{chance:.1g}" if chance > _RARE else f"below {_RARE:g}"
+    what = f"by its runs this machine is not of the type {known.name!r} (χ², probability {rare})"
+    fits = f"; it would fit if {why}" if why else ""
+    return f"Do not mount these weights: {what}{fits}. Balance it without --type."
