@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet
 import pytest
 
 from rotorid.samples import sample_data
@@ -15,6 +14,7 @@ from rotorid.tables.fleet.fleet_tables import TABLES
 from rotorid.workflows.fleet.fleet_add import fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show
 
+parquet = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 FANS = sample_data() / "fleet" / "fan-132"
 PROGRAM = """
 import os, sys
@@ -75,7 +75,7 @@ def test_tables_are_plain_parquet(tree):
     fleet_add("F", [tree])
     for name, columns in TABLES.items():
         assert list(pd.read_parquet(f"F/{name}")) == list(columns)
-        file = pyarrow.parquet.ParquetFile(f"F/{name}/000001.parquet")
+        file = parquet.ParquetFile(f"F/{name}/000001.parquet")
         assert file.schema_arrow.metadata[b"rotorid_fleet"] == b"1"
         assert file.metadata.row_group(0).column(0).compression == "ZSTD"
         assert "RLE_DICTIONARY" in file.metadata.row_group(0).column(0).encodings
@@ -191,8 +191,8 @@ def test_refusals(tree, cli, monkeypatch):
     assert "this is no fleet" in refused("add", "tree", "tree")
     fleet_add("F", [tree])
     jobs = tree.parent / "F" / "jobs" / "000001.parquet"
-    table = pyarrow.parquet.read_table(jobs)
-    pyarrow.parquet.write_table(table.replace_schema_metadata({"rotorid_fleet": "2"}), jobs)
+    table = parquet.read_table(jobs)
+    parquet.write_table(table.replace_schema_metadata({"rotorid_fleet": "2"}), jobs)
     assert "expected tables of version 1, not '2': update rotorid" in refused("show", "F")
     jobs.write_bytes(b"PAR1")
     assert "expected a whole Parquet table" in refused("show", "F")

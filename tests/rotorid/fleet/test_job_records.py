@@ -15,6 +15,7 @@ from rotorid.tables import read_job
 from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
 from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
 
+pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 FLEET = sample_data() / "fleet"
 MIL, OUNCE = 25.4e-6, 0.028349523125
 
