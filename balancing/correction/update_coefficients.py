@@ -21,10 +21,11 @@ from balancing.coefficients.run_errors import marginal, run_columns, runs_of
 from balancing.data.reading_errors import error_model, mean_covariance
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
-from rotorid.base.arrays import ComplexArray
 from rotorid.regression import least_squares, stack, stretch, unstretch
 
-_NOTHING = 1e-9
+OWN = 0.01
+"""Of the variance of each channel, added as its own: by that, corrections weigh readings (and not by what these
+have in common, `Influence.parameters`, which counts in the errors of the answer)."""
 
 
 def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
@@ -89,8 +90,8 @@ def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
         known,
         W=known.W + each[0, ..., 1:],
         baseline=start + each[0, ..., 0],
-        parameters=_shared(each[1:]),
-        covariance=marginal(None, each[1:]),
+        parameters=each[1:],
+        covariance=(1.0 + OWN) * marginal(None, each[1:]),
         errors=model.errors,
         error_source=model.source,
         reading_dof=model.dof,
@@ -101,20 +102,3 @@ def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
         warnings=tuple(dict.fromkeys((*known.warnings, *trials.warnings, *model.warnings))),
     )
     return result, float(chdtrc(found.dof, found.chi_square)) if found.dof else 1.0
-
-
-def _shared(columns: ComplexArray) -> ComplexArray:
-    """Columns (M, S, C, P + 1) of a covariance without the most that channels can have for themselves.
-
-    That is the same share of what each channel has in all: the least eigenvalue of the whole covariance in
-    units of its blocks. Corrections weigh readings by it (`balancing.solvers.effective_variance`).
-    """
-    M, S, C, n = columns.shape
-    F = np.moveaxis(stretch(columns[..., None])[..., 0].reshape(M, S * C, 2 * n), 0, -1)
-    U, s, V = np.linalg.svd(F, full_matrices=False)
-    there = s > _NOTHING * s.max()
-    values, vectors = np.linalg.eigh(V[there] @ V[there].T)
-    left = np.zeros((*s.shape, len(values)))
-    left[there] = vectors * np.sqrt((values - values[0]).clip(0.0))
-    real = (U * s[:, None, :]) @ left
-    return np.moveaxis(unstretch(np.swapaxes(real, -1, -2)), 1, 0).reshape(-1, S, C, n)

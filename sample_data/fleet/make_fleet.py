@@ -1,7 +1,7 @@
-"""Draws eight fans of one type, balanced in two planes: python sample_data/fleet/make_fleet.py
+"""Draws nine fans of one type, balanced in two planes: python sample_data/fleet/make_fleet.py
 
 writes fan-132/MACHINE/ with job.toml, runs.csv, weights.csv, and where there was a check run check.csv and,
-mostly, check_weights.csv. Everything is fixed by SEED; README.md says how.
+mostly, check_weights.csv. The last has nothing but its baseline. Everything is fixed by SEED; README.md says how.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ PLANES, SENSORS, SPEEDS_RPM = ("DE", "NDE"), ("A", "B"), (1480, 2960)
 # Of the type: peak amplitude, µm, per gram, and lead, degrees; a row a speed and sensor, a column a plane.
 SIZE = [[[0.42, 0.18], [0.16, 0.47]], [[0.95, 0.61], [0.55, 1.08]]]
 LEAD = [[[-35, -50], [-48, -38]], [[-118, -140], [-137, -121]]]
-OF_ALL, OF_EACH, READING = 0.05, 0.02, 0.005
-"""Relative standard deviations: of all coefficients of a machine alike, of each by itself, of a reading."""
+OF_ALL, OF_EACH, READING = (0.10, 12.0), (0.05, 6.0), 0.005
+"""Standard deviations, relative and in degrees: of all coefficients of a machine alike, of each by itself; of a
+reading, relative."""
 
 
 class Fan(NamedTuple):
@@ -40,6 +41,7 @@ class Fan(NamedTuple):
     speeds: int = 2
     comma: bool = False
     said: str = ""  # the phase that the job says, where that is wrong
+    trials: bool = True
 
 
 FANS = (
@@ -53,6 +55,7 @@ FANS = (
     Fan("132-06", "2026-04-02", speeds=1),
     Fan("132-07", "2026-04-23", said="lead"),
     Fan("132-08", "2026-05-11", angles="against rotation", check=""),
+    Fan("132-09", "2026-06-02", check="", trials=False),
 )
 
 
@@ -61,10 +64,16 @@ def main() -> None:
     rng = np.random.default_rng(SEED)
     common = np.array(SIZE) * np.exp(1j * np.radians(LEAD))
     for fan in FANS:
-        W = common * (1 + OF_ALL * noise(rng)) * (1 + OF_EACH * noise(rng, *common.shape))
+        W = common * differing(rng, *OF_ALL) * differing(rng, *OF_EACH, *common.shape)
         unbalance = rng.uniform(25, 60, 2) * np.exp(2j * np.pi * rng.uniform(size=2))  # g in the planes
         bare = W @ unbalance * (1 + 0.02 * noise(rng, *W.shape[:2]))
         write(fan, W[: fan.speeds], bare[: fan.speeds], rng)
+
+
+def differing(rng: np.random.Generator, along: float, degrees: float, *shape: int) -> np.ndarray:
+    """Factors of machines."""
+    turn = np.exp(1j * np.radians(degrees * rng.normal(size=shape)))
+    return np.asarray((1 + along * rng.normal(size=shape)) * turn)
 
 
 def noise(rng: np.random.Generator, *shape: int) -> np.ndarray:
@@ -78,6 +87,8 @@ def write(fan: Fan, W: np.ndarray, bare: np.ndarray, rng: np.random.Generator) -
     folder.mkdir(parents=True, exist_ok=True)
     trial = round(20 / fan.grams, 1) * fan.grams
     runs = {"as found": (0, 0), "trial DE": (trial, 0), "trial NDE": (0, trial)}
+    if not fan.trials:
+        del runs["trial DE"], runs["trial NDE"]
 
     def read(mounted: object) -> np.ndarray:
         return (bare + W @ np.asarray(mounted)) * (1 + READING * noise(rng, *bare.shape))
@@ -87,6 +98,8 @@ def write(fan: Fan, W: np.ndarray, bare: np.ndarray, rng: np.random.Generator) -
         "weights.csv": weights(fan, {run: mounted for run, mounted in runs.items() if any(mounted)}),
         "job.toml": job(fan),
     }
+    if not fan.trials:
+        del lines["weights.csv"]
     put(fan, folder, lines)
     if fan.check == "proposed":
         mounted = 1e3 * correct(estimate_influence(read_job(folder / "job.toml").trials)).weights
@@ -114,7 +127,9 @@ def put(fan: Fan, folder: Path, files: dict[str, str]) -> None:
 def job(fan: Fan) -> str:
     """The job file."""
     said = f'phase = "{fan.said or fan.phase}"\nangles = "{fan.angles}"\n'
-    return f'date = "{fan.date}"\nruns = "runs.csv"\nweights = "weights.csv"\n{said}'
+    mounted = 'weights = "weights.csv"\n' if fan.trials else 'machine_type = "fan-132"\n'
+    errors = "[errors]\namplitude_percent = 0.4\nphase_deg = 0.4\n"
+    return f'date = "{fan.date}"\nruns = "runs.csv"\n{mounted}{said}{errors}'
 
 
 def readings(fan: Fan, runs: dict[str, np.ndarray]) -> str:

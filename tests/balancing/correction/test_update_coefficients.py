@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from balancing import Influence, ReadingErrors, Trials, correct, estimate_influence
+from balancing import Influence, ReadingErrors, Trials, correct
 from balancing.coefficients.coefficients_from_model import with_parameters
 from balancing.coefficients.run_errors import marginal
-from balancing.correction.update_coefficients import update
+from balancing.correction.update_coefficients import OWN, update
 
 SPEEDS = np.array([100.0, 200.0])
 
@@ -43,10 +43,10 @@ def test_one_trial_run_is_the_weighted_mean():
     variance = 2 * 0.05**2 / 0.8**2
     share = 0.3**2 / (0.3**2 + variance)
     assert found.W[0, 0, 0] == pytest.approx(known.W[0, 0, 0] * (1 - share) + measured[0, 0] * share)
-    assert found.covariance[0, 0, 2, 2] == pytest.approx(1 / (1 / 0.3**2 + 1 / variance))
+    assert found.covariance[0, 0, 2, 2] == pytest.approx((1 + OWN) / (1 / 0.3**2 + 1 / variance))
     # Y0 is read directly, and through the second run
     through = 0.05**2 + 0.8**2 * 0.3**2
-    assert found.covariance[0, 0, 0, 0] == pytest.approx(1 / (1 / 0.05**2 + 1 / through))
+    assert found.covariance[0, 0, 0, 0] == pytest.approx((1 + OWN) / (1 / 0.05**2 + 1 / through))
 
 
 def test_a_bare_run_leaves_the_coefficients_and_is_the_baseline():
@@ -56,7 +56,7 @@ def test_a_bare_run_leaves_the_coefficients_and_is_the_baseline():
     assert chance == 1.0
     assert pytest.approx(known.W) == found.W
     assert found.baseline == pytest.approx(trials.mean[0])
-    assert found.covariance[..., 2:, 2:] == pytest.approx(known.covariance[..., 2:, 2:])
+    assert found.covariance[..., 2:, 2:] == pytest.approx((1 + OWN) * known.covariance[..., 2:, 2:])
 
 
 def test_without_knowledge_it_is_the_measurement():
@@ -64,9 +64,10 @@ def test_without_knowledge_it_is_the_measurement():
     T = [[0, 0], [0.5, 0], [0, 0.7j], [0.3, 0.2]]
     trials = runs(known, known.W, np.array([1.0, 2.0]), T, rng)
     found, _ = update(known, trials)
-    alone = estimate_influence(trials)
-    assert pytest.approx(alone.W, rel=1e-5) == found.W
-    assert found.baseline == pytest.approx(alone.baseline, rel=1e-5)
+    A = np.column_stack((np.ones(len(T)), np.array(T)))
+    alone = np.linalg.lstsq(A, trials.mean.reshape(len(T), -1), rcond=None)[0].reshape(3, 2, 3)
+    assert pytest.approx(np.moveaxis(alone[1:], 0, -1), rel=1e-6) == found.W
+    assert found.baseline == pytest.approx(alone[0], rel=1e-6)
 
 
 def test_runs_one_after_the_other_are_all_at_once():
@@ -94,13 +95,12 @@ def test_a_plane_that_was_not_tried_follows_the_one_that_was():
     assert pytest.approx(known.W + 0.4, abs=0.02) == found.W
 
 
-def test_what_channels_have_for_themselves_and_in_common_is_all():
-    known, rng = prior(S=2, C=2, P=2), np.random.default_rng(6)
+def test_little_is_added_to_what_is_known_so_that_readings_can_be_weighed():
+    known, rng = prior(S=2, C=2, P=2, alike=True), np.random.default_rng(6)
     trials = runs(known, known.W, np.array([1.0, 2.0]), [[0, 0], [0.5, 0]], rng)
     found, _ = update(known, trials)
-    own = found.covariance - marginal(None, found.parameters)
-    assert np.linalg.eigvalsh(own).min() > -1e-12
-    assert np.trace(own, axis1=-2, axis2=-1).min() > 0
+    whole = marginal(None, found.parameters)
+    assert found.covariance == pytest.approx((1 + OWN) * whole)
     assert correct(found).covariance is not None
 
 
