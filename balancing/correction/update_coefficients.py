@@ -24,8 +24,10 @@ from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.regression import least_squares, stack, stretch, unstretch
 
 OWN = 0.01
-"""Of the variance of each channel, added as its own: by that, corrections weigh readings (and not by what these
-have in common, `Influence.parameters`, which counts in the errors of the answer)."""
+"""Of the variance of each channel, added as its own: by that, corrections weigh readings.
+
+What these have in common, `Influence.parameters`, counts in the errors of the answer, but not in weights.
+"""
 
 
 def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
