@@ -52,9 +52,7 @@ def _fit(fleet: FleetArgument, options: FleetFitOptions, to: Destination) -> Non
 
     Example: rotorid fleet fit fans --type fan-132
 
-    Example: rotorid balance job.toml --type fans:fan-132
-
-    The second balances a machine of the type from its baseline alone.
+    With `balance --type FLEET:TYPE` a machine of the type is balanced from its baseline alone.
     """
     to.deliver("coefficients", lambda: fleet_fit(fleet, options))
 

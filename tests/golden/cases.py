@@ -366,6 +366,7 @@ COMMANDS = (
         "tolerance",
         "fleet add",
         "fleet show",
+        "fleet fit",
     ),
     *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "calibrate", "schema", "validate"),
 )
@@ -504,6 +505,7 @@ def _all() -> list[Case]:
     ]
     added = "fleet add fans sample_data/fleet"
     shown = "fleet show fans"
+    of_type, typed = "balance sample_data/fleet/fan-132/132-0", "--type fans:fan-132"
     cases += [
         Case("fleet-add", "fleet add d sample_data/fleet", "fleet"),
         Case("fleet-add-known", added, "fleet", before=(added,)),
@@ -511,6 +513,10 @@ def _all() -> list[Case]:
         Case("fleet-show", shown, "fleet", before=(added,)),
         Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
         Case("fleet-show-other", f"{shown} --type fan-123", "fleet", (TEXT,), before=(added,)),
+        Case("fleet-fit", "fleet fit fans --type fan-132 --plot t.png", "fleet", before=(added,)),
+        Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=(added,)),
+        Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
+        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", (TEXT,), before=(added,)),
     ]
     for name in DEMOS:
         forms = (TEXT, JSON) if name == "identification" else (TEXT,)
