@@ -250,7 +250,9 @@ def on_grid(
     for wanted, there in ((sensors, influence.sensors), (planes, influence.planes)):
         if lacking := [name for name in wanted if name not in there]:
             known = listing(there, "and")
-            raise ValueError(f"there are no coefficients of {listing(lacking, 'and')}; there are some of {known}")
+            raise ValueError(
+                f"there are no coefficients of {listing(lacking, 'and')}; there are some of {known}"
+            )
     rows = [influence.sensors.index(c) for c in sensors]
     return influence.part(at, rows, [influence.planes.index(p) for p in planes])
 
