@@ -19,7 +19,7 @@ import numpy as np
 
 from balancing.data.conventions import Labels, polar
 from balancing.data.trials import Trials
-from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, Rows, arrow, schema
+from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, JobRows, arrow, arrow_table, schema
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,8 +82,8 @@ class FleetStore:
             files.update(table["files"].combine_chunks().flatten().to_pylist())
         return Known(frozenset(jobs), frozenset(files))
 
-    def append(self, rows: Rows) -> int:
-        """Add a batch: all of it or nothing; gives the number of jobs that were new.
+    def append(self, jobs: Sequence[JobRows]) -> int:
+        """Add different jobs: all or nothing; gives the number of those that were new.
 
         Raises
         ------
@@ -91,23 +91,19 @@ class FleetStore:
             Where it cannot be written.
         """
         pa = arrow()
-        self.folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / "jobs").mkdir(parents=True, exist_ok=True)
         with self._alone():
             self._remove_leftovers()
-            known = pa.array(self.known().jobs, pa.string())
+            known = self.known().jobs
+            new = [job for job in jobs if job["jobs"][0]["job"][0] not in known]
             batch = f"{max(map(int, self.batches()), default=0) + 1:06d}"
-            count = 0
-            for name, columns in TABLES.items():
-                own = schema(name)
-                cells = [pa.array(rows[name][c], own.field(c).type, from_pandas=True) for c in columns]
-                table = pa.Table.from_arrays(cells, schema=own)
-                table = table.filter(pa.compute.invert(pa.compute.is_in(table["job"], known)))
-                count = len(table)  # of jobs, the last
+            for name in TABLES if new else ():
                 (self.folder / name).mkdir(exist_ok=True)
+                table = arrow_table(name, [part for job in new for part in job.get(name, ())])
                 pa.parquet.write_table(table, self._file(name, f".{batch}", ".tmp"), compression="zstd")
-            for name in TABLES if count else ():
+            for name in TABLES if new else ():
                 os.replace(self._file(name, f".{batch}", ".tmp"), self._file(name, batch))
-        return count
+        return len(new)
 
     def table(
         self,
