@@ -67,7 +67,7 @@ class FleetStore:
 
     def batches(self) -> list[str]:
         """Numbers of the batches that are whole, in the order in which they were added."""
-        return sorted(path.stem for path in (self.folder / "jobs").glob("[!.]*.parquet"))
+        return sorted(path.stem for path in (self.folder / "jobs").glob("[0-9]*.parquet") if _is_ours(path))
 
     def files(self, *names: str) -> list[Path]:
         """The files of these tables."""
@@ -179,11 +179,15 @@ class FleetStore:
             yield
 
     def _remove_leftovers(self) -> None:
-        whole = {f"{batch}.parquet" for batch in self.batches()}
-        for name in TABLES:
-            for path in (self.folder / name).glob("*"):
-                if path.name not in whole and path.suffix in (".tmp", ".parquet"):
-                    path.unlink()
+        whole = self.batches()
+        for path in (path for name in TABLES for path in (self.folder / name).glob("*")):
+            if _is_ours(path) and path.stem not in whole:
+                path.unlink()
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file is a table of a batch, or one that was being written; others are left alone."""
+    return path.suffix in (".parquet", ".tmp") and path.stem.removeprefix(".").isdecimal()
 
 
 def trials_of(store: FleetStore, job: str) -> Trials:

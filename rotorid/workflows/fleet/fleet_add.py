@@ -37,7 +37,7 @@ class FleetAddOptions:
     machine_type : NAME
         Of the jobs that do not say it; default: the first folder below TREE, of those two folders deep.
     workers : N
-        Processes that read, default 1; 2 and more for hundreds of jobs.
+        Processes that read; 2 and more for hundreds of jobs.
     """
 
     machine_type: str | None = None
@@ -87,6 +87,7 @@ class FleetAdded(Outcome):
             head += f" {counted(len(self.damaged), 'file')} cannot be read:"
         told = [f"{printable(str(file))}: {reason}" for file, reason in self.damaged.items()]
         untyped = f"{counted(self.untyped, 'job')} without a type: machine_type in the job, or --type"
+        told.append(f"What is in it: rotorid fleet show {self.store.folder}")
         return Answer(head, "\n".join(told), notes=(untyped,) if self.untyped else ())
 
 

@@ -122,7 +122,11 @@ def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
         assert done.returncode == 9
         assert len(list((tree.parent / "F").rglob("*.parquet"))) == renamed
         assert FleetStore(tree.parent / "F").table("readings").empty
+    own = tree.parent / "F" / "jobs" / "mine.parquet"  # of somebody else
+    own.touch()
     assert fleet_add("F", [tree / "fan" / "132-01"]).jobs == 1
+    assert own.exists()
+    own.unlink()
     assert len(list((tree.parent / "F").rglob("*.parquet"))) == len(TABLES)
     assert list((tree.parent / "F").rglob("*.tmp")) == []
 
