@@ -19,7 +19,7 @@ import numpy as np
 
 from balancing.data.conventions import Labels, polar
 from balancing.data.trials import Trials
-from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, JobRows, arrow, arrow_table, schema
+from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, JobRows, arrow, arrow_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,14 +134,14 @@ class FleetStore:
         batches = [
             self._read("jobs", batch).to_pandas().assign(**{_BATCH: batch}) for batch in self.batches()
         ]
-        own: pd.DataFrame = pd.concat(batches) if batches else schema("jobs").empty_table().to_pandas()
+        own: pd.DataFrame = pd.concat(batches) if batches else arrow_table("jobs", []).to_pandas()
         own = own.drop_duplicates(["machine", "path"], keep="last", ignore_index=True)
         if jobs is not None:
             own = own[own["job"].isin(list(jobs))]
         if machine_type is not None:
             own = own[own["machine_type"] == machine_type]
         if name == "jobs" or own.empty:
-            there = own if name == "jobs" else schema(name).empty_table().to_pandas()
+            there = own if name == "jobs" else arrow_table(name, []).to_pandas()
             return there.reset_index(drop=True)[list(columns or TABLES[name])]
         parts = [
             self._read(name, str(batch), columns=columns, filters=[("job", "in", list(part))])

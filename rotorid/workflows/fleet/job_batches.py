@@ -40,26 +40,19 @@ def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[ReadJob]:
     if workers == 1:
         yield from (read for chunk in chunks for read in _read_chunk(chunk))
         return
-    threads = os.environ.get("OPENBLAS_NUM_THREADS")
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # is read when a process starts
-    try:
-        with ProcessPoolExecutor(workers, get_context("spawn"), _begin) as pool:
-            under_way: deque[Future[list[ReadJob]]] = deque()
-            for chunk in chunks:
-                under_way.append(pool.submit(_read_chunk, chunk))
-                if len(under_way) > 3 * workers:
-                    yield from under_way.popleft().result()
-            while under_way:
+    with ProcessPoolExecutor(workers, get_context("spawn"), _begin) as pool:
+        under_way: deque[Future[list[ReadJob]]] = deque()
+        for chunk in chunks:
+            under_way.append(pool.submit(_read_chunk, chunk))
+            if len(under_way) > 3 * workers:
                 yield from under_way.popleft().result()
-    finally:
-        if threads is None:
-            del os.environ["OPENBLAS_NUM_THREADS"]
-        else:
-            os.environ["OPENBLAS_NUM_THREADS"] = threads
+        while under_way:
+            yield from under_way.popleft().result()
 
 
 def _begin() -> None:
     """In a process that reads: Ctrl+C is for the one that asks, and where that is gone this one goes, too."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy is not loaded yet
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

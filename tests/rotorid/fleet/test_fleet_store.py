@@ -122,6 +122,8 @@ def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
         assert done.returncode == 9
         assert len(list((tree.parent / "F").rglob("*.parquet"))) == renamed
         assert FleetStore(tree.parent / "F").table("readings").empty
+        with pytest.raises(ValueError, match="F: there is no job"):
+            fleet_show("F")
     own = tree.parent / "F" / "jobs" / "mine.parquet"  # of somebody else
     own.touch()
     assert fleet_add("F", [tree / "fan" / "132-01"]).jobs == 1
