@@ -36,7 +36,7 @@ def _add(
 
     Example: rotorid fleet add fans sample_data/fleet
     """
-    to.deliver("jobs", lambda: fleet_add(fleet, trees, options))
+    to.deliver("reading jobs", lambda: fleet_add(fleet, trees, options))
 
 
 def _show(fleet: FleetArgument, options: FleetShowOptions, to: Destination) -> None:

@@ -39,13 +39,18 @@ def tree(tmp_path, monkeypatch):
     return tmp_path / "tree"
 
 
-def test_the_same_job_twice_changes_nothing_wherever_it_lies(tree, cli):
+def test_the_same_job_twice_changes_nothing_wherever_it_lies(tree, cli, monkeypatch):
     first = cli("fleet", "add", "F", "tree", "--json").json
     assert (first["jobs"], first["vectors"], first["known"], first["damaged"]) == (2, 28, 0, [])
     assert first["tables"]["readings"].endswith("readings")
     before = {path: path.read_bytes() for path in (tree.parent / "F").rglob("*.parquet")}
     shutil.copytree(tree / "fan" / "132-08", tree / "elsewhere")
+    read = []
+    monkeypatch.setattr(
+        "rotorid.workflows.fleet.fleet_add.read_jobs", lambda found, _: read.extend(found) or ()
+    )
     again = cli("fleet", "add", "F", "tree", "tree/fan").out
+    assert read == []  # what its files hold says it, before they are read as a job
     assert again.startswith("Added 0 jobs with 0 vectors to F; 3 jobs known already.")
     assert {path: path.read_bytes() for path in (tree.parent / "F").rglob("*.parquet")} == before
 
@@ -122,7 +127,13 @@ def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
         assert done.returncode == 9
         assert len(list((tree.parent / "F").rglob("*.parquet"))) == renamed
         assert FleetStore(tree.parent / "F").table("readings").empty
+        with pytest.raises(ValueError, match="F: there is no job"):
+            fleet_show("F")
+    own = tree.parent / "F" / "jobs" / "mine.parquet"  # of somebody else
+    own.touch()
     assert fleet_add("F", [tree / "fan" / "132-01"]).jobs == 1
+    assert own.exists()
+    own.unlink()
     assert len(list((tree.parent / "F").rglob("*.parquet"))) == len(TABLES)
     assert list((tree.parent / "F").rglob("*.tmp")) == []
 
