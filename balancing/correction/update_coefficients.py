@@ -144,6 +144,8 @@ def _real(columns: ComplexArray) -> FloatArray:
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """Columns of a covariance, what is negative left out."""
-    values, vectors = np.linalg.eigh(symmetric(covariance))
-    return np.asarray(vectors * np.sqrt(values.clip(0.0)))
+    """Columns of a covariance, what is negative left out; each number in units of its own size."""
+    size = np.sqrt(np.diag(covariance).clip(0.0))
+    size = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(symmetric(covariance / np.outer(size, size)))
+    return np.asarray(size[:, None] * vectors * np.sqrt(values.clip(0.0)))

@@ -146,8 +146,8 @@ def test_two_writers_at_once_one_with_two_processes(tmp_path):
     ]
     assert [one.wait(60) for one in both] == [0, 0]
     store = FleetStore(tmp_path / "F")
-    assert len(pd.read_parquet(tmp_path / "F" / "jobs")) == len(store.table("jobs")) == 8
-    assert len(store.table("readings")) == 116
+    assert len(pd.read_parquet(tmp_path / "F" / "jobs")) == len(store.table("jobs")) == 9
+    assert len(store.table("readings")) == 120
     fleet_add(tmp_path / "G", [sample_data() / "fleet"])
     for name in TABLES:
         one, other = store.table(name), FleetStore(tmp_path / "G").table(name)
@@ -162,11 +162,11 @@ def test_show_tells_types_and_machines(tmp_path, cli):
     assert own["fan-132"] | {"rms_before": 0, "rms_after": 0} == {
         "machine_type": "fan-132",
         "quantity": "displacement",
-        "machines": 8,
-        "jobs": 8,
+        "machines": 9,
+        "jobs": 9,
         "first_date": "2026-01-14",
-        "last_date": "2026-05-11",
-        "vectors": 116,
+        "last_date": "2026-06-02",
+        "vectors": 120,
         "coefficients": 60,
         "outcomes": 7,
         "rms_before": 0,
@@ -183,7 +183,7 @@ def test_show_tells_types_and_machines(tmp_path, cli):
     assert own["fan-132"]["rms_after"] == pytest.approx(np.median(after))
     assert [row["machine"] for row in document["machines"]][:2] == ["turbo_job", "132-01"]
     only = cli("fleet", "show", tmp_path / "F", "--type", "fan-132", "--output", tmp_path / "t.csv")
-    assert only.out.startswith("8 machines, 8 jobs.")
+    assert only.out.startswith("9 machines, 9 jobs.")
     assert pd.read_csv(tmp_path / "t.csv")["jobs"].tolist() == [8]
     assert max(map(len, cli("fleet", "show", tmp_path / "F", "--table").out.splitlines())) <= 100
     with pytest.raises(ValueError, match="did you mean 'fan-132'"):
