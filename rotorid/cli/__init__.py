@@ -38,6 +38,7 @@ from rotorid.cli.commands import (
     validate,
     vectors,
 )
+from rotorid.cli.study import study
 from rotorid.cli.terminal import markup_mode
 from rotorid.cli.verbose import verbosely
 from rotorid.cli.worksheet import worksheet
@@ -65,6 +66,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "campbell": campbell.campbell,
         "response": response.response,
         "influence": influence.influence,
+        "study": study,
     },
     "Reduce rotors, let them move": {
         "reduce": reduce.reduce,

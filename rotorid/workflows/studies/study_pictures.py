@@ -1,0 +1,36 @@
+"""Pictures of studies: shares of the samples, in percent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.base.plot_style import BLUE, look, plain
+from rotorid.workflows.studies.machine_counts import EDGES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from rotorid.base.arrays import FloatArray
+
+
+def draw_machines(ax: Axes, shares: FloatArray) -> None:
+    """Machines below a ratio to the limit, from shares between `EDGES`, as built and at last, (2, 600)."""
+    plain(ax)
+    curves = shares if (shares[0] != shares[1]).any() else shares[:1]
+    for k, (share, name) in enumerate(zip(curves, ("as built", "after the last correction"), strict=False)):
+        ax.stairs(100 * np.cumsum(share), EDGES, baseline=None, label=name, **look(k))
+    seen = EDGES[1:][curves.any(axis=0)]
+    ax.axvline(1.0, color="black", linewidth=0.8, label="limit")
+    ax.set(xscale="log", xlim=(min(0.9, *seen) / 1.2, max(1.1, *seen) * 1.2), ylim=(0, 101))
+    ax.set(xlabel="largest reading over its limit", ylabel="machines below, %")
+    ax.legend(frameon=False)
+
+
+def draw_starts(ax: Axes, chi_square: FloatArray, shares: FloatArray) -> None:
+    """Starts that end at each minimum."""
+    plain(ax)
+    ax.vlines(chi_square, 0, 100 * shares, color=BLUE)
+    ax.plot(chi_square, 100 * shares, "o", color=BLUE)
+    ax.set(xlabel="χ² at the minimum", ylabel="starts that end there, %", ylim=(0, 105))
