@@ -10,7 +10,6 @@ import logging
 import multiprocessing
 import os
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import closing, contextmanager
@@ -79,20 +78,25 @@ def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Ex
     import pyarrow.parquet as pq
 
     schema = pa.schema([("sample", "int64"), *task.columns.items()])
-    chunks = [(first, min(first + task.chunk, samples)) for first in range(0, samples, task.chunk)]
-    missing = [chunk for chunk in chunks if rows_in(part(folder, task, chunk)) < chunk[1] - chunk[0]]
-    begun, todo, done = time.perf_counter(), sum(last - first for first, last in missing), 0
-    with (
-        single_threads(),
-        closing(_Underway(task, deque((each, 0) for each in missing), workers, executor)) as work,
-    ):
+    begun, seen, done = time.perf_counter(), 0, 0
+
+    def missing() -> Iterator[Chunk]:
+        nonlocal seen
+        for first in range(0, samples, task.chunk):
+            chunk = first, min(first + task.chunk, samples)
+            if rows_in(part(folder, task, chunk)) < chunk[1] - first:
+                yield chunk
+            else:
+                seen += chunk[1] - first
+
+    with single_threads(), closing(_Underway(task, missing(), workers, executor)) as work:
         for chunk, rows in work.finished():
             file = part(folder, task, chunk)
             pq.write_table(pa.Table.from_pylist(rows, schema), file.with_suffix(".tmp"))
             file.with_suffix(".tmp").replace(file)
-            done += len(rows)
-            left = (time.perf_counter() - begun) * (todo / done - 1)
-            log.info("%d of %d samples, about %.0f s left", samples - todo + done, samples, left)
+            done, seen = done + len(rows), seen + len(rows)
+            left = (time.perf_counter() - begun) * (samples - seen) / done
+            log.info("%d of %d samples, about %.0f s left", seen, samples, left)
 
 
 def part(folder: Path, task: Task, chunk: Chunk) -> Path:
@@ -119,18 +123,18 @@ class _Underway:
     """
 
     task: Task
-    waiting: deque[tuple[Chunk, int]]
+    chunks: Iterator[Chunk]
     workers: int
     given: Executor | None
 
     def __post_init__(self) -> None:
         self.pool = self.given or local_pool(self.workers)
         self.running: dict[Future[list[Row]], tuple[Chunk, int]] = {}
+        self.waiting: list[tuple[Chunk, int]] = []
 
     def finished(self) -> Iterator[tuple[Chunk, list[Row]]]:
         """Chunks with their rows, as they are done."""
-        while self.waiting or self.running:
-            self._submit()
+        while self._submit():
             lost = []
             for future in wait(self.running, return_when=FIRST_COMPLETED).done:
                 chunk, tries = self.running.pop(future)
@@ -144,24 +148,30 @@ class _Underway:
             if any(isinstance(error, BrokenExecutor) for *_, error in lost) and self.given is None:
                 lost += [(chunk, tries + 1, lost[0][2]) for chunk, tries in self.running.values()]
                 self._renew()
-            for chunk, tries, error in sorted(lost, key=lambda one: one[0], reverse=True):
-                self._again(chunk, tries, error)
+            for one in lost:
+                self._again(*one)
 
-    def _submit(self) -> None:
+    def _submit(self) -> bool:
+        """Hand over as much as there may be; whether anything is under way."""
         width = AHEAD * self.workers if self.given is None else AHEAD_ELSEWHERE
-        if any(tries for _, tries in (*self.running.values(), *self.waiting)):
+        if self.waiting or any(tries for _, tries in self.running.values()):
             width = 1
-        while self.waiting and len(self.running) < width:
+        while len(self.running) < width:
+            if not self.waiting and (new := next(self.chunks, None)) is not None:
+                self.waiting.append((new, 0))
+            if not self.waiting:
+                break
             try:
                 future = self.pool.submit(run_chunk, self.task, *self.waiting[0][0])
             except BrokenExecutor as error:
                 if self.given is not None:
                     raise ValueError(f"the executor takes no more work: {error}") from error
                 if self.running:  # their futures tell it
-                    return
+                    break
                 self._renew()
             else:
-                self.running[future] = self.waiting.popleft()
+                self.running[future] = self.waiting.pop(0)
+        return bool(self.running)
 
     def _again(self, chunk: Chunk, tries: int, error: BaseException) -> None:
         if tries >= ATTEMPTS:
@@ -169,7 +179,7 @@ class _Underway:
                 f"a worker died {tries} times on the samples {chunk[0]} to {chunk[1] - 1}: "
                 f"{type(error).__name__}; the memory may be too small for so many workers"
             )
-        self.waiting.appendleft((chunk, tries))
+        self.waiting.append((chunk, tries))
 
     def _renew(self) -> None:
         self.running.clear()

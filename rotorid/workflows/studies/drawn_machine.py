@@ -16,10 +16,10 @@ from fem.response import influence
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
 from rotorid.tables.study_file import MachineStudy
+from rotorid.workflows.studies.machine_counts import UNSTABLE
 
 TRIAL = 0.5
 """By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
-UNSTABLE = "the drawn rotor is unstable: no steady response"
 
 
 @dataclass(frozen=True, eq=False)

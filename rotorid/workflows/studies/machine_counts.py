@@ -11,6 +11,8 @@ import numpy as np
 if TYPE_CHECKING:
     from rotorid.base.arrays import AnyArray, FloatArray, IntArray
 
+UNSTABLE = "the drawn rotor is unstable, and has no steady response"
+UNDETERMINED = "the readings do not determine a correction"
 EDGES = np.geomspace(1e-3, 1e3, 601)
 """Of the counted ratios, about 2.3 % wide; 1 is one of them."""
 
@@ -25,7 +27,8 @@ def count_machines(parts: Iterable[Mapping[str, AnyArray]], planes: int, most: i
         said = columns["warned"]
         for k in (0, 1):
             held[k] += int((columns["held"][said == k] == 1).sum()), int((said == k).sum())
-        reasons.update(why for why in columns["why"].tolist() if why)
+        why = filter(None, columns["why"].tolist())
+        reasons.update(UNSTABLE if one == UNSTABLE else UNDETERMINED for one in why)
         last = columns["ratio_0"].copy()
         ratios[0] += _histogram(last)
         for k in range(1, most + 1):

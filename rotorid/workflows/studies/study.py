@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MACHINES, STARTS = 250, 8
 """Samples in a file: some seconds of work."""
-MANIFEST = "study.json"
+MANIFEST = "_study.json"  # with _: who reads the folder as a table passes it over
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ def draw_machines(ax: Axes, shares: FloatArray) -> None:
     ax.axvline(1.0, color="black", linewidth=0.8, label="limit")
     ax.set(xscale="log", xlim=(min(0.9, *seen) / 1.2, max(1.1, *seen) * 1.2), ylim=(0, 101))
     ax.set(xlabel="largest reading over its limit", ylabel="machines below, %")
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.legend(frameon=False)
 
 
