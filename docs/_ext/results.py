@@ -32,6 +32,7 @@ ANSWERS = (
     *(
         "response-compressor",
         "influence-compressor",
+        "study",
         "bearings",
         "motion",
         "periodic-jumps",

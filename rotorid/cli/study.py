@@ -24,6 +24,6 @@ def study(
     A study that was broken off is continued by the same command with --results; the samples do not
     depend on the workers. In Python it runs on any executor, such as that of a Dask cluster.
 
-    Example: rotorid study sample_data/study/study.toml --samples 200
+    Example: rotorid study sample_data/study/study.toml --samples 50
     """
     to.deliver("study", lambda: work(file, options))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.calibration import one_start
+from rotorid.calibration.calibrate import one_start
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import AnyArray, FloatArray

@@ -113,7 +113,7 @@ def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
         drawn_machine, "estimate_influence", lambda trials: seen.append(trials) or real(trials)
     )
     row = drawn_machine.draw_machine(machines, np.random.default_rng([1, 4]))
-    assert row["runs_needed"] is None
+    assert row["ratio_3"] is not None
     first, last = seen[0], seen[-1]
 
     def part(runs):
