@@ -185,8 +185,8 @@ GALLERY = (
         "study",
         "rotors",
         "study sample_data/study/study.toml --samples 300",
-        "One of seven drawn rotors meets 15 µm as built, all of them after three corrections or fewer; the largest "
-        "as built reads 3.5 times the limit.",
+        "One of seven drawn rotors meets 15 µm as built, all of them after three corrections or fewer; "
+        "the worst reads 3.5 times the limit as built.",
     ),
     Picture(
         "reduction",

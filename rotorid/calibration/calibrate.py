@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -133,72 +132,6 @@ def calibrate(
     ValueError
         Without data or unknowns, for unknowns that the rotor does not have, and data that it cannot show.
     """
-    equations, names, first, prior, bounds = _problem(rotor, unknowns, readings, frequencies)
-    begin, others = _best_start(equations, unknowns, prior, first, starts, seed)
-
-    def solve(begin: FloatArray, *, near: bool = False) -> NonlinearEstimate:
-        return nonlinear_least_squares(
-            equations.residual,
-            equations.jacobian,
-            begin,
-            names=names,
-            sigma_stated=True,
-            bounds=bounds,
-            near=near,
-            prior=prior,
-        )
-
-    found = solve(begin)
-    equations.weigh(found.estimate.solution)
-    found = solve(found.estimate.solution, near=True)
-    return _judged(equations, unknowns, prior, held, found, others)
-
-
-def one_start(
-    rotor: Rotor,
-    unknowns: Sequence[Unknown],
-    readings: Sequence[RunReadings],
-    frequencies: Sequence[MeasuredFrequencies],
-    random: np.random.Generator,
-) -> tuple[FloatArray, float, bool]:
-    """Where a search from one drawn start ends (n,), χ² of data and priors there, and whether it converged.
-
-    Errors of the readings are those at the starting values, so that ends of different searches compare.
-    """
-    equations, names, first, prior, bounds = _problem(rotor, unknowns, readings, frequencies)
-    lower, upper = _ends([*bounds.values()])
-    begin = first + _spread(unknowns, first) * random.uniform(-1.0, 1.0, first.size)
-    found = nonlinear_least_squares(
-        equations.residual,
-        equations.jacobian,
-        np.clip(begin, lower, upper),
-        names=names,
-        sigma_stated=True,
-        bounds=bounds,
-        prior=prior,
-    )
-    end = found.estimate.solution
-    chi_square = np.sum(equations.residual(end) ** 2) + np.sum(prior.residual(end) ** 2)
-    return end, float(chi_square), found.converged
-
-
-class _Problem(NamedTuple):
-    """What is solved: equations, names, starting values (n,), what is known beforehand, bounds."""
-
-    equations: _Equations
-    names: tuple[str, ...]
-    first: FloatArray
-    prior: Prior
-    bounds: dict[str, tuple[float | None, float | None]]
-
-
-def _problem(
-    rotor: Rotor,
-    unknowns: Sequence[Unknown],
-    readings: Sequence[RunReadings],
-    frequencies: Sequence[MeasuredFrequencies],
-) -> _Problem:
-    """The equations, with the errors of readings as they are at the starting values."""
     if not unknowns or not (readings or frequencies):
         raise ValueError("a calibration needs data and at least one unknown number")
     for path in (unknown.path for unknown in unknowns if is_reading(unknown.path)):
@@ -218,14 +151,25 @@ def _problem(
         modes.check(rotor, equations.values(first), equations.paths)
     equations.weigh(first)
     equations.residual(first)
+    begin, others = _best_start(equations, unknowns, prior, first, starts, seed)
     bounds = dict(zip(names, limits, strict=True))
-    return _Problem(equations, names, first, prior, bounds)
 
+    def solve(begin: FloatArray, *, near: bool = False) -> NonlinearEstimate:
+        return nonlinear_least_squares(
+            equations.residual,
+            equations.jacobian,
+            begin,
+            names=names,
+            sigma_stated=True,
+            bounds=bounds,
+            near=near,
+            prior=prior,
+        )
 
-def _spread(unknowns: Sequence[Unknown], first: FloatArray) -> FloatArray:
-    """How far starts are drawn from the first (n,)."""
-    spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
-    return np.where(spread > 0, spread, SPREAD * np.abs(first))
+    found = solve(begin)
+    equations.weigh(found.estimate.solution)
+    found = solve(found.estimate.solution, near=True)
+    return _judged(equations, unknowns, prior, held, found, others)
 
 
 def _ends(limits: Sequence[tuple[float | None, float | None]]) -> tuple[FloatArray, FloatArray]:
@@ -249,7 +193,8 @@ def _best_start(
 
     random = np.random.default_rng(seed)
     residual, jacobian = prior.beside(equations.residual, equations.jacobian)
-    spread = _spread(unknowns, first)
+    spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
+    spread = np.where(spread > 0, spread, SPREAD * np.abs(first))
     lower, upper = _ends([unknown.limits(equations.rotor) for unknown in unknowns])
     free = np.array([unknown.prior is None for unknown in unknowns]) & (first != 0)
     dof = max(residual(first).size - first.size - equations.besides, 1)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.data.trials import ReadingErrors
-from fem.model.rotor_parameters import expand, numbers_of
+from fem.model.rotor_parameters import expand, numbers_of, parameter_value
 from fem.model.sensors import Sensor
 from rotorid.tables.reader import units, value_kinds
 from rotorid.tables.reader.problems import InputError, Problems
@@ -54,7 +54,7 @@ SENSOR = (
     Key(
         "limit_um_pp limit_mm_s_rms",
         ABOVE_ZERO,
-        "the limit",
+        "largest amplitude allowed",
         units.VIBRATION,
         required="the limit of the sensor",
     ),
@@ -126,7 +126,7 @@ class MachineStudy:
     unbalance
         Standard deviation of x and y by node, kg·m.
     scatter
-        Standard deviation of the logarithm of the rotor's numbers, by path.
+        Numbers of the rotor by path, and standard deviations of their logarithms.
     errors, run_error
         Of readings, None where they have none, and from run to run, relative.
     runs
@@ -140,7 +140,7 @@ class MachineStudy:
     trials: FloatArray
     gains: ComplexArray
     unbalance: Mapping[int, float]
-    scatter: Mapping[str, float]
+    scatter: Mapping[str, tuple[float, float]]
     errors: ReadingErrors | None
     run_error: float
     runs: int
@@ -213,20 +213,18 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
         rayleigh = np.sqrt(2 * np.log(2) if size["rms_g_mm"].key.startswith("median") else 2)
         at = node(top, "unbalance", place)
         unbalance[at] = float(np.hypot(unbalance.get(at, 0.0), size["rms_g_mm"].si / rayleigh))
-    scatter: dict[str, float] = {}
+    scatter: dict[str, tuple[float, float]] = {}
+    taken: set[object] = set()
     for pattern, share in said["scatter"].items():
         try:
-            paths = expand(rotor, pattern)
-            taken = [numbers_of(rotor, path) for path in scatter]
-            if any(
-                not numbers_of(rotor, path) or numbers_of(rotor, path) & {*sum(map(tuple, taken), ())}
-                for path in paths
-            ):
-                raise ValueError(f"{pattern}: each number of the rotor once")
+            for path in expand(rotor, pattern):
+                own = numbers_of(rotor, path)
+                if not own or own & taken:
+                    raise ValueError(f"{pattern}: each number of the rotor once")
+                scatter[path] = parameter_value(rotor, path), float(np.sqrt(np.log1p((share / 100) ** 2)))
+                taken |= own
         except ValueError as error:
             top.complain("scatter", f"numbers of the rotor: {error}", value=False)
-            continue
-        scatter |= dict.fromkeys(paths, float(np.sqrt(np.log1p((share / 100) ** 2))))
     errors = said["readings"] or {key.name: 0.0 for key in READINGS}
     sizes = errors["amplitude_percent"] / 100, np.radians(errors["phase_deg"]), errors["floor_percent"] / 100
     return MachineStudy(
@@ -242,5 +240,5 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
         scatter=scatter,
         errors=ReadingErrors(*map(float, sizes)) if any(sizes) else None,
         run_error=errors["run_percent"] / 100,
-        runs=said["runs"],
+        runs=said["runs"] if planes else 0,
     )

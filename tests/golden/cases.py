@@ -368,7 +368,18 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "study", "reduce", "identify", "fit", "simulate", "modes", "calibrate", "schema", "validate"),
+    *(
+        "unbalance",
+        "study",
+        "reduce",
+        "identify",
+        "fit",
+        "simulate",
+        "modes",
+        "calibrate",
+        "schema",
+        "validate",
+    ),
 )
 
 MODELLED = {

@@ -12,7 +12,9 @@ from rotorid.cli.output import Destination, json_text
 
 @command(to=("json",))
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model), study or waveforms.")],
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model), study or waveforms.")
+    ],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
     """JSON schema of a job, a rotor file or another settings file, for editors to check keys.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.calibration.calibrate import one_start
+from rotorid.calibration.calibrate import SPREAD, calibrate
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import AnyArray, FloatArray
@@ -19,9 +20,14 @@ SAME = 1e-3
 
 def draw_start(given: Prepared, rng: np.random.Generator) -> dict[str, Any]:
     """χ² of data and priors where the search from one drawn start ends, and the numbers there."""
-    end, chi_square, converged = one_start(given.rotor, given.numbers, given.readings, given.frequencies, rng)
-    labels = [number.label for number in given.numbers]
-    return {"converged": converged, "chi_square": chi_square, **dict(zip(labels, end.tolist(), strict=True))}
+    begun = []
+    for unknown in given.numbers:
+        first = unknown.first(given.rotor)
+        spread = unknown.prior[1] if unknown.prior else SPREAD * abs(first)
+        begun.append(replace(unknown, start=first + spread * rng.uniform(-1.0, 1.0)))
+    end = calibrate(given.rotor, begun, given.readings, given.frequencies, starts=1)
+    numbers = dict(zip(end.found.names, end.found.estimate.solution.tolist(), strict=True))
+    return {"converged": end.found.converged, "chi_square": end.chi_square, **numbers}
 
 
 def count_minima(parts: Iterable[Mapping[str, AnyArray]], names: tuple[str, ...]) -> dict[str, Any]:
@@ -37,7 +43,7 @@ def count_minima(parts: Iterable[Mapping[str, AnyArray]], names: tuple[str, ...]
                 continue
             for k, (known, place) in enumerate(minima):
                 near = abs(known - chi_square) <= SAME * known + 0.01
-                if near and np.allclose(end, place, rtol=SAME, atol=SAME * np.abs(place).max() * SAME):
+                if near and np.allclose(end, place, rtol=SAME, atol=0.0):
                     found[k] += 1
                     break
             else:

@@ -11,7 +11,7 @@ from scipy.special import chdtri, fdtri
 from balancing import Correction, Trials, UndeterminedError, correct, estimate_influence
 from balancing.data.trials import RunScatter
 from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import parameter_value, with_parameters
+from fem.model.rotor_parameters import with_parameters
 from fem.response import influence
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
@@ -62,12 +62,12 @@ def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str,
     in `balancing.refine`. As long as what is read does not meet the limit, there is a next correction.
     """
     study, W = machines.study, machines.coefficients
-    factors = np.exp([*study.scatter.values()] * rng.standard_normal(len(study.scatter)))
+    normal = rng.standard_normal(len(study.scatter))
     u = [*study.unbalance.values()] * _normal(rng, len(study.unbalance))
     row: dict[str, Any] = {"ratio_0": None, "runs_needed": None, "held": None, "warned": None, "why": None}
     if study.scatter:
-        scattered = zip(study.scatter, factors, strict=True)
-        values = {path: parameter_value(study.rotor, path) * factor for path, factor in scattered}
+        scattered = zip(study.scatter.items(), normal, strict=True)
+        values = {path: value * float(np.exp(spread * x)) for (path, (value, spread)), x in scattered}
         drawn = coefficients(study, with_parameters(study.rotor, values))
         if drawn is None:
             return row | {"why": UNSTABLE}
@@ -78,7 +78,7 @@ def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str,
     row["ratio_0"] = float(np.abs(readings[0]).max())
     if row["ratio_0"] <= 1:
         row["runs_needed"] = 1
-    if row["ratio_0"] <= 1 or not (study.runs and P):
+    if row["ratio_0"] <= 1 or not study.runs:
         return row
     weights += [*np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * machines.unit))]
     readings += [_read(study, bare + W @ trial, rng) for trial in weights[1:]]

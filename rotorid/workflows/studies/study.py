@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotorid.base.arrays import AnyArray
-    from rotorid.tables.study_file import MachineStudy, StudyFile
+    from rotorid.tables.study_file import StudyFile
     from rotorid.workflows.studies.chunks import Task
 
 MACHINES, STARTS = 250, 8
@@ -95,15 +95,11 @@ def study(
         if read.machine is not None:
             from rotorid.workflows.studies.machine_counts import count_machines
 
-            found = count_machines(parts, len(read.machine.planes), _corrections(read.machine))
+            found = count_machines(parts, len(read.machine.planes), read.machine.runs)
             return StudiedMachines(**common, **found)
         from rotorid.workflows.studies.calibration_starts import count_minima
 
         return StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
-
-
-def _corrections(machine: MachineStudy) -> int:
-    return machine.runs if machine.planes else 0
 
 
 def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path]]:
@@ -113,7 +109,7 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path]]:
     if read.machine is not None:
         from rotorid.workflows.studies.drawn_machine import draw_machine, ready
 
-        ratios = {f"ratio_{k}": "double" for k in range(_corrections(read.machine) + 1)}
+        ratios = {f"ratio_{k}": "double" for k in range(read.machine.runs + 1)}
         columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
         return Task(draw_machine, ready(read.machine), seed, columns, MACHINES), [*read.files]
     from rotorid.workflows.calibration.calibrate import CalibrateOptions, prepared

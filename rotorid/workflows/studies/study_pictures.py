@@ -1,4 +1,4 @@
-"""Pictures of studies: shares of the samples, in percent."""
+"""Picture of a study of machines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.plot_style import BLUE, look, plain
+from rotorid.base.plot_style import look, plain
 from rotorid.workflows.studies.machine_counts import EDGES
 
 if TYPE_CHECKING:
@@ -27,11 +27,3 @@ def draw_machines(ax: Axes, shares: FloatArray) -> None:
     ax.set(xlabel="largest reading over its limit", ylabel="machines below, %")
     ax.xaxis.set_major_formatter("{x:g}")
     ax.legend(frameon=False)
-
-
-def draw_starts(ax: Axes, chi_square: FloatArray, shares: FloatArray) -> None:
-    """Starts that end at each minimum."""
-    plain(ax)
-    ax.vlines(chi_square, 0, 100 * shares, color=BLUE)
-    ax.plot(chi_square, 100 * shares, "o", color=BLUE)
-    ax.set(xlabel="χ² at the minimum", ylabel="starts that end there, %", ylim=(0, 105))

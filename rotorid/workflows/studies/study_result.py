@@ -170,10 +170,3 @@ class StudiedStarts(Outcome):
     def to_frame(self) -> pd.DataFrame:
         """The minima."""
         return frame(self._columns())
-
-    def figure(self) -> Figure:
-        """Shares of the starts over χ² of the minima where they end."""
-        from rotorid.base.plot_style import on_figure
-        from rotorid.workflows.studies.study_pictures import draw_starts
-
-        return on_figure(lambda ax: draw_starts(ax, self.chi_square, self.found / self.samples))
