@@ -24,7 +24,7 @@ def main(samples: int = 10_000, runs: int = 0) -> None:
         text = (sample_data() / "study" / "study.toml").read_text(encoding="utf-8")
         text = text.replace("../rotor23.csv", (sample_data() / "rotor23.csv").as_posix())
         file = folder / "study.toml"
-        file.write_text(text.replace("runs = 3", f"runs = {runs}"), encoding="utf-8")
+        file.write_text(text.replace("corrections = 3", f"corrections = {runs}"), encoding="utf-8")
         seconds, bytes_of = {}, {}
 
         def timed(way: str, workers: int, **executor: object) -> None:

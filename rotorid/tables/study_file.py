@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fem.model.rotor import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
 
-MOST_SAMPLES, MOST_RUNS = 10**9, 20
+MOST_SAMPLES, MOST_CORRECTIONS = 10**9, 20
 _PERCENT = number(0.0, 100.0)
 _SPEEDS = "speeds, such as speeds_rpm = [1500, 3000]"
 _SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale" = 20'
@@ -99,7 +99,12 @@ STUDY = (
         "speeds at which limits hold and runs are made",
         units.SPEED,
     ),
-    Key("runs", value_kinds.whole("corrections", 0, MOST_RUNS), "most corrections, default none", default=0),
+    Key(
+        "corrections",
+        value_kinds.whole("corrections", 0, MOST_CORRECTIONS),
+        "most corrections, default none",
+        default=0,
+    ),
     Key("planes", value_kinds.named(PLANE), "correction planes", default={}),
     Key("sensors", value_kinds.named(SENSOR), "sensors with their limits", default={}),
     Key("unbalance", value_kinds.named(UNBALANCE), "drawn unbalance, by node or station", default={}),
@@ -129,8 +134,8 @@ class MachineStudy:
         Numbers of the rotor by path, and standard deviations of their logarithms.
     errors, run_error
         Of readings, None where they have none, and from run to run, relative.
-    runs
-        Most corrections.
+    corrections
+        At most; 0 without planes.
     """
 
     rotor: Rotor
@@ -143,7 +148,7 @@ class MachineStudy:
     scatter: Mapping[str, tuple[float, float]]
     errors: ReadingErrors | None
     run_error: float
-    runs: int
+    corrections: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,5 +245,5 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
         scatter=scatter,
         errors=ReadingErrors(*map(float, sizes)) if any(sizes) else None,
         run_error=errors["run_percent"] / 100,
-        runs=said["runs"] if planes else 0,
+        corrections=said["corrections"] if planes else 0,
     )

@@ -17,7 +17,7 @@ def schema(
     ],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """JSON schema of a job, a rotor file or another settings file, for editors to check keys.
+    """JSON schema of a job, a rotor file or other settings, for editors to check keys.
 
     Example: rotorid schema job
     """

@@ -78,12 +78,12 @@ def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str,
     row["ratio_0"] = float(np.abs(readings[0]).max())
     if row["ratio_0"] <= 1:
         row["runs_needed"] = 1
-    if row["ratio_0"] <= 1 or not study.runs:
+    if row["ratio_0"] <= 1 or not study.corrections:
         return row
     weights += [*np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * machines.unit))]
     readings += [_read(study, bare + W @ trial, rng) for trial in weights[1:]]
     try:
-        for k in range(1, study.runs + 1):
+        for k in range(1, study.corrections + 1):
             estimate = estimate_influence(_trials(study, readings, weights))
             correction = correct(estimate)
             if k == 1 and (study.errors or study.run_error):

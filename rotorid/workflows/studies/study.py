@@ -95,7 +95,7 @@ def study(
         if read.machine is not None:
             from rotorid.workflows.studies.machine_counts import count_machines
 
-            found = count_machines(parts, len(read.machine.planes), read.machine.runs)
+            found = count_machines(parts, len(read.machine.planes), read.machine.corrections)
             return StudiedMachines(**common, **found)
         from rotorid.workflows.studies.calibration_starts import count_minima
 
@@ -109,7 +109,7 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path]]:
     if read.machine is not None:
         from rotorid.workflows.studies.drawn_machine import draw_machine, ready
 
-        ratios = {f"ratio_{k}": "double" for k in range(read.machine.runs + 1)}
+        ratios = {f"ratio_{k}": "double" for k in range(read.machine.corrections + 1)}
         columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
         return Task(draw_machine, ready(read.machine), seed, columns, MACHINES), [*read.files]
     from rotorid.workflows.calibration.calibrate import CalibrateOptions, prepared

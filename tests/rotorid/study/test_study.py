@@ -21,7 +21,7 @@ from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED, UNSTAB
 
 SAMPLE = sample_data() / "study"
 TWO = STUDY.replace(
-    "[planes.middle]\nnode = 3\n", "runs = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
+    "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
 ).replace(
     "[unbalance.3]",
     "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nmedian_g_mm = 300\n[unbalance.4]",
@@ -94,7 +94,7 @@ def test_counts_are_those_of_the_table_and_later_corrections_help(tmp_path):
 
 def test_small_errors_within_the_model_are_covered(tmp_path):
     """The engine draws errors as the analysis takes them: 95 % of the regions hold the truth."""
-    text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 1").replace("runs = 3", "runs = 1")
+    text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 1").replace("corrections = 3", "corrections = 1")
     found = run(write(tmp_path, text + "[readings]\namplitude_percent = 0.5\nphase_deg = 0.3\n"), samples=400)
     good, n = found.held.sum(axis=0).tolist()
     assert n > 390

@@ -37,7 +37,7 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypa
     from distributed import Client, LocalCluster
 
     monkeypatch.setattr(module, "MACHINES", 20)
-    file = write(tmp_path, STUDY.replace("samples", "runs = 2\nsamples") + SCATTER)
+    file = write(tmp_path, STUDY.replace("samples", "corrections = 2\nsamples") + SCATTER)
     found = [study(file, StudyOptions(workers=n, results=tmp_path / f"own{n}")) for n in (1, 2)]
     found.append(study(file, StudyOptions(results=tmp_path / "threads"), executor=threads))
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
