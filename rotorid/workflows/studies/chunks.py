@@ -201,8 +201,11 @@ def local_pool(workers: int) -> Executor:
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent is killed waits for work for ever: end it then."""
+    """A worker whose parent is killed waits for work for ever: end it then; Ctrl+C is the parent's alone."""
+    import signal
     import threading
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         parent = multiprocessing.parent_process()
