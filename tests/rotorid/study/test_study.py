@@ -19,6 +19,8 @@ from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.workflows.studies import drawn_machine
 from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED, UNSTABLE
 
+pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
+
 SAMPLE = sample_data() / "study"
 TWO = STUDY.replace(
     "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"

@@ -9,13 +9,14 @@ import tracemalloc
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from studies.drawn import SCATTER, STUDY, fatal, kept, noted, task, write
 
 import rotorid.workflows.studies.study as module
 from rotorid.workflows import StudyOptions, study
 from rotorid.workflows.studies.chunks import SampleError, rows_in, run_study, single_threads
+
+pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
 NUMBERS = [float(np.random.default_rng([7, k]).standard_normal()) for k in range(12)]
 
@@ -34,14 +35,14 @@ def threads():
 
 
 def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypatch, threads):
-    from distributed import Client, LocalCluster
+    distributed = pytest.importorskip("distributed", reason="without the extra rotorid[cluster]")
 
     monkeypatch.setattr(module, "MACHINES", 20)
     file = write(tmp_path, STUDY.replace("samples", "corrections = 2\nsamples") + SCATTER)
     found = [study(file, StudyOptions(workers=n, results=tmp_path / f"own{n}")) for n in (1, 2)]
     found.append(study(file, StudyOptions(results=tmp_path / "threads"), executor=threads))
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
-    with LocalCluster(**options) as cluster, Client(cluster) as client:
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
         found.append(study(file, StudyOptions(results=tmp_path / "dask"), executor=client.get_executor()))
     one, *others = (kept(tmp_path / name) for name in ("own1", "own2", "threads", "dask"))
     assert list(one) == [f"part-{k:06d}.parquet" for k in range(3)]
