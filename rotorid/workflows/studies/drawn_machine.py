@@ -12,7 +12,7 @@ from balancing import Correction, Trials, UndeterminedError, correct, estimate_i
 from balancing.data.trials import RunScatter
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import with_parameters
-from fem.response import influence
+from fem.response import InfluenceCoefficients, influence
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
 from rotorid.tables.study_file import MachineStudy
@@ -29,6 +29,7 @@ class DrawnMachines:
     study: MachineStudy
     coefficients: ComplexArray
     unit: FloatArray
+    warnings: tuple[str, ...]
 
 
 def ready(study: MachineStudy) -> DrawnMachines:
@@ -39,20 +40,20 @@ def ready(study: MachineStudy) -> DrawnMachines:
     ValueError
         For a rotor that is unstable at these speeds.
     """
-    W = coefficients(study, study.rotor)
-    if W is None:
+    found = _influence(study, study.rotor)
+    if found.windows:
         raise ValueError("the rotor itself is unstable at the speeds of the study: it has no steady response")
+    W = found.W * study.gains[..., None]
     largest = np.abs(W[..., : len(study.planes)]).max(axis=(0, 1))
     if not largest.all():
         raise ValueError("no sensor sees one of the planes: there is no trial unbalance for it")
-    return DrawnMachines(study, W, 1 / largest)
+    return DrawnMachines(study, W, 1 / largest, found.warnings)
 
 
-def coefficients(study: MachineStudy, rotor: Rotor) -> ComplexArray | None:
-    """Shares of the limits per unbalance in planes and at the drawn nodes, (S, C, P + U); None: unstable."""
+def _influence(study: MachineStudy, rotor: Rotor) -> InfluenceCoefficients:
+    """Of unbalance in the planes and at the drawn nodes, (S, C, P + U)."""
     places = [*study.planes.values(), *study.unbalance]
-    found = influence(rotor, places, list(study.sensors.values()), study.speeds)
-    return None if found.windows else found.W * study.gains[..., None]
+    return influence(rotor, places, list(study.sensors.values()), study.speeds)
 
 
 def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str, Any]:
@@ -68,10 +69,10 @@ def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str,
     if study.scatter:
         scattered = zip(study.scatter.items(), normal, strict=True)
         values = {path: value * float(np.exp(spread * x)) for (path, (value, spread)), x in scattered}
-        drawn = coefficients(study, with_parameters(study.rotor, values))
-        if drawn is None:
+        drawn = _influence(study, with_parameters(study.rotor, values))
+        if drawn.windows:
             return row | {"why": UNSTABLE}
-        W = drawn
+        W = drawn.W * study.gains[..., None]
     P = len(study.planes)
     W, bare = W[..., :P], W[..., P:] @ u
     readings, weights = [_read(study, bare, rng)], [np.zeros(P, complex)]

@@ -37,7 +37,7 @@ class StudyOptions:
     seed : N
         In place of what the file says.
     workers : N
-        Processes on this machine; default: 1.
+        Processes on this machine.
     results : FOLDER
         For the samples, as Parquet; a study that was broken off there is continued.
     """
@@ -83,7 +83,7 @@ def study(
     samples = read.samples if options.samples is None else options.samples
     if samples < 1 or seed < 0 or options.workers < 1:
         raise ValueError("--samples and --workers take a number from 1, --seed one from 0")
-    task, files = _task(read, path.parent, seed)
+    task, files, words = _task(read, path.parent, seed)
     told = provenance(files, options)
     with ExitStack() as stack:
         folder = Path(options.results or stack.enter_context(tempfile.TemporaryDirectory()))
@@ -91,7 +91,7 @@ def study(
         with phase("samples"):
             run_study(task, samples, folder, options.workers, executor)
         parts = _parts(task, samples, folder)
-        common: dict[str, Any] = {"samples": samples, "seed": seed, "provenance": told}
+        common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words, "provenance": told}
         if read.machine is not None:
             from rotorid.workflows.studies.machine_counts import count_machines
 
@@ -102,8 +102,8 @@ def study(
         return StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
 
 
-def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path]]:
-    """What the workers get, and all files that were read."""
+def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], tuple[str, ...]]:
+    """What the workers get, all files that were read, and what is to be known of them."""
     from rotorid.workflows.studies.chunks import Task
 
     if read.machine is not None:
@@ -111,7 +111,8 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path]]:
 
         ratios = {f"ratio_{k}": "double" for k in range(read.machine.corrections + 1)}
         columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
-        return Task(draw_machine, ready(read.machine), seed, columns, MACHINES), [*read.files]
+        machines = ready(read.machine)
+        return Task(draw_machine, machines, seed, columns, MACHINES), [*read.files], machines.warnings
     from rotorid.workflows.calibration.calibrate import CalibrateOptions, prepared
     from rotorid.workflows.studies.calibration_starts import draw_start
 
@@ -121,7 +122,8 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path]]:
     given = prepared(read.rotor_file, data, CalibrateOptions(**said))
     columns = {"converged": "bool", "chi_square": "double"}
     columns |= dict.fromkeys((number.label for number in given.numbers), "double")
-    return Task(draw_start, given, seed, columns, STARTS), [*read.files, *given.data_files]
+    files = [*read.files, *given.data_files]
+    return Task(draw_start, given, seed, columns, STARTS), files, tuple(given.assumed)
 
 
 def _claim(folder: Path, told: dict[str, Any]) -> None:

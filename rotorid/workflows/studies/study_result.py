@@ -32,8 +32,8 @@ class StudiedMachines(Outcome):
 
     Attributes
     ----------
-    samples, seed
-        How many, and what they were drawn with.
+    samples, seed, warnings
+        How many, what they were drawn with, and what is to be known of the rotor.
     met
         How many meet the limit after so many corrections or fewer, as built first, (K + 1,).
     runs
@@ -48,6 +48,7 @@ class StudiedMachines(Outcome):
 
     samples: int
     seed: int
+    warnings: tuple[str, ...]
     met: IntArray
     runs: IntArray
     held: IntArray
@@ -83,7 +84,7 @@ class StudiedMachines(Outcome):
                     f"({low} to {high} %)"
                 )
         head = f"The limit is met by {listing(shares, 'and')}, of {drawn}."
-        return Answer(head, text(self._columns()), notes=tuple(notes))
+        return Answer(head, text(self._columns()), self.warnings, tuple(notes))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; `probability` and `interval` are those after all corrections."""
@@ -91,6 +92,7 @@ class StudiedMachines(Outcome):
             "kind": "balance",
             "samples": self.samples,
             "seed": self.seed,
+            "warnings": list(self.warnings),
             "probability": int(self.met[-1]) / self.samples,
             "interval": list(interval(int(self.met[-1]), self.samples)),
             "rows": rows(self._columns()),
@@ -119,12 +121,13 @@ class StudiedStarts(Outcome):
 
     Attributes
     ----------
-    samples, seed, lost
-        Starts, what they were drawn with, and how many did not converge.
+    samples, seed, warnings, lost
+        Starts, what they were drawn with, what was assumed of the data, and how many did not converge.
     """
 
     samples: int
     seed: int
+    warnings: tuple[str, ...]
     lost: int
     chi_square: FloatArray
     found: FloatArray
@@ -147,12 +150,11 @@ class StudiedStarts(Outcome):
         if not self.found.size:
             return Answer(f"None of {counted(self.samples, 'start')} converged.")
         times = counted(int(self.found[0]), "start")
-        words = (
-            () if self.found[0] > 1 else ("a single start found the best minimum: there may be a better one",)
-        )
+        alone = self.found[0] == 1
+        words = ("a single start found the best minimum: there may be a better one",) if alone else ()
         head = f"{times} of {self.samples} end at the best of {counted(len(self.found), 'minimum', 'minima')}"
         notes = (f"{counted(self.lost, 'start')} did not converge",) if self.lost else ()
-        return Answer(f"{head}.", text(self._columns(), width=COLUMNS), words, notes)
+        return Answer(f"{head}.", text(self._columns(), width=COLUMNS), words, (*notes, *self.warnings))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; `probability` that a start ends at the best minimum."""
@@ -161,6 +163,7 @@ class StudiedStarts(Outcome):
             "kind": "calibrate",
             "samples": self.samples,
             "seed": self.seed,
+            "warnings": list(self.warnings),
             "probability": best / self.samples,
             "interval": list(interval(best, self.samples)),
             "not_converged": self.lost,

@@ -149,6 +149,18 @@ def test_an_unstable_rotor_is_told(tmp_path):
     assert found.met[0] <= 100 - found.reasons[UNSTABLE]
 
 
+def test_what_the_model_leaves_out_is_told(tmp_path):
+    (tmp_path / "rotor.toml").write_text(
+        'shaft = "rotor.csv"\n[[disc]]\nnode = 3\nmass_kg = 2\npolar_inertia_kg_m2 = 0.1\n'
+        "diametral_inertia_kg_m2 = 0.06\n"
+    )
+    found = run(write(tmp_path, STUDY.replace("rotor.csv", "rotor.toml")), samples=2)
+    known = fem.influence(read_rotor(tmp_path / "rotor.toml"), [3], [3], [100.0]).warnings
+    assert known
+    assert found.to_dict()["warnings"] == list(known)
+    assert found.answer.warnings == known
+
+
 def test_starts_end_where_calibrate_does():
     found = run(SAMPLE / "starts.toml", samples=6)
     options = CalibrateOptions("bearing[*].stiffness", exact=True)
