@@ -63,6 +63,7 @@ def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threa
         time.sleep(0.02)
         assert started.poll() is None
     workers = subprocess.run(["pgrep", "-P", str(started.pid)], capture_output=True, text=True).stdout.split()
+    assert len(workers) >= 2
     started.kill()
     started.wait()
     left = kept(tmp_path / "killed")
