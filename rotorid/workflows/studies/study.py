@@ -134,7 +134,7 @@ def _claim(folder: Path, told: dict[str, Any]) -> None:
     ValueError
         For a folder that holds another one, or something else.
     """
-    manifest = folder / MANIFEST
+    manifest, new = folder / MANIFEST, (folder / MANIFEST).with_suffix(".tmp")
     folder.mkdir(parents=True, exist_ok=True)
     if manifest.exists():
         if json.loads(manifest.read_text(encoding="utf-8")) != told:
@@ -143,10 +143,10 @@ def _claim(folder: Path, told: dict[str, Any]) -> None:
                 "rotorid differs): name another folder"
             )
         return
-    if any(folder.iterdir()):
+    if any(file != new for file in folder.iterdir()):
         raise ValueError(f"{folder}: no study is kept here, but other files: name another folder")
-    manifest.with_suffix(".tmp").write_text(json.dumps(told, indent=1), encoding="utf-8")
-    manifest.with_suffix(".tmp").replace(manifest)
+    new.write_text(json.dumps(told, indent=1), encoding="utf-8")
+    new.replace(manifest)
 
 
 def _parts(task: Task, samples: int, folder: Path) -> Iterator[dict[str, AnyArray]]:
