@@ -33,6 +33,7 @@ ANSWERS = (
     *(
         "response-compressor",
         "influence-compressor",
+        "study",
         "bearings",
         "motion",
         "periodic-jumps",

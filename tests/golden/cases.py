@@ -125,6 +125,9 @@ critical-calibrated         critical sample_data/calibration/calibrated.toml -n 
 reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
+study                       study sample_data/study/study.toml --samples 50 --plot study.png
+study-starts                study sample_data/study/starts.toml --samples 8 --output minima.csv
+study-misspelt              study misspelt.toml
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
 influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
 vectors                     vectors sample_data/waveforms/waveforms.toml --orders 1,2 --output runs.csv
@@ -368,7 +371,18 @@ COMMANDS = (
         "fleet show",
         "fleet fit",
     ),
-    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "calibrate", "schema", "validate"),
+    *(
+        "unbalance",
+        "study",
+        "reduce",
+        "identify",
+        "fit",
+        "simulate",
+        "modes",
+        "calibrate",
+        "schema",
+        "validate",
+    ),
 )
 
 MODELLED = {
@@ -411,6 +425,7 @@ EDITS = {
         )
     },
     "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
+    "study-misspelt": {"misspelt.toml": ("sample_data/study/study.toml", "sensors.A", "senzors.A")},
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {
         "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
