@@ -89,7 +89,7 @@ def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
     change = channels(found.solution[:, None])[0]
     gains = [channels(C_theta @ K_r.T @ white) for K_r, white in zip(K, whites, strict=True)]
     alone = sum((_own(G, own[r]) for r, G in enumerate(gains)), np.zeros(()))
-    parameters = _shared(channels(_root(C_theta)), alone)
+    parameters = _shared(channels(_root(C_theta, np.diag(C_theta))), alone)
     last = bool(mounted[-1].any())
     result = replace(
         known,
@@ -135,7 +135,8 @@ def _shared(columns: ComplexArray, own: FloatArray) -> ComplexArray:
     rest = (F.T @ F).reshape(own.shape[0] * own.shape[1], own.shape[-1], -1, own.shape[-1])
     k = np.arange(len(rest))
     rest[k, :, k] -= own.reshape(len(rest), *own.shape[-2:])
-    return unstretch(_root(rest.reshape(F.shape[1], -1)).T).reshape(-1, *shape)
+    root = _root(rest.reshape(F.shape[1], -1), np.sum(F**2, axis=0))
+    return unstretch(root.T).reshape(-1, *shape)
 
 
 def _real(columns: ComplexArray) -> FloatArray:
@@ -143,9 +144,9 @@ def _real(columns: ComplexArray) -> FloatArray:
     return stretch(columns[..., None])[..., 0]
 
 
-def _root(covariance: FloatArray) -> FloatArray:
-    """Columns of a covariance, what is negative left out; each number in units of its own size."""
-    size = np.sqrt(np.diag(covariance).clip(0.0))
+def _root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
+    """Columns of a covariance, what is negative left out; numbers in units of their own size."""
+    size = np.sqrt(variance)
     size = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(symmetric(covariance / np.outer(size, size)))
     return np.asarray(size[:, None] * vectors * np.sqrt(values.clip(0.0)))
