@@ -184,7 +184,7 @@ def test_show_tells_types_and_machines(tmp_path, cli):
     assert [row["machine"] for row in document["machines"]][:2] == ["turbo_job", "132-01"]
     only = cli("fleet", "show", tmp_path / "F", "--type", "fan-132", "--output", tmp_path / "t.csv")
     assert only.out.startswith("9 machines, 9 jobs.")
-    assert pd.read_csv(tmp_path / "t.csv")["jobs"].tolist() == [8]
+    assert pd.read_csv(tmp_path / "t.csv")["jobs"].tolist() == [9]
     assert max(map(len, cli("fleet", "show", tmp_path / "F", "--table").out.splitlines())) <= 100
     with pytest.raises(ValueError, match="did you mean 'fan-132'"):
         fleet_show(tmp_path / "F", FleetShowOptions(machine_type="fan-123"))
