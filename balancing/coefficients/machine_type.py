@@ -163,9 +163,9 @@ def fit_type(
     centre = np.median(W.real, axis=0) + 1j * np.median(W.imag, axis=0)
     turn = np.exp(1j * np.angle(centre))
     y, error = _rows(W, np.stack([record.covariance for record in records]), turn)
-    far, limit = oddness(grouped(y, error, np.arange(len(records))))
-    fits = far <= limit
     names = np.array([record.machine for record in records])
+    far, limit = oddness(y, error, np.unique(names, return_inverse=True)[1])
+    fits = far <= limit
     machines = tuple(dict.fromkeys(names[fits].tolist()))
     _enough(machines)
     groups = grouped(y[fits], error[fits], np.array([machines.index(name) for name in names[fits]]))

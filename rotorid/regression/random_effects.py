@@ -12,7 +12,7 @@ Biol. 4 (2005) 32; concentration steps: P. J. Rousseeuw, K. van Driessen, Techno
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,10 +48,6 @@ class Groups:
     jobs: IntArray
     within: FloatArray
 
-    def part(self, chosen: BoolArray) -> Groups:
-        """Some of them."""
-        return replace(self, mean=self.mean[chosen], error=self.error[chosen], jobs=self.jobs[chosen])
-
     def covariance(self, m: int) -> FloatArray:
         """Of the mean of group m about the group itself, (n, n)."""
         return np.asarray(_in_blocks(self.error[m]) + self.within / self.jobs[m])
@@ -67,6 +63,8 @@ class RandomEffects:
         μ (n,).
     between, within
         B and W, (n, n).
+    error
+        Covariance of a group's mean about the group itself, the mean over the groups, (n, n).
     groups
         How many it is made of.
     """
@@ -74,12 +72,13 @@ class RandomEffects:
     mean: FloatArray
     between: FloatArray
     within: FloatArray
+    error: FloatArray
     groups: int
 
     @property
     def new_group(self) -> FloatArray:
         """Covariance (n, n) of a further group about the mean, which is none too well known itself."""
-        return self.between * (1.0 + 1.0 / self.groups)
+        return self.between + (self.between + self.error) / self.groups
 
     def distance(self, y: FloatArray, error: FloatArray) -> float:
         """Squared Mahalanobis distance of a further group y (n,) with the covariance `error` (n, n)."""
@@ -92,7 +91,7 @@ class RandomEffects:
     def given(self, y: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean (n,) and covariance (n, n) of a group whose jobs had the mean y with this covariance."""
         G = np.linalg.lstsq((self.new_group + error).T, self.new_group, rcond=None)[0].T
-        return self.mean + G @ (y - self.mean), positive(self.new_group - G @ self.new_group)
+        return self.mean + G @ (y - self.mean), _without(self.new_group, G @ self.new_group)
 
 
 def grouped(y: FloatArray, error: FloatArray, group: IntArray) -> Groups:
@@ -115,7 +114,7 @@ def grouped(y: FloatArray, error: FloatArray, group: IntArray) -> Groups:
     several = jobs[group] > 1
     if several.any():
         off = (y - mean[group]) * np.sqrt(jobs / np.maximum(jobs - 1, 1))[group, None]
-        within = positive(shrunk(off[several], int(several.sum())) - _in_blocks(error[several].mean(axis=0)))
+        within = _without(shrunk(off[several], int(several.sum())), _in_blocks(error[several].mean(axis=0)))
     return Groups(mean, own, jobs, within)
 
 
@@ -123,7 +122,8 @@ def random_effects(groups: Groups) -> RandomEffects:
     """Mean and covariances by moments, of two groups or more."""
     mean, M = groups.mean.mean(axis=0), len(groups.mean)
     error = _in_blocks(groups.error.mean(axis=0)) + groups.within * np.mean(1 / groups.jobs)
-    return RandomEffects(mean, positive(shrunk(groups.mean - mean, M - 1) - error), groups.within, M)
+    between = _without(shrunk(groups.mean - mean, M - 1), error)
+    return RandomEffects(mean, between, groups.within, error, M)
 
 
 def shrunk(off: FloatArray, dof: int) -> FloatArray:
@@ -139,43 +139,56 @@ def shrunk(off: FloatArray, dof: int) -> FloatArray:
     return np.asarray(np.where(other, (1 - share) * R, R) * np.outer(std, std))
 
 
-def positive(covariance: FloatArray) -> FloatArray:
-    """The nearest covariance without negative variances, each number in units of its own size."""
-    size = np.sqrt(np.abs(np.diag(covariance)))
+def _without(scatter: FloatArray, error: FloatArray) -> FloatArray:
+    """What errors leave of a scatter, (n, n), without negative variances.
+
+    Numbers are taken in units of their scatter: in those of what is left, a number of which hardly anything
+    is left would make what it has in common with others, and with it their variance, as large as one likes.
+    """
+    size = np.sqrt(np.diag(scatter))
     scale = np.outer(*(np.where(size > 0, size, 1.0),) * 2)
-    values, vectors = np.linalg.eigh(covariance / scale)
+    values, vectors = np.linalg.eigh((scatter - error) / scale)
     return np.asarray((vectors * values.clip(0.0)) @ vectors.T * scale)
 
 
-def oddness(groups: Groups) -> tuple[FloatArray, float]:
-    """Squared distance of each group from those that belong together, (M,), and the limit of these.
+def oddness(y: FloatArray, error: FloatArray, group: IntArray) -> tuple[FloatArray, float]:
+    """Squared distance of each job from the groups that belong together, (J,), and the limit of these.
 
-    The half that lies closest together is found by concentration steps, and grown by what fits it; each of
-    these is then left out and compared with the rest (of many, in `_FOLDS` parts), so that none hides itself.
-    The scale is the median of these distances: that of an estimated, shrunk covariance has no closed form.
-    Infinite without `LEAST_GROUPS` groups.
+    The half of the groups that lies closest together is found by concentration steps, and grown by the jobs
+    that fit it; each group of these is then left out and compared with the rest (of many, in `_FOLDS` parts),
+    so that none hides itself. A group counts once, however many jobs it has. The scale is the median of these
+    distances: that of an estimated, shrunk covariance has no closed form. Infinite without `LEAST_GROUPS`
+    groups. Parameters as `grouped`.
     """
-    M, n = groups.mean.shape
+    n, M = y.shape[1], len(np.bincount(group))
     if M < LEAST_GROUPS:
-        return np.zeros(M), np.inf
-    centre = np.median(groups.mean, axis=0)
-    spread = np.median(np.abs(groups.mean - centre), axis=0)
-    distance = np.mean(((groups.mean - centre) / np.where(spread > 0, spread, 1.0)) ** 2, axis=1)
-    inside = np.zeros(M, dtype=bool)
+        return np.zeros(len(y)), np.inf
+    each = _medians(y, group)
+    centre = np.median(each, axis=0)
+    spread = np.median(np.abs(each - centre), axis=0)
+    distance = np.mean(((y - centre) / np.where(spread > 0, spread, 1.0)) ** 2, axis=1)
+    inside = np.zeros(len(y), dtype=bool)
     for _ in range(_STEPS):
-        half = np.zeros(M, dtype=bool)
-        half[np.argsort(distance, kind="stable")[: M // 2 + 1]] = True
+        nearest = np.full(M, np.inf)
+        np.minimum.at(nearest, group, distance)
+        half = distance <= np.sort(nearest)[M // 2]
         if (half == inside).all():
             break
-        inside, distance = half, _distances(groups, half, 1)
-    limit = _limit(distance, n, M // 2)
+        inside, distance = half, _distances(y, error, group, half, 1)
+    limit = _limit(_medians(distance, group), n, M // 2)
     for _ in range(_STEPS):
         fits = distance <= limit
-        if fits.sum() < LEAST_GROUPS or (fits == inside).all():
+        kept = len(np.unique(group[fits]))
+        if kept < LEAST_GROUPS or (fits == inside).all():
             break
-        inside, distance = fits, _distances(groups, fits, _FOLDS)
-        limit = _limit(distance[fits], n, int(fits.sum()) - 1)
+        inside, distance = fits, _distances(y, error, group, fits, _FOLDS)
+        limit = _limit(_medians(distance[fits], group[fits]), n, kept - 1)
     return distance, limit
+
+
+def _medians(values: FloatArray, group: IntArray) -> FloatArray:
+    """Median of each group over its jobs, values (J, …)."""
+    return np.array([np.median(values[group == m], axis=0) for m in np.unique(group)])
 
 
 def _limit(distance: FloatArray, n: int, dof: int) -> float:
@@ -185,14 +198,18 @@ def _limit(distance: FloatArray, n: int, dof: int) -> float:
     return float(np.median(distance) * fdtri(n, dof, LEVEL) / fdtri(n, dof, 0.5))
 
 
-def _distances(groups: Groups, inside: BoolArray, folds: int) -> FloatArray:
-    """Squared distance of each group from those inside, its own fold left out if there are several."""
-    found = np.empty(len(inside))
-    fold = np.arange(len(inside)) % folds
-    for k in range(min(folds, len(inside))):
-        effects = random_effects(groups.part(inside & (fold != k) if folds > 1 else inside))
-        for m in np.flatnonzero(fold == k).tolist():
-            found[m] = effects.distance(groups.mean[m], groups.covariance(m))
+def _distances(
+    y: FloatArray, error: FloatArray, group: IntArray, inside: BoolArray, folds: int
+) -> FloatArray:
+    """Squared distance of each job from those inside, its group's own fold left out if there are several."""
+    found = np.empty(len(y))
+    fold = group % folds
+    for k in np.unique(fold).tolist():
+        rest = inside & (fold != k) if folds > 1 else inside
+        number = np.unique(group[rest], return_inverse=True)[1]
+        effects = random_effects(grouped(y[rest], error[rest], number))
+        for j in np.flatnonzero(fold == k).tolist():
+            found[j] = effects.distance(y[j], _in_blocks(error[j]) + effects.within)
     return found
 
 

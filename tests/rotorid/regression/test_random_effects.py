@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from rotorid.regression.random_effects import (
-    Groups,
     RandomEffects,
     grouped,
     oddness,
-    positive,
     random_effects,
     shrunk,
 )
@@ -74,15 +72,32 @@ def test_shrinkage_is_that_of_schaefer_and_strimmer():
 
 
 def test_negative_variances_are_none():
-    A = RNG.standard_normal((5, 5))
-    good = A @ A.T
-    assert positive(good) == pytest.approx(good)
-    assert np.linalg.eigvalsh(positive(good - 3 * np.eye(5))).min() > -1e-12
-    assert not positive(np.zeros((2, 2))).any()
+    y, error, group = several(M=20, k=1, n=4, between=0.3, error=1.0)
+    found = random_effects(grouped(y, 2 * error / 0.1**2 * 0.3**2, group))
+    assert np.linalg.eigvalsh(found.between).min() > -1e-12
+
+
+def test_errors_as_large_as_the_scatter_leave_no_more_than_the_scatter():
+    """Where hardly anything is left of one number, the variance of another one once grew without end."""
+    x = RNG.standard_normal((40, 2)) @ np.array([[1.0, 0.9], [0.0, 0.4]])
+    scatter = np.diag(shrunk(x - x.mean(axis=0), 39))
+    for left in (1e-2, 1e-4, 1e-8):
+        error = np.diag([0.0, (1 - left) * scatter[1]])
+        found = random_effects(grouped(x, np.tile(error, (40, 1, 1, 1)), np.arange(40)))
+        assert np.all(np.diag(found.between) < 1.3 * scatter)
+
+
+def test_the_mean_of_groups_alike_is_as_good_as_the_measurements():
+    off = []
+    for seed in range(400):
+        y = np.random.default_rng(seed).standard_normal((4, 2))
+        found = random_effects(grouped(y, np.tile(np.eye(2), (4, 1, 1, 1)), np.arange(4)))
+        off += (found.mean**2 / np.diag(found.new_group)).tolist()
+    assert np.mean(np.array(off) > 4) < 0.05  # two deviations
 
 
 def test_a_known_group_is_shrunk_to_the_mean():
-    effects = RandomEffects(np.array([10.0, 0.0]), np.diag([4.0, 1.0]), np.zeros((2, 2)), 10**9)
+    effects = RandomEffects(np.array([10.0, 0.0]), np.diag([4.0, 1.0]), *np.zeros((2, 2, 2)), 10**9)
     mean, covariance = effects.given(np.array([16.0, 2.0]), np.diag([2.0, 0.0]))
     assert mean == pytest.approx([10 + 6 * 4 / 6, 2.0], rel=1e-6)
     assert covariance == pytest.approx(np.diag([4 * 2 / 6, 0.0]), abs=1e-6)
@@ -94,7 +109,7 @@ def test_groups_that_do_not_belong_are_found_and_few_others():
         rng = np.random.default_rng(seed)
         y = rng.multivariate_normal(np.zeros(6), np.eye(6) + 2, 30)
         y[[4, 9, 20]] += 12 * rng.choice([-1, 1], (3, 6))
-        distance, limit = oddness(grouped(y, np.zeros((30, 3, 2, 2)), np.arange(30)))
+        distance, limit = oddness(y, np.zeros((30, 3, 2, 2)), np.arange(30))
         odd = distance > limit
         assert odd[[4, 9, 20]].all()
         false.append(odd.sum() - 3)
@@ -103,6 +118,18 @@ def test_groups_that_do_not_belong_are_found_and_few_others():
 
 def test_few_groups_have_no_odd_one():
     y = RNG.standard_normal((4, 2))
-    distance, limit = oddness(Groups(y, np.zeros((4, 1, 2, 2)), np.ones(4, dtype=int), np.zeros((2, 2))))
+    distance, limit = oddness(y, np.zeros((4, 1, 2, 2)), np.arange(4))
     assert not distance.any()
     assert limit == np.inf
+
+
+def test_a_group_of_many_jobs_does_not_make_the_others_odd():
+    rng = np.random.default_rng(4)
+    group = np.concatenate((np.zeros(20, dtype=int), np.arange(1, 9), [3]))
+    y = 1 + rng.standard_normal((9, 4))[group] + 0.1 * rng.standard_normal((29, 4))
+    y[-1] += 30
+    distance, limit = oddness(y, np.zeros((29, 2, 2, 2)), group)
+    assert np.flatnonzero(distance > limit).tolist() == [28]
+    assert (
+        oddness(y[:20], np.zeros((20, 2, 2, 2)), np.arange(20) % 4)[1] == np.inf
+    )  # four groups of five jobs
