@@ -23,6 +23,7 @@ from rotorid.workflows.result_provenance import hash_of
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
     from rotorid.tables import Job
+    from rotorid.tables.fleet.fleet_store import FleetStore
 
 LEVEL = 0.001
 """Probability below which runs are not those of a machine of the type."""
@@ -104,13 +105,13 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     if not folder or not name:
         raise ValueError(f"--type {address!r}: expected the folder of a fleet and a type, FLEET:TYPE")
     store, trials = FleetStore(Path(folder)), job.trials
+    machine = job.machine or machine_of(job.files[0])
     grid = Grid(trials.speeds, trials.sensors, job.used, *kind_of(trials.labels))
-    known = known_type(store, name, grid, [hash_of(file) for file in job.files])
+    known = known_type(store, name, grid, _of_itself(store, job, machine))
     if not job.planes:  # nothing but a baseline: in the unit of the others' weights
         unit = weight(str(known.jobs["weight_unit"].mode()[0]))
         labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
         trials = replace(trials, labels=labels)
-    machine = job.machine or machine_of(job.files[0])
     prior = known.kind.influence(trials.labels, machine)
     found, chance = update(prior, trials)
     if refined:
@@ -127,6 +128,15 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     found = replace(found, notes=(*found.notes, words, *known.notes), warnings=(*found.warnings, *warnings))
     reason = _reason(known, trials) if chance < LEVEL else ""
     return TypeKnowledge(known, found, tuple(store.files("jobs", "coefficients")), earlier, chance, reason)
+
+
+def _of_itself(store: FleetStore, job: Job, machine: str) -> list[str]:
+    """Ids of the job in a store: with the same runs, or at the same place, as it was before it changed."""
+    store.check()
+    jobs, place = store.table("jobs"), "/" + job.files[0].resolve().as_posix()
+    there = np.array([place.endswith(f"/{path}") for path in jobs["path"]], dtype=bool)
+    own = jobs["runs_file"].isin([hash_of(file) for file in job.files])
+    return jobs["job"][own | (jobs["machine"] == machine) & there].tolist()
 
 
 def _reason(known: KnownType, trials: Trials) -> str:

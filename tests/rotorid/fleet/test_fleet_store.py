@@ -121,6 +121,20 @@ def test_damaged_files_are_named_and_spoil_nothing(tree, cli):
     assert not (tree.parent / "G").exists()
 
 
+def test_other_jobs_at_the_same_place_of_two_trees_are_named(tree):
+    other = shutil.copytree(tree, tree.parent / "other")
+    assert fleet_add("F", [tree, other]).known == 2  # the same jobs
+    for k, said in enumerate(("", 'machine = "X"\n')):
+        job = other / "fan" / "132-08" / "job.toml"
+        job.write_text(said + job.read_text("utf-8"), "utf-8")
+        runs = job.with_name("runs.csv")
+        runs.write_bytes(runs.read_bytes() + b"\n")
+        added = fleet_add("F", [tree, other])
+        assert (added.jobs, len(added.damaged)) == (k, 1 - k)
+        assert all("at the same place below its tree" in reason for reason in added.damaged.values())
+    assert set(FleetStore(tree.parent / "F").table("jobs")["machine"]) == {"132-01", "132-08", "X"}
+
+
 def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
     for renamed in (0, 3, 5):
         done = subprocess.run([sys.executable, "-c", PROGRAM, str(renamed), "tree"], check=False)
@@ -184,7 +198,7 @@ def test_show_tells_types_and_machines(tmp_path, cli):
     assert [row["machine"] for row in document["machines"]][:2] == ["turbo_job", "132-01"]
     only = cli("fleet", "show", tmp_path / "F", "--type", "fan-132", "--output", tmp_path / "t.csv")
     assert only.out.startswith("9 machines, 9 jobs.")
-    assert pd.read_csv(tmp_path / "t.csv")["jobs"].tolist() == [8]
+    assert pd.read_csv(tmp_path / "t.csv")["jobs"].tolist() == [9]
     assert max(map(len, cli("fleet", "show", tmp_path / "F", "--table").out.splitlines())) <= 100
     with pytest.raises(ValueError, match="did you mean 'fan-132'"):
         fleet_show(tmp_path / "F", FleetShowOptions(machine_type="fan-123"))
