@@ -12,11 +12,11 @@ import numpy as np
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
 from balancing.coefficients.machine_type import on_grid, record_of, why_odd
-from balancing.correction.correct import correct
 from balancing.correction.refine_coefficients import together
 from balancing.correction.update_coefficients import update
 from balancing.data.trials import Trials
 from rotorid.base.text import counted
+from rotorid.workflows.coefficients import proposed
 from rotorid.workflows.fleet.type_records import Grid, KnownType, known_type
 from rotorid.workflows.result_provenance import hash_of
 
@@ -117,7 +117,7 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     if refined:
         if job.check is None:
             raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
-        mounted = None if job.check_mounted else correct(found)
+        mounted = None if job.check_mounted else proposed(job, found, refuse=False)
         trials = together(trials, job.check, corrections=mounted)
         found, chance = update(prior, trials)
     odd = f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count"

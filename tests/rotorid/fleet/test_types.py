@@ -140,6 +140,22 @@ def test_a_check_run_refines(fleet, tmp_path):
     assert refined.result.mounted[0] == "check 0"
 
 
+@pytest.mark.parametrize("runs", [1, 3])
+def test_a_check_run_that_does_not_say_its_weights_has_those_within_the_limits(fleet, tmp_path, runs):
+    machine = Machine(np.random.default_rng(30))
+    job = machine.job(tmp_path / "limited", runs, more="[planes.L]\nmax_mass_g = 1\n[planes.R]\n")
+    of_type = address(fleet) if runs == 1 else None
+    found = balance(job, BalanceOptions(machine_type=of_type)).result
+    mounted = found.weights[None] * 1e3
+    machine._table(job.parent / "check.csv", machine.W, mounted, "check")
+    machine._weights(job.parent / "check_weights.csv", mounted, "check")
+    weights, said = [], 'check = "check.csv"\n' + job.read_text()
+    for more in ("", 'check_weights = "check_weights.csv"\n'):
+        job.write_text(more + said)
+        weights.append(balance(job, BalanceOptions(machine_type=of_type, refine=True)).result.weights)
+    assert weights[0] == pytest.approx(weights[1], rel=1e-4)
+
+
 def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
     folder, machines = fleet
     own = folder / "tree" / "fan" / "F2" / "2026-01-01" / "job.toml"
@@ -239,6 +255,7 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
     refused("no job of fan has .* of all these speeds", UndeterminedError, other, machine_type=address(fleet))
     table.assign(sensor=["S1", "S9"]).to_csv(other.parent / "runs.csv", index=False)
     refused("it has no sensor S9, but S1 and S2", UndeterminedError, other, machine_type=address(fleet))
+    refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
     job.write_text(job.read_text().replace("machine_type", "machine"))
     refused("or machine_type, whose coefficients come with balance --type", machine_type=address(fleet))
 
