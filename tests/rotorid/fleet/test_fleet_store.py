@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -74,6 +75,12 @@ def test_a_job_that_changed_stands_in_place_of_the_older(tree):
         assert set(store.table(name)["job"]) == set(new["job"]), name
     assert len(pd.read_parquet("F/readings")) == 28 + 16  # the older ones stay
     assert store.known().jobs == {*old["job"], *new["job"]}
+
+
+def test_a_folder_with_a_colon_is_no_address(tree):
+    fleet_add("on:2/F", [tree])
+    assert len(FleetStore(tree.parent / "on:2" / "F").table("readings")) == 28
+    assert len(FleetStore(Path("on:2/F")).table("jobs")) == 2
 
 
 def test_tables_are_plain_parquet(tree):
