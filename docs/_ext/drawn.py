@@ -52,7 +52,7 @@ class Gallery(SphinxDirective):
             raise self.error(f"docs/figures.py has no pictures of {self.arguments[0]!r}")
         out: list[nodes.Node] = []
         for one in group:
-            line = f"$ {one.typed}"
+            line = "$ " + one.typed.replace("\n", "\n$ ")
             out += [nodes.literal_block(line, line, language="console"), figure(one.name, one.read)]
         return out
 

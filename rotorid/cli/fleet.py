@@ -48,7 +48,7 @@ def _show(fleet: FleetArgument, options: FleetShowOptions, to: Destination) -> N
 
 
 def _fit(fleet: FleetArgument, options: FleetFitOptions, to: Destination) -> None:
-    """Coefficients of a type: their mean, how machines differ, which machines are odd and why.
+    """Coefficients of a type: mean, differences between machines, odd machines.
 
     Example: rotorid fleet fit fans --type fan-132
 

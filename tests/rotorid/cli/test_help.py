@@ -49,7 +49,7 @@ def test_every_option_has_a_panel_and_the_first_two_are_short(name):
 
 def test_the_panels_of_balance():
     titles = dict.fromkeys(one.rich_help_panel for one in options(COMMANDS["balance"]))
-    expected = "Input and conventions|Method|Limits|Mounting|Check run|Grade|Output|Expert"
+    expected = "Input and conventions|Method|Limits|Mounting|Machines of a type|Check run|Grade|Output|Expert"
     assert list(titles) == expected.split("|")
 
 
