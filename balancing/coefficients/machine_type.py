@@ -196,7 +196,9 @@ def why_odd(kind: MachineType, record: MachineRecord, trials: Trials | None = No
     """
     found = list(_changes(kind, record, trials))
     least = min(distance for distance, _ in found)
-    return "" if least > kind.limit else listing([text for d, text in found if d <= least + _ALIKE], "or")
+    if least > min(kind.limit, kind.distance(record.W, record.covariance)):
+        return ""
+    return listing([text for d, text in found if d <= least + _ALIKE], "or")
 
 
 def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) -> Iterator[tuple[float, str]]:

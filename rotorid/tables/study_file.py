@@ -135,7 +135,7 @@ class MachineStudy:
     errors, run_error
         Of readings, None where they have none, and from run to run, relative.
     corrections
-        At most; 0 without planes.
+        At most.
     """
 
     rotor: Rotor
@@ -179,6 +179,8 @@ def read_study(path: str | Path) -> StudyFile:
     for key in ("speeds_rpm", "sensors", "unbalance") if machine else ("calibrate",):
         if not said[key]:
             said.section.missing(key, f"what is needed where kind is {said['kind']}")
+    if said["corrections"] and not said["planes"]:
+        said.section.missing("planes", "the planes of the corrections; corrections = 0: as built only")
     for key in ("calibrate",) if machine else ("planes", "sensors", "unbalance", "scatter", "readings"):
         if said[key]:
             said.section.complain(key, f"nothing, where kind is {said['kind']}", value=False)
@@ -245,5 +247,5 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
         scatter=scatter,
         errors=ReadingErrors(*map(float, sizes)) if any(sizes) else None,
         run_error=errors["run_percent"] / 100,
-        corrections=said["corrections"] if planes else 0,
+        corrections=said["corrections"],
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from balancing import Influence, Trials
+    from balancing import Correction, Influence, Trials
     from rotorid.tables import Job
 
 KINDS = ("measured", "computed", "combined")
@@ -38,11 +38,16 @@ def choose(
     UndeterminedError
         Where the runs do not determine the coefficients.
     """
-    from balancing import estimate_influence
+    from balancing import UndeterminedError, estimate_influence
     from balancing.coefficients.combined_coefficients import combine
     from rotorid.workflows.calibration.one_shot import counted_before
 
     has_trials = bool(job.trials.weights.any())
+    if job.machine_type and kind is None and not has_trials and job.influence is None and job.rotor is None:
+        raise UndeterminedError(
+            "no run has a trial weight: balance it from its type (rotorid balance --type "
+            f"FLEET:{job.machine_type}), or add runs with trial weights"
+        )
     if kind is None:
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
@@ -81,16 +86,41 @@ def used_planes(job: Job, influence: Influence) -> list[str]:
     return [plane for plane in influence.planes if plane not in job.left_out]
 
 
+def proposed(
+    job: Job, influence: Influence, runs: Trials | None = None, *, refuse: bool = True
+) -> Correction:
+    """What `balance` proposes for a job with these coefficients, and no option changes it.
+
+    Parameters
+    ----------
+    job
+        With its limits, the planes it uses, and what is removed.
+    influence, runs, refuse
+        As of `correct`.
+    """
+    from balancing import correct
+
+    return correct(
+        influence,
+        runs,
+        used_planes(job, influence),
+        refuse=refuse,
+        limits=job.limits_of(influence.planes),
+        row_weights=job.row_weights,
+        remove=sorted(job.remove),
+    )
+
+
 def _refined(job: Job, kind: str) -> Influence:
     """From trial runs and check runs together."""
-    from balancing import correct, estimate_influence
+    from balancing import estimate_influence
     from balancing.correction.refine_coefficients import refine
 
     if job.check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if kind != "measured" or job.influence is not None:
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
-    mounted = None if job.check_mounted else correct(estimate_influence(job.trials))
+    mounted = None if job.check_mounted else proposed(job, estimate_influence(job.trials))
     return refine(job.trials, job.check, corrections=mounted)
 
 

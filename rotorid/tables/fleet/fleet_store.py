@@ -100,7 +100,8 @@ class FleetStore:
             for name in TABLES if new else ():
                 (self.folder / name).mkdir(exist_ok=True)
                 table = arrow_table(name, [part for job in new for part in job.get(name, ())])
-                pa.parquet.write_table(table, self._file(name, f".{batch}", ".tmp"), compression="zstd")
+                with self._file(name, f".{batch}", ".tmp").open("wb") as file:
+                    pa.parquet.write_table(table, file, compression="zstd")
             for name in TABLES if new else ():
                 os.replace(self._file(name, f".{batch}", ".tmp"), self._file(name, batch))
         return len(new)
@@ -157,7 +158,8 @@ class FleetStore:
         """One table of one batch."""
         path = self._file(name, batch)
         try:
-            table = arrow().parquet.read_table(path, partitioning=None, **how)
+            with path.open("rb") as file:  # by name, a colon would make it an address
+                table = arrow().parquet.read_table(file, **how)
         except arrow().ArrowInvalid as error:
             raise ValueError(
                 f"{path}: expected a whole Parquet table; remove the batch and add it again"

@@ -125,7 +125,7 @@ def found_job(file: Path, tree: Path, machine_type: str = "") -> FoundJob | None
     return FoundJob(
         file=file,
         path="/".join(parts),
-        machine=machine_of(file),
+        machine=str(said.get("machine") or machine_of(file)),
         machine_type=machine_type or (parts[0] if len(parts) > 2 else ""),
         date=next((date for date in dates if date is not None), None),
         tables={key: file.parent / name for key, name in named.items() if name.isprintable()},

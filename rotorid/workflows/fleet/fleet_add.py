@@ -167,6 +167,14 @@ def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Da
                 continue
             if job is not None:
                 found.setdefault(file.resolve(), job)
+    places: dict[tuple[str, str], FoundJob] = {}
+    for file, job in list(found.items()):
+        other = places.setdefault((job.machine, job.path), job)
+        if other is not job and not _same(job, other):
+            damaged[found.pop(file).file] = (
+                f"{other.file} is another job at the same place below its tree, of the same machine: "
+                "add the folder above both, or say `machine` in them"
+            )
     damaged |= {Path(error.filename): reason_of(error) for error in closed}
     tables = (table for job in found.values() for table in job.tables.values())
     named = {table.resolve() for table in tables if is_workbook(table)}
@@ -178,6 +186,13 @@ def _is_known(job: FoundJob, seen: set[str]) -> bool:
         return apart(job.quick_id) in seen
     except (OSError, ValueError):  # reading says it better
         return False
+
+
+def _same(job: FoundJob, other: FoundJob) -> bool:
+    try:
+        return bool(apart(job.quick_id) == apart(other.quick_id))
+    except (OSError, ValueError):  # reading says it better
+        return True
 
 
 def _nothing(trees: Sequence[Path | str], damaged: Damaged) -> str:

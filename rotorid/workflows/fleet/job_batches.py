@@ -111,8 +111,8 @@ def _checked(
     job: Job, influence: Influence
 ) -> tuple[ComplexArray | None, tuple[Sequence[str], ComplexArray] | None, str]:
     """Of a job with check runs: vibration of the bare rotor, proposed corrections, or why there are none."""
-    from balancing import correct
     from balancing.coefficients.baseline import starting_point
+    from rotorid.workflows.coefficients import proposed
 
     if job.check is None:
         return None, None, ""
@@ -121,14 +121,7 @@ def _checked(
         before = starting_point(influence, runs).readings
         if job.check_mounted:
             return before, None, ""
-        made = correct(
-            influence,
-            runs,
-            [plane for plane in influence.planes if plane not in job.left_out],
-            limits=job.limits_of(influence.planes),
-            row_weights=job.row_weights,
-            remove=sorted(job.remove),
-        )
+        made = proposed(job, influence, runs)
     except ValueError as error:
         return influence.baseline, None, f"no corrections are proposed: {error}"
     return before, (made.planes, made.weights), ""

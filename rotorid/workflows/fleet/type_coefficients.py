@@ -12,17 +12,18 @@ import numpy as np
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
 from balancing.coefficients.machine_type import on_grid, record_of, why_odd
-from balancing.correction.correct import correct
 from balancing.correction.refine_coefficients import together
 from balancing.correction.update_coefficients import update
 from balancing.data.trials import Trials
 from rotorid.base.text import counted
+from rotorid.workflows.coefficients import proposed
 from rotorid.workflows.fleet.type_records import Grid, KnownType, known_type
 from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
     from rotorid.tables import Job
+    from rotorid.tables.fleet.fleet_store import FleetStore
 
 LEVEL = 0.001
 """Probability below which runs are not those of a machine of the type."""
@@ -104,19 +105,19 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     if not folder or not name:
         raise ValueError(f"--type {address!r}: expected the folder of a fleet and a type, FLEET:TYPE")
     store, trials = FleetStore(Path(folder)), job.trials
+    machine = job.machine or machine_of(job.files[0])
     grid = Grid(trials.speeds, trials.sensors, job.used, *kind_of(trials.labels))
-    known = known_type(store, name, grid, [hash_of(file) for file in job.files])
+    known = known_type(store, name, grid, _of_itself(store, job, machine))
     if not job.planes:  # nothing but a baseline: in the unit of the others' weights
         unit = weight(str(known.jobs["weight_unit"].mode()[0]))
         labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
         trials = replace(trials, labels=labels)
-    machine = job.machine or machine_of(job.files[0])
     prior = known.kind.influence(trials.labels, machine)
     found, chance = update(prior, trials)
     if refined:
         if job.check is None:
             raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
-        mounted = None if job.check_mounted else correct(found)
+        mounted = None if job.check_mounted else proposed(job, found, refuse=False)
         trials = together(trials, job.check, corrections=mounted)
         found, chance = update(prior, trials)
     odd = f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count"
@@ -127,6 +128,15 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     found = replace(found, notes=(*found.notes, words, *known.notes), warnings=(*found.warnings, *warnings))
     reason = _reason(known, trials) if chance < LEVEL else ""
     return TypeKnowledge(known, found, tuple(store.files("jobs", "coefficients")), earlier, chance, reason)
+
+
+def _of_itself(store: FleetStore, job: Job, machine: str) -> list[str]:
+    """Ids of the job in a store: with the same runs, or at the same place, as it was before it changed."""
+    store.check()
+    jobs, place = store.table("jobs"), "/" + job.files[0].resolve().as_posix()
+    there = np.array([place.endswith(f"/{path}") for path in jobs["path"]], dtype=bool)
+    own = jobs["runs_file"].isin([hash_of(file) for file in job.files])
+    return jobs["job"][own | (jobs["machine"] == machine) & there].tolist()
 
 
 def _reason(known: KnownType, trials: Trials) -> str:

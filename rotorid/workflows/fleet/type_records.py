@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -9,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.coefficients.baseline import SPEED_TOLERANCE
+from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.machine_type import MachineRecord, MachineType, fit_type, why_odd
 from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import counted
+from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 _KIND = ["quantity", "weight_kind"]
 _MOST = 20
+_SAME = 1e-3
+"""Coefficients that differ by less, relative, come from the same runs: no two measurements agree so well."""
+_YEAR = re.compile(r"(?<!\d)(19|20)\d\d(-\d\d){0,2}(?!\d)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +57,8 @@ class KnownType:
         Of each odd record, what would make it fit; "": not found.
     lacking
         How many jobs of the type have no coefficients there.
+    copies
+        How many have those of another job.
     """
 
     name: str
@@ -60,13 +67,30 @@ class KnownType:
     grid: Grid
     reasons: tuple[str, ...]
     lacking: int
+    copies: int
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out."""
+        """What was left out, and what is to be known of names."""
         lacking = f"{counted(self.lacking, 'job')} of {self.name} without all of these coefficients left out"
         few = f"with {counted(len(self.kind.machines), 'machine')} nothing tells an odd one from the others"
-        return (lacking,) * bool(self.lacking) + (few,) * bool(np.isinf(self.kind.limit))
+        copies = f"{counted(self.copies, 'job')} with the same coefficients as another left out"
+        notes = (lacking,) * bool(self.lacking) + (copies,) * bool(self.copies)
+        return (*notes, *self._repeated, *(few,) * bool(np.isinf(self.kind.limit)))
+
+    @property
+    def _repeated(self) -> tuple[str, ...]:
+        """Names of machines that are folders at more than one place, years apart."""
+        found = {}
+        for name, paths in self.jobs.groupby("machine")["path"]:
+            parts = [path.split("/")[:-1] for path in paths]
+            above = {_YEAR.sub("", "/".join(p[: p.index(name)])): "/".join(p) for p in parts if name in p}
+            if len(above) > 1:
+                found[str(name)] = listing([*above.values()], "and")
+        return tuple(
+            f"{name!r} counts as one machine: {places}; if these are several, say `machine` in the jobs"
+            for name, places in found.items()
+        )
 
 
 def known_type(
@@ -83,7 +107,7 @@ def known_type(
     grid
         Where; None: where most of them are.
     without
-        Hashes of files whose jobs are not to count.
+        Ids of jobs that are not to count.
 
     Raises
     ------
@@ -97,21 +121,47 @@ def known_type(
     if jobs.empty:
         types = sorted({*store.table("jobs")["machine_type"]} - {""})
         raise ValueError(f"{store.folder}: there is no type {name!r}{did_you_mean(name, types)}")
-    jobs = jobs[~jobs["runs_file"].isin(list(without))].set_index("job")
+    jobs = jobs[~jobs["job"].isin(list(without))].set_index("job")
     cells = store.table("coefficients", jobs=list(jobs.index)).join(jobs[_KIND], on="job")
     if grid is None or not grid.planes:
         usual = _usual(cells)
         if grid is None:
             grid = usual
         grid = replace(grid, planes=usual.planes, weight_kind=usual.weight_kind)
-    records = _records(cells, dict(jobs["machine"]), grid)
+    complete = _records(cells, dict(jobs["machine"]), grid)
+    if not complete:
+        raise UndeterminedError(_none(store, name, cells, grid))
+    records = _different_runs(complete)
     kind = fit_type(records, grid.speeds, grid.sensors, grid.planes)
     own = jobs.loc[[record.job for record in records]]
     reasons = tuple(
         why_odd(kind, record, trials_of(store, record.job) if own["trial_runs"][record.job] > 1 else None)
         for record, _ in kind.odd
     )
-    return KnownType(name, kind, own, grid, reasons, len(jobs) - len(records))
+    copies = len(complete) - len(records)
+    return KnownType(name, kind, own, grid, reasons, len(jobs) - len(complete), copies)
+
+
+def _different_runs(records: list[MachineRecord]) -> list[MachineRecord]:
+    """Records without those of copies, and of coefficients that were stored and used again."""
+    W = np.array([record.W for record in records]).reshape(len(records), -1)
+    size = np.abs(W).max(axis=1)
+    kept: list[int] = []
+    for j in range(len(W)):
+        if not (np.abs(W[kept] - W[j]).max(axis=1) <= _SAME * size[j]).any():
+            kept.append(j)
+    return [records[j] for j in kept]
+
+
+def _none(store: FleetStore, name: str, cells: pd.DataFrame, grid: Grid) -> str:
+    """That no job has the coefficients of a grid, and which of its names are known."""
+    known = {"sensor": grid.sensors, "plane": grid.planes}
+    words = f"{store.folder}: no job of {name} has coefficients of all these speeds, sensors and planes"
+    for column, names in known.items():
+        there = sorted(set(cells[column]))
+        if lacking := [one for one in names if one not in there]:
+            words += f"; it has no {column} {listing(lacking, 'and')}, but {listing(there, 'and')}"
+    return words
 
 
 def _records(cells: pd.DataFrame, machine: Mapping[Any, str], grid: Grid) -> list[MachineRecord]:

@@ -92,7 +92,8 @@ def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Ex
     with single_threads(), closing(_Underway(task, missing(), workers, executor)) as work:
         for chunk, rows in work.finished():
             file = part(folder, task, chunk)
-            pq.write_table(pa.Table.from_pylist(rows, schema), file.with_suffix(".tmp"))
+            with file.with_suffix(".tmp").open("wb") as new:  # by name, a colon would make it an address
+                pq.write_table(pa.Table.from_pylist(rows, schema), new)
             file.with_suffix(".tmp").replace(file)
             done, seen = done + len(rows), seen + len(rows)
             left = (time.perf_counter() - begun) * (samples - seen) / done
@@ -110,7 +111,8 @@ def rows_in(file: Path) -> int:
     import pyarrow.parquet as pq
 
     try:
-        return int(pq.read_metadata(file).num_rows)
+        with file.open("rb") as there:
+            return int(pq.read_metadata(there).num_rows)
     except (OSError, pa.ArrowInvalid):
         return 0
 

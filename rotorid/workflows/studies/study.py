@@ -157,5 +157,6 @@ def _parts(task: Task, samples: int, folder: Path) -> Iterator[dict[str, AnyArra
 
     for first in range(0, samples, task.chunk):
         last = min(first + task.chunk, samples)
-        table = pq.read_table(part(folder, task, (first, last))).slice(0, last - first)
+        with part(folder, task, (first, last)).open("rb") as file:
+            table = pq.read_table(file).slice(0, last - first)
         yield {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}

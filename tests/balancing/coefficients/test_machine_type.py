@@ -118,6 +118,7 @@ def test_planes_that_were_exchanged_are_told():
     assert "planes L and R were exchanged" in why_odd(kind, every[9])
     broken = every[9]._replace(W=every[9].W * 30)
     assert why_odd(kind, broken) == ""
+    assert why_odd(kind, every[0]) == ""  # a turn by 1° is no reason where none is needed
 
 
 def test_scatter_is_what_was_drawn_and_own_jobs_narrow_it():

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -76,6 +77,12 @@ def test_a_job_that_changed_stands_in_place_of_the_older(tree):
     assert store.known().jobs == {*old["job"], *new["job"]}
 
 
+def test_a_folder_with_a_colon_is_no_address(tree):
+    fleet_add("on:2/F", [tree])
+    assert len(FleetStore(tree.parent / "on:2" / "F").table("readings")) == 28
+    assert len(FleetStore(Path("on:2/F")).table("jobs")) == 2
+
+
 def test_tables_are_plain_parquet(tree):
     fleet_add("F", [tree])
     for name, columns in TABLES.items():
@@ -119,6 +126,20 @@ def test_damaged_files_are_named_and_spoil_nothing(tree, cli):
     assert (alone.code, alone.out) == (2, "")
     assert alone.err.startswith("rotorid: nothing could be read:")
     assert not (tree.parent / "G").exists()
+
+
+def test_other_jobs_at_the_same_place_of_two_trees_are_named(tree):
+    other = shutil.copytree(tree, tree.parent / "other")
+    assert fleet_add("F", [tree, other]).known == 2  # the same jobs
+    for k, said in enumerate(("", 'machine = "X"\n')):
+        job = other / "fan" / "132-08" / "job.toml"
+        job.write_text(said + job.read_text("utf-8"), "utf-8")
+        runs = job.with_name("runs.csv")
+        runs.write_bytes(runs.read_bytes() + b"\n")
+        added = fleet_add("F", [tree, other])
+        assert (added.jobs, len(added.damaged)) == (k, 1 - k)
+        assert all("at the same place below its tree" in reason for reason in added.damaged.values())
+    assert set(FleetStore(tree.parent / "F").table("jobs")["machine"]) == {"132-01", "132-08", "X"}
 
 
 def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):

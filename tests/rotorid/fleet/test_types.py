@@ -11,7 +11,7 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.workflows import balance
 from rotorid.workflows.balance import BalanceOptions
-from rotorid.workflows.fleet.fleet_add import fleet_add
+from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 from rotorid.workflows.fleet.type_coefficients import type_coefficients
 
@@ -140,6 +140,22 @@ def test_a_check_run_refines(fleet, tmp_path):
     assert refined.result.mounted[0] == "check 0"
 
 
+@pytest.mark.parametrize("runs", [1, 3])
+def test_a_check_run_that_does_not_say_its_weights_has_those_within_the_limits(fleet, tmp_path, runs):
+    machine = Machine(np.random.default_rng(30))
+    job = machine.job(tmp_path / "limited", runs, more="[planes.L]\nmax_mass_g = 1\n[planes.R]\n")
+    of_type = address(fleet) if runs == 1 else None
+    found = balance(job, BalanceOptions(machine_type=of_type)).result
+    mounted = found.weights[None] * 1e3
+    machine._table(job.parent / "check.csv", machine.W, mounted, "check")
+    machine._weights(job.parent / "check_weights.csv", mounted, "check")
+    weights, said = [], 'check = "check.csv"\n' + job.read_text()
+    for more in ("", 'check_weights = "check_weights.csv"\n'):
+        job.write_text(more + said)
+        weights.append(balance(job, BalanceOptions(machine_type=of_type, refine=True)).result.weights)
+    assert weights[0] == pytest.approx(weights[1], rel=1e-4)
+
+
 def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
     folder, machines = fleet
     own = folder / "tree" / "fan" / "F2" / "2026-01-01" / "job.toml"
@@ -161,6 +177,34 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
     )
     W = machines[2].W * 1e-6 / 2 / 1e-3
     assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
+
+
+def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(fleet, tmp_path):
+    machine = Machine(np.random.default_rng(28))
+    own = machine.job(tmp_path / "tree" / "fan" / "N").parent
+    store = shutil.copytree(fleet[0] / "store", tmp_path / "store")
+    assert fleet_add(store, [tmp_path / "tree"]).jobs == 1
+    runs = own / "runs.csv"
+    runs.write_text(runs.read_text() + "\n")  # a further run, or a reading that was corrected
+    assert type_coefficients(read_job(own / "job.toml"), f"{store}:fan").earlier == 0
+    new = machine.job(tmp_path / "new" / "N", runs=1)
+    assert type_coefficients(read_job(new), f"{store}:fan").earlier == 1
+
+
+def test_copies_count_once_and_names_at_several_places_are_told(tmp_path):
+    rng = np.random.default_rng(29)
+    for customer, name in (("a", "P1"), ("b", "P1"), ("a", "P2"), ("a 2025", "P3"), ("a 2026", "P3")):
+        Machine(rng).job(tmp_path / "tree" / customer / name / "2026-02-03")
+    for k, name in enumerate(("copy of P2", "digits of P2")):
+        copy = shutil.copytree(tmp_path / "tree" / "a" / "P2", tmp_path / "tree" / "a" / name)
+        job = copy / "2026-02-03" / "job.toml"
+        job.write_text(job.read_text() + f"floor = 0.0{k + 1}\n")
+    fleet_add(tmp_path / "F", [tmp_path / "tree"], FleetAddOptions("fan"))
+    known = fleet_fit(tmp_path / "F", FleetFitOptions("fan")).known
+    assert set(known.kind.machines) == {"P1", "P2", "P3"}
+    assert known.notes[0] == "2 jobs with the same coefficients as another left out"
+    assert known.notes[1].startswith("'P1' counts as one machine: a/P1/2026-02-03 and b/P1/2026-02-03; if")
+    assert "P3" not in " ".join(known.notes)
 
 
 def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
@@ -208,9 +252,10 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
     other = machine.job(tmp_path / "other", runs=1)
     table = pd.read_csv(other.parent / "runs.csv")
     table.assign(speed_rpm=2000).to_csv(other.parent / "runs.csv", index=False)
-    refused("0 machines with these speeds", UndeterminedError, other, machine_type=address(fleet))
+    refused("no job of fan has .* of all these speeds", UndeterminedError, other, machine_type=address(fleet))
     table.assign(sensor=["S1", "S9"]).to_csv(other.parent / "runs.csv", index=False)
-    refused("0 machines with these speeds", UndeterminedError, other, machine_type=address(fleet))
+    refused("it has no sensor S9, but S1 and S2", UndeterminedError, other, machine_type=address(fleet))
+    refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
     job.write_text(job.read_text().replace("machine_type", "machine"))
     refused("or machine_type, whose coefficients come with balance --type", machine_type=address(fleet))
 

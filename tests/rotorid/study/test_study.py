@@ -202,6 +202,7 @@ def test_ends_of_searches_are_told_apart_by_their_numbers():
         ("rms_g_mm = 500", "rms_g_mm = -500", "key unbalance.3.rms_g_mm"),
         ("rms_g_mm = 500", "rms_g_mm = 500\nmedian_g_mm = 50", "one key of them"),
         ("samples = 60", "samples = 0", "key samples"),
+        ("[planes.middle]\nnode = 3\n", "corrections = 2\n", "key planes"),
         ("rotor.csv", "roter.csv", "roter.csv"),
         ("[planes.middle]", "[planer.middle]", "did you mean"),
         ("= 500\n", '= 500\n[scatter]\n"bearing[9].kxx" = 10\n', "key scatter"),
