@@ -5,7 +5,7 @@ with 3 % from run to run. A further machine of the type is balanced from its bas
 run in one plane, then in all. Three kinds: each coefficient for itself, planes alike (the sensors' gains and
 delays differ), the whole machine alike. Of odd machines there are three in each type.
 
-    python examples/coverage_fleet.py [TYPES [SEED]]
+    python examples/coverage_fleet.py [TYPES [SEED [MACHINES]]]
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from balancing.coefficients.machine_type import MachineRecord, MachineType, fit_
 from balancing.correction.update_coefficients import update
 from balancing.data.conventions import Labels
 from rotorid.regression import stretch
+from rotorid.workflows.fleet.type_coefficients import LEVEL
 
 ComplexArray = NDArray[np.complex128]
 KINDS = {"each coefficient": (1, 1, 1, 1), "planes alike": (1, 1, 1, 0), "machine alike": (1, 0, 0, 0)}
@@ -33,17 +34,19 @@ ODD = {"lag for lead": "lag", "another keyphasor mark": "mark", "two sensors exc
 
 
 class Shot(NamedTuple):
-    """What a correction left, relative to the vibration; which intervals held; whether it was warned."""
+    """What a correction left, relative to the vibration; which intervals held; whether it was warned, or called
+    a machine of another type."""
 
     left: float
     weights: bool
     readings: float
     rms: bool
     warned: bool
+    foreign: bool
 
 
 class Type(NamedTuple):
-    """A drawn type: its machines' true coefficients (M, S, C, P), and the records of the first `MACHINES`."""
+    """A drawn type: its machines' true coefficients (M, S, C, P), and records of all but the last `FURTHER`."""
 
     W: ComplexArray
     records: list[MachineRecord]
@@ -94,12 +97,14 @@ def shots(rng: np.random.Generator, drawn: Type, kind: MachineType, m: int) -> l
             errors=ReadingErrors(RUN, RUN),
         )
         try:
-            answer = correct(update(prior, trials)[0], refuse=False)
+            known, chance = update(prior, trials)
+            answer = correct(known, refuse=False)
         except UndeterminedError:
             found.append(None)
             continue
         after = W @ (answer.weights - D)
-        found.append(judged(answer, D, np.linalg.norm(after) / np.linalg.norm(W @ D), read(rng, after)))
+        left = float(np.linalg.norm(after) / np.linalg.norm(W @ D))
+        found.append(judged(answer, D, left, read(rng, after), chance < LEVEL))
     return found
 
 
@@ -108,7 +113,13 @@ def read(rng: np.random.Generator, Y: ComplexArray) -> ComplexArray:
     return np.asarray(Y * (1 + RUN * normal(rng, *Y.shape)))
 
 
-def judged(found: Correction, D: ComplexArray, left: float, check: ComplexArray) -> Shot:
+def judged(
+    found: Correction,
+    D: ComplexArray,
+    left: float,
+    check: ComplexArray,
+    foreign: bool,  # noqa: FBT001
+) -> Shot:
     """Against the truth, and a check run."""
     assert found.covariance is not None
     assert found.after_covariance is not None
@@ -119,7 +130,7 @@ def judged(found: Correction, D: ComplexArray, left: float, check: ComplexArray)
     weights = bool(d @ np.linalg.solve(found.covariance, d) < bound(n, found.dof))
     size = float(np.sqrt(np.mean(np.abs(check) ** 2)))
     readings = float(np.mean(far < bound(2, found.dof)))
-    return Shot(left, weights, readings, size < found.check_rms, bool(found.warnings))
+    return Shot(left, weights, readings, size < found.check_rms, bool(found.warnings), foreign)
 
 
 def bound(n: int, dof: float | None) -> float:
@@ -153,39 +164,42 @@ def line(name: str, shots: list[Shot]) -> None:
         left, *held = np.array([shot[:4] for shot in shots], dtype=float).T
         shares = [100 * np.mean(each) for each in held]
         print(
-            f"{name:<44}{len(shots):>6}{np.median(left):>8.3f}{shares[0]:>9.1f}{shares[1]:>10.1f}{shares[2]:>8.1f}"
+            f"{name:<52}{len(shots):>6}{np.median(left):>8.3f}{shares[0]:>9.1f}{shares[1]:>10.1f}{shares[2]:>8.1f}"
         )
 
 
-def main(types: int = 20, seed: int = 1) -> None:
+def main(types: int = 20, seed: int = 1, machines: int = MACHINES) -> None:
     """Print the tables."""
     stages = "baseline alone", "one trial run", "all trial runs"
     print("a. Corrections of further machines: median of what is left; 95 % regions that hold the truth, %")
-    print(f"{'':<44}{'number':>6}{'left':>8}{'weights':>9}{'readings':>10}{'rms <':>8}")
+    print(f"{'':<52}{'number':>6}{'left':>8}{'weights':>9}{'readings':>10}{'rms <':>8}")
     for kind in KINDS:
         rng = np.random.default_rng([seed, list(KINDS).index(kind)])
         rows: list[list[Shot | None]] = []
         for _ in range(types):
-            drawn = draw(rng, kind)
+            drawn = draw(rng, kind, machines)
             known = fit_type(drawn.records, *drawn[2:])
-            rows += [shots(rng, drawn, known, m) for m in range(MACHINES, MACHINES + FURTHER)]
+            rows += [shots(rng, drawn, known, m) for m in range(machines, machines + FURTHER)]
         for stage, each in zip(stages, zip(*rows, strict=True), strict=True):
             answered = [shot for shot in each if shot is not None]
             for said in (False, True):
                 line(
                     f"{kind}, {stage}{', warned' if said else ''}", [s for s in answered if s.warned == said]
                 )
+            other = sum(shot.foreign for shot in answered)
+            if other:
+                print(f"{f'{kind}, {stage}, called of another type':<52}{other:>6}")
             if len(answered) < len(each):
-                print(f"{f'{kind}, {stage}, refused':<44}{len(each) - len(answered):>6}")
+                print(f"{f'{kind}, {stage}, refused':<52}{len(each) - len(answered):>6}")
     print("\nb. Odd machines, three in each type: found, and with the right reason, %; others called odd, %")
     for kind in KINDS:
         rng = np.random.default_rng([seed, 9, list(KINDS).index(kind)])
-        each = [odd_machines(rng, draw(rng, kind)) for _ in range(types)]
+        each = [odd_machines(rng, draw(rng, kind, machines)) for _ in range(types)]
         told = [one for found, _ in each for one in found]
         for what in ODD:
             own = np.array([one[1:] for one in told if one[0] == what], dtype=float).mean(axis=0) * 100
-            print(f"{kind + ', ' + what:<44}{own[0]:>8.1f}{own[1]:>8.1f}")
-        print(f"{kind + ', called odd':<44}{100 * np.mean([one for _, rest in each for one in rest]):>8.1f}")
+            print(f"{kind + ', ' + what:<52}{own[0]:>8.1f}{own[1]:>8.1f}")
+        print(f"{kind + ', called odd':<52}{100 * np.mean([one for _, rest in each for one in rest]):>8.1f}")
 
 
 if __name__ == "__main__":

@@ -28,6 +28,12 @@ if TYPE_CHECKING:
 LEVEL = 0.001
 """Probability below which runs are not those of a machine of the type."""
 
+ENOUGH = 12
+"""Machines, from which on the regions of first shots hold what they say."""
+_FEW = (
+    "the type rests on few machines: where whole machines differ, 95 % regions of first shots held the truth "
+    "in 85 to 90 of 100 simulated ones; make a trial run"
+)
 _RARE = 1e-12
 
 
@@ -122,6 +128,7 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
         found, chance = update(prior, trials)
     odd = f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count"
     warnings = (odd,) * any(record.machine == machine for record, _ in known.kind.odd)
+    warnings += (_FEW,) * (len(known.kind.machines) < ENOUGH and not trials.weights.any())
     earlier = int((known.jobs["machine"] == machine).sum()) if machine in known.kind.machines else 0
     words = f"coefficients of the type {name!r}, {counted(len(known.kind.machines), 'machine')}"
     words += f", and of {counted(earlier, 'earlier job')} of {machine!r}" if earlier else ""
