@@ -10,11 +10,11 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rotorid.base.answer import Answer, Answered, together
+from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.workflows.input_checks import changed, checked, plain
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Outcome(Answered):
     @property
     def document(self) -> dict[str, Any]:
         """What `--json` prints."""
-        return {**self.to_dict(), "provenance": dict(self.provenance)}
+        return {"schema_version": SCHEMA_VERSION, **self.to_dict(), "provenance": dict(self.provenance)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -158,7 +158,7 @@ def provenance(
     return {
         "program": "rotorid",
         "version": __version__,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "date": now().isoformat(timespec="seconds"),
         "inputs": [{"file": str(f), "sha256": hash_of(f)} for f in files],
         "options": {key: plain(value) for key, value in (given | changed(options)).items()},
     }
