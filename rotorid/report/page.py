@@ -56,7 +56,7 @@ def render_report(
     jinja2.UndefinedError
         If the template names something that the context does not hold.
     """
-    whole = Document({"schema_version": SCHEMA_VERSION, **document, "provenance": dict(provenance)})
+    whole = Document({**document, "schema_version": SCHEMA_VERSION, "provenance": dict(provenance)})
     page = _environment().get_template(template)
     text = page.render(
         document=whole.data,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-import logging
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rotorid.base.answer import Answer, Answered, together
+from rotorid.base.logs import workflows as log
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.workflows.input_checks import changed, checked, plain
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-log = logging.getLogger("rotorid.workflows")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,7 +65,7 @@ class Outcome(Answered):
     @property
     def document(self) -> dict[str, Any]:
         """What `--json` prints."""
-        return {"schema_version": SCHEMA_VERSION, **self.to_dict(), "provenance": dict(self.provenance)}
+        return {**self.to_dict(), "schema_version": SCHEMA_VERSION, "provenance": dict(self.provenance)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)

@@ -114,7 +114,7 @@ class Problems:
 
     def refuse_newer(self, file: str, version: object) -> None:
         """Note a file of a later `schema_version`, which may mean something else, and what is none."""
-        if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
+        if isinstance(version, bool) or version not in range(1, SCHEMA_VERSION + 1):  # or 1.0, of a workbook
             expected = f"{SCHEMA_VERSION}: a file of a later version needs a newer rotorid"
             self.add(file, None, "schema_version", str(version), expected)
 

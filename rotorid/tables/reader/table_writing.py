@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotorid.base import logs
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.excel_pages import Page, book_bytes
 from rotorid.tables.reader.problems import InputError, Problem
@@ -109,6 +110,7 @@ def write_files(files: Mapping[Path, bytes], last_look: Callable[[], None] | Non
             last_look()
         for path, temporary in waiting.items():
             temporary.replace(targets[path])
+            logs.files.debug("written %s, %d bytes", path, len(files[path]))
     except OSError as error:
         expected = f"a file that can be written ({error.strerror or error})"
         raise InputError([Problem(str(path), None, None, None, expected)]) from error
