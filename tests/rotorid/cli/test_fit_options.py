@@ -12,7 +12,7 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain import Record, simulate
 
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[3]
 FOLDER = sample_data() / "fit"
 PRINTED = Path(__file__).parents[2] / "data" / "f_printed.csv"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
