@@ -1,4 +1,4 @@
-"""`rotorid schema`: the keys of a job, a rotor file or a small model as a JSON schema, for editors."""
+"""`rotorid schema`: the keys of a settings file as a JSON schema, for editors."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from rotorid.cli.output import Destination, json_text
 
 @command(to=("json",))
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job, rotor or small (model).")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model) or waveforms.")],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """JSON schema of a job, a rotor file or a small model, for editors to check keys.
+    """JSON schema of a job, a rotor, a small model or a waveforms file, for editors to check keys.
 
     Example: rotorid schema job
     """
