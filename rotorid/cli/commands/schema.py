@@ -12,10 +12,12 @@ from rotorid.cli.output import Destination, json_text
 
 @command(to=("json",))
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model) or waveforms.")],
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model) or waveforms.")
+    ],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """JSON schema of a job, a rotor, a small model or a waveforms file, for editors to check keys.
+    """JSON schema of a kind of settings file, for editors to check its keys.
 
     Example: rotorid schema job
     """
