@@ -131,9 +131,9 @@ def _same(influence: Influence, readings: ComplexArray) -> bool:
 
 def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start:
     """Bare-rotor vibration from runs at known coefficients: the mean of Y_run − W T_run."""
-    speeds, sensors = _where(influence, trials)
+    speeds, sensors = places(influence, trials)
     pick = np.ix_(range(len(trials.runs)), speeds, sensors)
-    mounted = _mounted_weights(influence, trials)  # (R, P)
+    mounted = mounted_weights(influence, trials)  # (R, P)
     mean = mounted.mean(axis=0)
     readings = trials.mean[pick].mean(axis=0) - influence.W @ mean
     own = error_model(trials)
@@ -206,7 +206,7 @@ def _last_run(influence: Influence) -> tuple[str, tuple[str, ...], ComplexArray]
     return None if run is None or weights is None or not weights.any() else (run, influence.planes, weights)
 
 
-def _where(influence: Influence, trials: Trials) -> tuple[list[int], list[int]]:
+def places(influence: Influence, trials: Trials) -> tuple[list[int], list[int]]:
     """Where the speeds and sensors of the coefficients stand among the readings."""
     lacking = [s for s in influence.sensors if s not in trials.sensors]
     if lacking:
@@ -218,7 +218,7 @@ def _where(influence: Influence, trials: Trials) -> tuple[list[int], list[int]]:
     return speeds, [trials.sensors.index(s) for s in influence.sensors]
 
 
-def _mounted_weights(influence: Influence, trials: Trials) -> ComplexArray:
+def mounted_weights(influence: Influence, trials: Trials) -> ComplexArray:
     """Weights of the baseline runs in the planes of the coefficients, shape (R, P)."""
     mounted = np.zeros((len(trials.runs), len(influence.planes)), dtype=complex)
     for p, plane in enumerate(trials.planes):

@@ -20,7 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.coefficients.run_errors import Origin, RunErrors, Runs
+from balancing.coefficients.run_errors import Origin, RunErrors, Runs, assumed
+from balancing.data.reading_errors import error_model
+from balancing.data.trials import Trials
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.regression import gain, stretch
 
@@ -242,6 +244,13 @@ def given(rows: Sequence[Rows], runs: Runs, relative: float, floor: float, origi
     found = [spectrum(each, runs, grid) for each in rows if each.dof > 0]
     found = _agreeing(rows, found, grid.sizes, np.ones(len(grid.points)))
     return _of_grid(grid.points, _posterior(found, grid), runs, origin, None)
+
+
+def known_run_errors(trials: Trials, runs: Runs) -> RunErrors:
+    """Errors between these runs: as stated; none beside stated errors of a reading; else assumed."""
+    if trials.run_errors is not None:
+        return given([], runs, *trials.run_errors, "stated")
+    return RunErrors() if error_model(trials).source == "stated" else assumed(runs)
 
 
 def scatter(

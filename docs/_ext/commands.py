@@ -38,13 +38,15 @@ def all_commands() -> Iterator[tuple[str, Any]]:
 
     group: Any = get_command(app)
     for name, command in group.commands.items():
-        tell_choices(command)
-        yield name, command
+        parts = getattr(command, "commands", {})  # of `rotorid fleet`
+        for typed, one in ({f"{name} {part}": own for part, own in parts.items()} or {name: command}).items():
+            tell_choices(one)
+            yield typed, one
 
 
 def describe(name: str, command: Any) -> nodes.section:  # noqa: ANN401 - typer has no public type for it
     """What a command does, its examples, and every argument and option."""
-    out = section(f"rotorid {name}", f"rotorid-{name}")
+    out = section(f"rotorid {name}", f"rotorid-{name.replace(' ', '-')}")
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option"]
     usage = " ".join(["rotorid", name, *(_usage(p) for p in arguments), "[OPTIONS]"])

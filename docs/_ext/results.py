@@ -28,6 +28,7 @@ ANSWERS = (
         "unbalance-model-job",
         "split-holes",
     ),
+    *("fleet-add", "fleet-show"),
     *("split-drill", "trial-weight", "tolerance", "critical-rotor23", "campbell-compressor"),
     *(
         "response-compressor",

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.coefficients.run_error_estimate import given
-from balancing.coefficients.run_errors import RunErrors, Runs, assumed, run_columns, runs_of
+from balancing.coefficients.run_error_estimate import known_run_errors
+from balancing.coefficients.run_errors import run_columns, runs_of
 from balancing.data.reading_errors import error_model, mean_covariance
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
@@ -177,7 +177,7 @@ class RunReadings:
         model = error_model(trials)
         reading = mean_covariance(trials, model)
         runs = runs_of(Y, trials.weights, W[..., :P])
-        run = run_errors(trials, runs)
+        run = known_run_errors(trials, runs)
         columns = run_columns(run, runs)
         take = np.eye(R) if self.modelled else np.column_stack((-np.ones(R - 1), np.eye(R - 1)))
         n, least = len(take) * C, (NO_ERROR * np.abs(Y).max()) ** 2
@@ -188,13 +188,6 @@ class RunReadings:
         white, _ = whitening(own, real_columns(common[1]), real_columns(common[0]))
         stated = "assumed" not in (model.source, run.origin)
         return ReadingRows(self, take, white, np.einsum("sii->si", own), stated)
-
-
-def run_errors(trials: Trials, runs: Runs) -> RunErrors:
-    """Errors between these runs: as stated; none beside stated errors of a reading; else assumed."""
-    if trials.run_errors is not None:
-        return given([], runs, *trials.run_errors, "stated")
-    return RunErrors() if error_model(trials).source == "stated" else assumed(runs)
 
 
 class Bare(NamedTuple):

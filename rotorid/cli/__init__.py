@@ -38,6 +38,7 @@ from rotorid.cli.commands import (
     validate,
     vectors,
 )
+from rotorid.cli.fleet import fleet
 from rotorid.cli.terminal import markup_mode
 from rotorid.cli.verbose import verbosely
 from rotorid.cli.worksheet import worksheet
@@ -50,7 +51,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
+_COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Balance rotors": {
         "balance": balance.balance,
         "worksheet": worksheet,
@@ -59,6 +60,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "split": split.split,
         "tolerance": tolerance.tolerance,
         "unbalance": unbalance.unbalance,
+        "fleet": fleet,
     },
     "Compute rotors": {
         "critical": critical.critical,
@@ -84,6 +86,9 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
 }
 for _job, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():
+        if isinstance(_command, typer.Typer):
+            app.add_typer(_command, name=_name, rich_help_panel=_job)
+            continue
         app.command(_name, cls=Command, rich_help_panel=_job)(verbosely(_command))
 
 
@@ -120,7 +125,14 @@ def _overview() -> str:
         "An example of each job, run in a checkout (else: rotorid demo DIR). More: rotorid COMMAND --help"
     ]
     for job, commands in _COMMANDS.items():
-        told = {name: command.__doc__ or "" for name, command in commands.items()}
+        told: dict[str, str] = {}
+        for name, command in commands.items():
+            if isinstance(command, typer.Typer):
+                told |= {
+                    f"{name} {one.name}": one.callback.__doc__ or "" for one in command.registered_commands
+                }
+            else:
+                told[name] = command.__doc__ or ""
         example = " ".join("".join(told.values()).split("Example: ")[1].partition("\n\n")[0].split())
         short = len(job) + len(example) + 2 <= COLUMNS
         lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]

@@ -9,6 +9,8 @@ from rotorid.workflows.campbell import CampbellDiagram, CampbellOptions, campbel
 from rotorid.workflows.critical import CriticalOptions, CriticalSpeeds, critical
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
+from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
+from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
@@ -44,6 +46,10 @@ __all__ = [
     "Demo",
     "DemoOptions",
     "FitOptions",
+    "FleetAddOptions",
+    "FleetAdded",
+    "FleetShowOptions",
+    "FleetShown",
     "IdentifyOptions",
     "InfluenceOptions",
     "ModesOfReadings",
@@ -80,6 +86,8 @@ __all__ = [
     "critical",
     "demo",
     "fit",
+    "fleet_add",
+    "fleet_show",
     "identify",
     "influence",
     "modes",

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.calibration.one_shot import NextTrial
+    from rotorid.workflows.fleet.type_coefficients import TypeKnowledge
     from rotorid.workflows.option_quantities import Amount, Amplitudes, Positions, Weights
 
     JobGiven = Job | Path | str | Sequence[Path | str]
@@ -68,6 +69,8 @@ class BalanceOptions:
     coefficients : KIND
         measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
         there are trial weights.
+    machine_type : FLEET:TYPE
+        Coefficients of the machine's type, from a store of `rotorid fleet`; a baseline is enough.
     model_error : PERCENT
         Standard deviation of computed coefficients; combined: 20 if not given.
     amplitude_error : PERCENT
@@ -126,6 +129,7 @@ class BalanceOptions:
     influence: Path | str | None = None
     waveforms: Path | str | None = None
     coefficients: str | None = None
+    machine_type: str | None = None
     model_error: float | None = None
     amplitude_error: float | None = None
     phase_error: float | None = None
@@ -168,6 +172,8 @@ class Balance(Parts):
         itself, choices of planes, residual against total weight, all runs; None where there is nothing.
     next_trial
         Of a calibrated rotor: the trial run that would tell most.
+    of_type
+        Where the coefficients are those of a type of machines.
     """
 
     result: Correction
@@ -182,6 +188,7 @@ class Balance(Parts):
     curve: TradeOff | None
     history: History | None
     next_trial: NextTrial | None = None
+    of_type: TypeKnowledge | None = None
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -205,6 +212,8 @@ class Balance(Parts):
         weights, sound = self.result.answer, self.result.sound
         if needs_trial_run(self.job, self.influence):
             weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
+        if self.of_type is not None and self.of_type.foreign:
+            weights, sound = replace(weights, judgement=self.of_type.foreign), False
         if sound and (self.check or self.mounted):
             weights = replace(weights, judgement="")
         if self.mounted:
@@ -305,7 +314,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     source = _source(job, options)
     files = source if isinstance(source, JobSource) else None
     read = with_contradiction(_read(source, options))
-    known = _choose(read, options)
+    known, of_type = _choose(read, options)
     influence = known[0]
     planes, subsets = _planes(read, known, options)
     result = _correct(read, known, planes, options)
@@ -327,7 +336,8 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         curve=_trade_off(result, influence, read) if options.trade_off else None,
         history=_history(result, influence, read) if options.history else None,
         next_trial=next_trial(read, influence, result.weights, result.planes),
-        provenance=provenance(read.files, options),
+        of_type=of_type,
+        provenance=provenance(read.files if of_type is None else (*read.files, *of_type.files), options),
     )
 
 
@@ -336,6 +346,8 @@ def _check(options: BalanceOptions) -> None:
     check_choices(options, choices())
     if options.coefficients is not None:
         one_of(options.coefficients, "--coefficients", KINDS)
+    if options.machine_type is not None and (options.coefficients or options.influence):
+        raise ValueError("--type has the coefficients: leave --coefficients and --influence away")
     if options.ridge is not None and options.truncate is not None:
         raise ValueError("--ridge and --truncate are two ways to the same end: choose one")
     if options.best and not options.split:
@@ -379,8 +391,13 @@ def _read(source: Job | JobSource, options: BalanceOptions) -> Job:
     return limited(source, options.max_mass, options.limit)
 
 
-def _choose(job: Job, options: BalanceOptions) -> Known:
-    return choose(job, options.coefficients, options.model_error, refined=options.refine)
+def _choose(job: Job, options: BalanceOptions) -> tuple[Known, TypeKnowledge | None]:
+    if options.machine_type is None:
+        return choose(job, options.coefficients, options.model_error, refined=options.refine), None
+    from rotorid.workflows.fleet.type_coefficients import type_coefficients
+
+    found = type_coefficients(job, options.machine_type, refined=options.refine)
+    return (found.influence, None), found
 
 
 def _planes(job: Job, known: Known, options: BalanceOptions) -> tuple[Sequence[str], Subsets | None]:
@@ -414,6 +431,7 @@ def _correct(job: Job, known: Known, planes: Sequence[str], options: BalanceOpti
         baseline,
         planes,
         _speeds(job, options),
+        refuse=options.machine_type is None,  # how a machine differs from its type is no error of readings
         method=options.method,
         limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,
@@ -439,7 +457,7 @@ def _again(
     with catch_warnings(action="ignore"):  # said when the job was read
         said = replace(source.overrides, phase=phase, angles=angles)
         job = _read(replace(source, overrides=said), options)
-    return _correct(job, _choose(job, options), planes, options)
+    return _correct(job, _choose(job, options)[0], planes, options)
 
 
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:

@@ -143,7 +143,7 @@ class WorkbookVersion:
                 _put(sheet.cell(top, len(names)), name)
                 sheet.cell(top, len(names))._style = copy(sheet.cell(top, at + 1)._style)
             cell = "" if value is None else setting_cell(name, value)
-            words = CELLS.get(parts[-1] if title == "settings" else name) in ("name", "words")
+            words = CELLS.get(parts[-1] if title == "settings" else name) in ("name", "words", "date")
             _put(sheet.cell(row, names.index(name) + 1), show(cell) if words else cell)
 
     def _lines(self, title: str, header: Sequence[str]) -> tuple[Any, list[Line]]:

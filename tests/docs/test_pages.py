@@ -16,7 +16,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
-SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "validation.md"]
+SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "validation.md", DOCS / "fleet.md"]
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 
@@ -38,6 +38,8 @@ def test_there_is_a_page_for_each_of_the_three_users():
 def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplace, cli, capsys):
     if page.stem == "motion" and not COMPILED:
         pytest.skip("long without the extra rotorid[fast]")
+    if page.stem == "fleet":
+        pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
     renewals = {} if os.environ.get("ROTORID_RENEW_PAGES") else None
     ran = run_page(page, workplace, cli, capsys, renewals)
     if renewals:

@@ -364,6 +364,8 @@ COMMANDS = (
         "trial-weight",
         "split",
         "tolerance",
+        "fleet add",
+        "fleet show",
     ),
     *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "calibrate", "schema", "validate"),
 )
@@ -500,10 +502,23 @@ def _all() -> list[Case]:
         Case("workbook", "balance job.xlsx --output again.xlsx", "balance", before=(filled,)),
         Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
     ]
+    added = "fleet add fans sample_data/fleet"
+    shown = "fleet show fans"
+    cases += [
+        Case("fleet-add", "fleet add d sample_data/fleet", "fleet"),
+        Case("fleet-add-known", added, "fleet", before=(added,)),
+        Case("fleet-add-nothing", "fleet add d sample_data/motion", "fleet"),
+        Case("fleet-show", shown, "fleet", before=(added,)),
+        Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
+        Case("fleet-show-other", f"{shown} --type fan-123", "fleet", (TEXT,), before=(added,)),
+    ]
     for name in DEMOS:
         forms = (TEXT, JSON) if name == "identification" else (TEXT,)
         cases.append(Case(f"demo-{name}", f"demo d --sample {name}", "demos", forms))
-    cases += [Case(f"help-{name}", f"{name} --help", "usage", (TEXT,), stored=False) for name in COMMANDS]
+    cases += [
+        Case(f"help-{name.replace(' ', '-')}", f"{name} --help", "usage", (TEXT,), stored=False)
+        for name in COMMANDS
+    ]
     cases += [
         Case("help", "--help", "usage", (TEXT,), stored=False),
         Case("version", "--version", "usage", (TEXT,)),

@@ -35,6 +35,7 @@ PARTS = {
         "[planes.2]\nmax_mass_g = 3\nuse = false\nforbidden_deg = [1e-5, 7]\n"
         '[sensors.A]\nlimit = { "1000" = 4.5 }\nweight = 2\n[sensors.B]\nlimit = 6\n'
     ),
+    "machine": 'machine = "007"\nmachine_type = "fan-132"\ndate = 2026-03-17\n',
     "weights of speeds": 'speed_weights = { "1000" = 0.5 }\n',
     "holes": (
         "[planes.1]\nholes_deg = [-30, 0, 7.25]\nhole_names = ['A', '2', 'C 3']\navailable_g = [5, 2.5]\n"

@@ -17,6 +17,7 @@ from rotorid.workflows.balance import balance as work
 
 @command(
     BalanceOptions,
+    names={"machine_type": ["--type"]},
     least={
         "model_error": 0.0,
         "amplitude_error": 0.0,
@@ -30,6 +31,7 @@ from rotorid.workflows.balance import balance as work
         "Method": "method planes speeds best_planes trade_off coefficients",
         "Limits": "max_mass limit",
         "Mounting": "split best",
+        "Machines of a type": "machine_type",
         "Check run": "refine history",
         "Grade": "grade rotor_mass service_speed positions bearings centre",
         OUTPUT: "save_influence template",

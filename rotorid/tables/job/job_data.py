@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,6 +96,8 @@ class Job:
         and `check` already; None: none.
     key_phasor
         Its direction, degrees with the rotation from the model's x.
+    machine, machine_type, date
+        What was balanced, of which type, and when; empty and None where the job does not say.
     """
 
     trials: Trials
@@ -117,6 +120,9 @@ class Job:
     trial_radii: Mapping[str, float] = field(default_factory=dict)
     slow_roll: ComplexArray | None = None
     key_phasor: float = 0.0
+    machine: str = ""
+    machine_type: str = ""
+    date: datetime.date | None = None
 
     @property
     def used(self) -> tuple[str, ...]:

@@ -250,6 +250,8 @@ def _value(key: str, cell: Cell, *, comma: bool) -> Cell | bool:
     if kind == "flag":
         word = show(cell).casefold()
         return word in ("true", "yes") if word in ("true", "yes", "false", "no") else cell
+    if kind == "date" and isinstance(cell, BadCell):  # a spreadsheet makes a cell with a date of its text
+        return cell.value.partition(" ")[0]
     if kind == "name" or not isinstance(cell, str) or not _NUMBER_LIKE.fullmatch(cell):
         return cell
     try:

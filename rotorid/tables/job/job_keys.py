@@ -439,6 +439,9 @@ JOB = (
     Key("columns", value_kinds.table(COLUMNS), "other names of the columns of runs tables, see below"),
     Key("planes", value_kinds.named(PLANE), "see below", default={}),
     Key("sensors", value_kinds.named(SENSOR), "see below", default={}),
+    Key("machine", value_kinds.LABEL, "its name or serial number, for `rotorid fleet`", default=""),
+    Key("machine_type", value_kinds.LABEL, "its type, for the same", default=""),
+    Key("date", value_kinds.DATE, "when it was balanced, for the same"),
 )
 CELLS = {name: key.kind.cell for keys in (JOB, PLANE, SENSOR) for key in keys for name in key.names}
 CELLS["station"] = "name"

@@ -33,11 +33,14 @@ def read_planes(said: Said, readings: Readings, model: Model, problems: Problems
     """Planes of the tables, then those that only the rotor model knows; other names are problems."""
     top, planes, trials = said.section, said["planes"], readings.trials
     own = trials.planes if readings.influence is None else readings.influence.planes
-    names = (*own, *(name for name in model.plane_nodes if name not in own))
+    more = model.plane_nodes if own or model.rotor is not None else planes  # or what a type knows
+    names = (*own, *(name for name in more if name not in own))
     radii = {name: plane["radius_mm"].si for name, plane in planes.items() if plane["radius_mm"]}
-    if not own and model.rotor is not None:
-        _complain_about_places(said, trials.sensors, model)
-        unit = units.MASS["g"] if all(p in radii for p in names) else units.UNBALANCE["g_mm"]
+    if not own:
+        masses = model.rotor is None or all(p in radii for p in names)
+        unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]
+        if model.rotor is not None:
+            _complain_about_places(said, trials.sensors, model)
         labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
         trials = replace(trials, labels=labels)
     if names:

@@ -95,5 +95,8 @@ def job_of(
             trial_radii=planes.trial_radii,
             slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
             key_phasor=labels.with_rotation(phasor),
+            machine=said["machine"],
+            machine_type=said["machine_type"],
+            date=said["date"],
         )
     )

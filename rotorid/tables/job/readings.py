@@ -118,8 +118,12 @@ def _complain_about_tables(said: Said, tables: Mapping[str, Source]) -> None:
     top = said.section
     if "check_weights" in {*top.keys, *tables} and "check" not in {*top.keys, *tables}:
         top.complain("check_weights", 'the check runs too, check = "check.csv" (in a workbook a sheet check)')
-    if {"weights", "influence", "rotor"}.isdisjoint({*top.keys, *tables}):
-        top.missing("weights", "a weights table, or an influence table of stored coefficients, or a rotor")
+    if {"weights", "influence", "rotor", "machine_type"}.isdisjoint({*top.keys, *tables}):
+        expected = (
+            "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
+            "whose coefficients come with balance --type"
+        )
+        top.missing("weights", expected)
 
 
 def _angles(said: Said, overrides: Overrides) -> tuple[Angles | None, bool]:

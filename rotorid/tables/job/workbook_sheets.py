@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""
-NAMES = {*TEXT_COLUMNS, *(name for name, cell in CELLS.items() if cell in ("name", "words"))}
+NAMES = {*TEXT_COLUMNS, *(name for name, cell in CELLS.items() if cell in ("name", "words", "date"))}
 """Those, and settings that a spreadsheet would take for a date."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 

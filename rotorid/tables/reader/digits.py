@@ -50,8 +50,10 @@ def _digits(cell: Cell) -> tuple[int, int, int]:
     if float(text) == 0:  # also 1e-999
         return max(0, -int(Decimal(re.sub("[eE].*", "", text)).as_tuple().exponent)), 0, 0
     number = Decimal(text)
-    if len(number.as_tuple().digits) > _SURE:
+    _, digits, exponent = number.as_tuple()
+    if len(digits) > _SURE:
         number = Decimal(f"{float(text):.12g}")
-    decimals = -int(number.as_tuple().exponent)
-    digits = (number if decimals > 0 else number.normalize()).as_tuple().digits
-    return decimals, len(digits), number.adjusted()
+        _, digits, exponent = number.as_tuple()
+    if int(exponent) >= 0:
+        digits = number.normalize().as_tuple().digits
+    return -int(exponent), len(digits), number.adjusted()

@@ -31,7 +31,8 @@ class Kind:
         How a file writes it.
     cell
         How a cell of a sheet holds it: text that looks like a number is one, or stays a name; `words` is
-        such text as a spreadsheet would take for a date (3:10); a flag is yes or no.
+        such text as a spreadsheet would take for a date (3:10); a flag is yes or no; a date is one, or its
+        text.
     header
         How the key itself is written in a file, such as `[{}]`.
     """
@@ -40,7 +41,7 @@ class Kind:
     schema: Mapping[str, Any] = field(default_factory=dict)
     allowed: str = ""
     example: str = ""
-    cell: Literal["number", "name", "words", "flag"] = "number"
+    cell: Literal["number", "name", "words", "flag", "date"] = "number"
     header: str = "{}"
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import datetime
 import math
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,6 +16,7 @@ from rotorid.tables.reader.decimal_numbers import NotANumber, check_size, has_de
 from rotorid.tables.reader.settings_keys import Key, Kind, object_schema, take
 from rotorid.tables.reader.toml_file import Section
 
+_DAY = re.compile(r"\d{4}-\d\d-\d\d")
 _TEXT = {"type": "string"}
 _NUMBER = {"type": "number"}
 
@@ -59,6 +63,29 @@ def _flag(section: Section, key: str) -> bool | None:
 
 
 FLAG = Kind(_flag, {"type": "boolean"}, "yes or no", "false", cell="flag")
+
+
+def _label(section: Section, key: str) -> str | None:
+    value = section.take(key)
+    return section.text(key) if isinstance(value, bool) or not isinstance(value, int) else str(value)
+
+
+LABEL = Kind(_label, {"type": ["string", "integer"]}, "text, or a number as its name", cell="name")
+"""A name that may be a number, as serial numbers are."""
+
+
+def _date(section: Section, key: str) -> datetime.date | None:
+    value = section.take(key)
+    if isinstance(value, datetime.datetime):
+        return value.date()
+    with contextlib.suppress(ValueError):
+        if isinstance(value, datetime.date) or (isinstance(value, str) and _DAY.fullmatch(value.strip())):
+            return value if isinstance(value, datetime.date) else datetime.date.fromisoformat(value.strip())
+    section.complain(key, "a date, such as 2026-03-17")
+    return None
+
+
+DATE = Kind(_date, {"type": "string", "format": "date"}, "a date, 2026-03-17", "2026-03-17", cell="date")
 
 
 def whole(what: str, low: int, high: int) -> Kind:

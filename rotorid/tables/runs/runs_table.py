@@ -90,11 +90,11 @@ def read_runs(
     steps, covariance = np.full((2, *readings.shape), np.nan), np.full((2, 2, *readings.shape), np.nan)
     across = np.where(amplitude > 0, amplitude * table.numbers("phase_std"), table.numbers("amplitude_std"))
     measured = np.moveaxis(turned(values, table.numbers("amplitude_std") ** 2, across**2), 0, -1)
-    for place, rows in cells.items():
-        for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
-            readings[(k, *place)] = values[row]
-            steps[(slice(None), k, *place)] = written[:, row]
-            covariance[(..., k, *place)] = measured[..., row]
+    rows = [row for own in cells.values() for row in sorted(own, key=lambda i: order[i])]
+    at = np.array([(k, *place) for place, own in cells.items() for k in range(len(own))], dtype=int).T
+    readings[*at] = values[rows]
+    steps[:, *at] = written[:, rows]
+    covariance[:, :, *at] = measured[..., rows]
     labels = replace(
         conventions.labels,
         vibration_unit=table.unit("amplitude").name,

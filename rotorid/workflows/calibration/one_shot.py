@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.coefficients.coefficients_from_model import DERIVATIVES, with_parameters
+from balancing.coefficients.run_error_estimate import known_run_errors
 from balancing.coefficients.run_errors import runs_of
 from balancing.data.reading_errors import error_model
 from balancing.data.trials import Trials
 from fem.model.rotor_parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
-from rotorid.calibration.run_readings import run_errors
 from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     runs, nothing = job.trials, np.zeros(len(job.trials.runs))
     by_plane = dict(zip(runs.planes, runs.weights.T, strict=True))
     mounted = np.column_stack([by_plane.get(plane, nothing) for plane in influence.planes])
-    between = run_errors(runs, runs_of(runs.mean, mounted, W))
+    between = known_run_errors(runs, runs_of(runs.mean, mounted, W))
     found = with_parameters(replace(influence, W=W, run_errors=between), columns, lack)
     said = f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
     return replace(found, warnings=(*found.warnings, said)) if calibration.needs_trial_run else found

@@ -1,0 +1,278 @@
+"""Influence coefficients of a type of machines: their mean, how machines differ, and which do not belong.
+
+A coefficient differs from machine to machine by a few per cent along and by some degrees across; both
+directions are those of the median machine's coefficient, so that a covariance which is shrunk towards its
+diagonal (`rotorid.regression.random_effects`) keeps them. Machines whose whole set of coefficients is far
+from the others' were mostly recorded otherwise; what would make them fit is looked for:
+
+- readings that lag where they are said to lead: Y is written as its conjugate (that of W is not enough where
+  a trial weight stood elsewhere than at 0°);
+- another keyphasor mark, or another zero of the angles: W e^{iθ};
+- two sensors, or two planes, exchanged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from balancing.coefficients.baseline import match_speeds
+from balancing.coefficients.coefficients_from_model import with_parameters
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.influence import Influence, estimate_influence
+from balancing.data.conventions import Labels
+from balancing.data.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import counted, listing
+from rotorid.regression import stretch, unstretch
+from rotorid.regression.random_effects import (
+    Groups,
+    RandomEffects,
+    grouped,
+    oddness,
+    random_effects,
+)
+
+LEAST_MACHINES = 3
+"""Fewer do not show how machines differ."""
+_ALIKE = 4.0
+"""Squared distances that differ by less do not tell two reasons apart."""
+
+
+class MachineRecord(NamedTuple):
+    """Coefficients (S, C, P) measured in one job of one machine, and their covariances (S, C, P, 2, 2)."""
+
+    machine: str
+    job: str
+    W: ComplexArray
+    covariance: FloatArray
+
+
+def record_of(machine: str, job: str, influence: Influence) -> MachineRecord:
+    """The coefficients of a job with their own covariances, zero where these are not known."""
+    S, C, P = influence.W.shape
+    V = np.zeros((S, C, P, 2, 2))
+    if influence.covariance is not None:
+        p = np.arange(P)
+        V = (
+            influence.covariance[..., 2:, 2:]
+            .reshape(S, C, P, 2, P, 2)[:, :, p, :, p]
+            .transpose(1, 2, 0, 3, 4)
+        )
+    return MachineRecord(machine, job, influence.W, V)
+
+
+@dataclass(frozen=True, eq=False)
+class MachineType:
+    """Coefficients of a type.
+
+    Attributes
+    ----------
+    speeds, sensors, planes
+        rad/s (S,), names (C) and (P).
+    turn
+        Phases of the median machine, as numbers of size 1, (S, C, P).
+    effects
+        Mean and covariances of the coefficients over these phases, stretched, n = 2 S C P.
+    machines
+        Names (M,) of those it is made of.
+    groups
+        Their means over jobs, as `effects`.
+    odd
+        Records that were left out, and how many times farther they are than what belongs to the type.
+    limit
+        Squared distance within which machines belong to the type; infinite with fewer than `LEAST_GROUPS`.
+    """
+
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    planes: tuple[str, ...]
+    turn: ComplexArray
+    effects: RandomEffects
+    machines: tuple[str, ...]
+    groups: Groups
+    odd: tuple[tuple[MachineRecord, float], ...]
+    limit: float
+
+    @property
+    def mean(self) -> ComplexArray:
+        """Mean coefficients (S, C, P)."""
+        return self.coefficients(self.effects.mean)
+
+    def scatter(self, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """One standard deviation along a mean coefficient, relative to it, and across, in rad, (S, C, P)."""
+        std = np.sqrt(np.diag(covariance)).reshape(*self.turn.shape, 2)
+        along = self.effects.mean.reshape(std.shape)
+        size = np.hypot(along[..., 0], along[..., 1])
+        return std[..., 0] / size, np.arctan2(std[..., 1], size)
+
+    def distance(self, W: ComplexArray, covariance: FloatArray) -> float:
+        """Squared distance of coefficients measured in one job, to be compared with `limit`."""
+        y, error = _rows(W[None], covariance[None], self.turn)
+        one = Groups(y, error, np.ones(1, dtype=np.int64), self.effects.within)
+        return self.effects.distance(y[0], one.covariance(0))
+
+    def influence(self, labels: Labels, machine: str = "") -> Influence:
+        """Coefficients to expect of a machine of this type, with their errors.
+
+        Parameters
+        ----------
+        labels
+            Units and conventions to print in.
+        machine
+            One of `machines`, whose own jobs count then beside the type; else a further one.
+        """
+        mean, covariance = self.effects.mean, self.effects.new_group
+        if machine in self.machines:
+            m = self.machines.index(machine)
+            mean, covariance = self.effects.given(self.groups.mean[m], self.groups.covariance(m))
+        covariance = (covariance + self.effects.within) * self.widening
+        values, vectors = np.linalg.eigh(covariance)
+        columns = self.coefficients((vectors * np.sqrt(values.clip(0.0))).T)
+        found = Influence(self.speeds, self.sensors, self.planes, self.coefficients(mean), labels=labels)
+        return with_parameters(found, columns, 0.0)
+
+    @property
+    def widening(self) -> float:
+        """Times the variance: what a region of two numbers at 95 % needs with so few machines (F over χ²)."""
+        from scipy.special import chdtri, fdtri
+
+        return float(2 * fdtri(2, self.effects.groups - 1, 0.95) / chdtri(2, 0.05))
+
+    def coefficients(self, values: FloatArray) -> ComplexArray:
+        """Stretched (…, n) as coefficients (…, S, C, P)."""
+        return unstretch(values).reshape(*values.shape[:-1], *self.turn.shape) * self.turn
+
+
+def fit_type(
+    records: Sequence[MachineRecord], speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
+) -> MachineType:
+    """Coefficients of a type, from jobs of its machines; those that do not belong are left out and named.
+
+    Raises
+    ------
+    UndeterminedError
+        With fewer than `LEAST_MACHINES` machines that belong together.
+    """
+    _enough([record.machine for record in records])
+    W = np.stack([record.W for record in records])
+    centre = np.median(W.real, axis=0) + 1j * np.median(W.imag, axis=0)
+    turn = np.exp(1j * np.angle(centre))
+    y, error = _rows(W, np.stack([record.covariance for record in records]), turn)
+    far, limit = oddness(grouped(y, error, np.arange(len(records))))
+    fits = far <= limit
+    names = np.array([record.machine for record in records])
+    machines = tuple(dict.fromkeys(names[fits].tolist()))
+    _enough(machines)
+    groups = grouped(y[fits], error[fits], np.array([machines.index(name) for name in names[fits]]))
+    return MachineType(
+        speeds=speeds,
+        sensors=tuple(sensors),
+        planes=tuple(planes),
+        turn=turn,
+        effects=random_effects(groups),
+        machines=machines,
+        groups=groups,
+        odd=tuple((records[j], float(far[j]) / limit) for j in np.flatnonzero(~fits).tolist()),
+        limit=limit,
+    )
+
+
+def why_odd(kind: MachineType, record: MachineRecord, trials: Trials | None = None) -> str:
+    """What would make a record fit its type, in words; "" where nothing tried does.
+
+    Parameters
+    ----------
+    kind
+        The type.
+    record
+        Coefficients that do not fit it.
+    trials
+        The runs that they were measured with; None: not known, and the weights taken to be at 0°.
+    """
+    found = list(_changes(kind, record, trials))
+    least = min(distance for distance, _ in found)
+    return "" if least > kind.limit else listing([text for d, text in found if d <= least + _ALIKE], "or")
+
+
+def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) -> Iterator[tuple[float, str]]:
+    """Squared distance of the coefficients as they would be, and what was changed."""
+    W, V = record.W, record.covariance
+    other = np.conj(W) if trials is None else _lagging(kind, trials)
+    mirror = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    yield kind.distance(other, V * mirror), "its phases were of the other sense (lag for lead)"
+    for names, axis, what in ((kind.sensors, 1, "sensors"), (kind.planes, 2, "planes")):
+        for a, b in combinations(range(len(names)), 2):
+            order = np.arange(len(names))
+            order[[a, b]] = b, a
+            exchanged = kind.distance(np.take(W, order, axis), np.take(V, order, axis))
+            yield exchanged, f"its {what} {names[a]} and {names[b]} were exchanged"
+
+    def turned(theta: float) -> float:
+        return kind.distance(W * np.exp(1j * theta), _spun(V, np.array(theta)))
+
+    theta = _least(turned)
+    degrees = (round(np.degrees(theta)) + 180) % 360 - 180
+    words = f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
+    yield turned(theta) + _ALIKE, words  # it has a number to choose
+
+
+def _lagging(kind: MachineType, trials: Trials) -> ComplexArray:
+    """Coefficients if phases meant the other."""
+    other = estimate_influence(replace(trials, readings=np.conj(trials.readings), covariance=None))
+    return on_grid(other, kind.speeds, kind.sensors, kind.planes).W
+
+
+def _least(distance: Callable[[float], float]) -> float:
+    """The angle, rad, at which a distance is least."""
+    from scipy.optimize import minimize_scalar
+
+    step = np.radians(10.0)
+    start = min(np.arange(0.0, 2 * np.pi, step).tolist(), key=distance)
+    return float(minimize_scalar(distance, bounds=(start - step, start + step), method="bounded").x)
+
+
+def on_grid(
+    influence: Influence, speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
+) -> Influence:
+    """Coefficients at these speeds, of these sensors and planes.
+
+    Raises
+    ------
+    ValueError
+        For one that is not among them.
+    """
+    at = match_speeds(speeds, influence.speeds)
+    for wanted, there in ((sensors, influence.sensors), (planes, influence.planes)):
+        if lacking := [name for name in wanted if name not in there]:
+            raise ValueError(
+                f"there are no coefficients of {listing(lacking, 'and')}; there are some of {listing(there, 'and')}"
+            )
+    rows = [influence.sensors.index(c) for c in sensors]
+    return influence.part(at, rows, [influence.planes.index(p) for p in planes])
+
+
+def _rows(W: ComplexArray, covariance: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (J, S, C, P) over the type's phases as rows (J, n), and covariances (J, n / 2, 2, 2)."""
+    J = len(W)
+    y = stretch((W * np.conj(turn)).ravel()).reshape(J, -1)
+    return y, _spun(covariance, -np.angle(turn)).reshape(J, -1, 2, 2)
+
+
+def _spun(covariance: FloatArray, angle: FloatArray) -> FloatArray:
+    """Covariances (…, 2, 2) of complex numbers that are turned by angles (…), rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.moveaxis(np.array([[c, -s], [s, c]]), (0, 1), (-2, -1))
+    return np.asarray(R @ covariance @ np.swapaxes(R, -1, -2))
+
+
+def _enough(machines: Collection[str]) -> None:
+    if (n := len(set(machines))) < LEAST_MACHINES:
+        raise UndeterminedError(
+            f"{counted(n, 'machine')} with these speeds, sensors and planes: how machines of a type differ "
+            f"shows with {LEAST_MACHINES} or more"
+        )

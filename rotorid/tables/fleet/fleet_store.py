@@ -1,0 +1,240 @@
+"""The store of a fleet: a folder of Parquet tables, FLEET/TABLE/NUMBER.parquet, a number a batch of jobs.
+
+A batch is there as soon as its table `jobs` is, which is renamed last. Writers take turns by a lock that the
+system takes away from one that is killed; the next removes what that has left.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sqlite3
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from balancing.data.conventions import Labels, polar
+from balancing.data.trials import Trials
+from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, Rows, arrow, schema
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LONGEST_WAIT = 600.0
+"""Seconds for the batch of another writer."""
+_BATCH = "batch"
+_SI = {"displacement": "m", "velocity": "m_s", "acceleration": "m_s2"}
+
+
+class Known(NamedTuple):
+    """Ids of jobs, and SHA-256 of all files that were read for them."""
+
+    jobs: frozenset[str]
+    files: frozenset[str]
+
+
+@dataclass(frozen=True)
+class FleetStore:
+    """Tables of the jobs of many machines.
+
+    Attributes
+    ----------
+    folder
+        It is made with the first batch.
+    """
+
+    folder: Path
+
+    def check(self, *, new: bool = False) -> None:
+        """Refuse a folder that is no store; `new`: one that is not there, or empty, becomes one.
+
+        Raises
+        ------
+        ValueError
+            Saying what it is.
+        """
+        arrow()
+        there = self.folder.exists()
+        if not there and not new:
+            raise ValueError(f"{self.folder}: there is no such fleet; `rotorid fleet add` makes one")
+        other = there and (not self.folder.is_dir() or any(self.folder.glob("[!.]*")) or not new)
+        if other and not (self.folder / "jobs").is_dir():
+            raise ValueError(f"{self.folder}: this is no fleet, which has a folder jobs; name a new folder")
+
+    def batches(self) -> list[str]:
+        """Numbers of the batches that are whole, in the order in which they were added."""
+        return sorted(path.stem for path in (self.folder / "jobs").glob("[!.]*.parquet"))
+
+    def files(self, *names: str) -> list[Path]:
+        """The files of these tables."""
+        return [self._file(name, batch) for name in names for batch in self.batches()]
+
+    def known(self) -> Known:
+        """What has been added so far."""
+        jobs, files = set[str](), set[str]()
+        for batch in self.batches():
+            table = self._read("jobs", batch, columns=["job", "files"])
+            jobs.update(table["job"].to_pylist())
+            files.update(table["files"].combine_chunks().flatten().to_pylist())
+        return Known(frozenset(jobs), frozenset(files))
+
+    def append(self, rows: Rows) -> int:
+        """Add a batch: all of it or nothing; gives the number of jobs that were new.
+
+        Raises
+        ------
+        OSError
+            Where it cannot be written.
+        """
+        pa = arrow()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with self._alone():
+            self._remove_leftovers()
+            known = pa.array(self.known().jobs, pa.string())
+            batch = f"{max(map(int, self.batches()), default=0) + 1:06d}"
+            count = 0
+            for name, columns in TABLES.items():
+                own = schema(name)
+                cells = [pa.array(rows[name][c], own.field(c).type, from_pandas=True) for c in columns]
+                table = pa.Table.from_arrays(cells, schema=own)
+                table = table.filter(pa.compute.invert(pa.compute.is_in(table["job"], known)))
+                count = len(table)  # of jobs, the last
+                (self.folder / name).mkdir(exist_ok=True)
+                pa.parquet.write_table(table, self._file(name, f".{batch}", ".tmp"), compression="zstd")
+            for name in TABLES if count else ():
+                os.replace(self._file(name, f".{batch}", ".tmp"), self._file(name, batch))
+        return count
+
+    def table(
+        self,
+        name: str,
+        *,
+        jobs: Collection[str] | None = None,
+        machine_type: str | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> pd.DataFrame:
+        """Rows of a table, those of superseded jobs left out.
+
+        Parameters
+        ----------
+        name
+            One of `TABLES`.
+        jobs, machine_type
+            Only those of these jobs, and of this type.
+        columns
+            Only these; default: all.
+
+        Raises
+        ------
+        ValueError
+            For a store that a newer version has written.
+        """
+        import pandas as pd
+
+        batches = [
+            self._read("jobs", batch).to_pandas().assign(**{_BATCH: batch}) for batch in self.batches()
+        ]
+        own: pd.DataFrame = pd.concat(batches) if batches else schema("jobs").empty_table().to_pandas()
+        own = own.drop_duplicates(["machine", "path"], keep="last", ignore_index=True)
+        if jobs is not None:
+            own = own[own["job"].isin(list(jobs))]
+        if machine_type is not None:
+            own = own[own["machine_type"] == machine_type]
+        if name == "jobs" or own.empty:
+            there = own if name == "jobs" else schema(name).empty_table().to_pandas()
+            return there.reset_index(drop=True)[list(columns or TABLES[name])]
+        parts = [
+            self._read(name, str(batch), columns=columns, filters=[("job", "in", list(part))])
+            for batch, part in own.groupby(_BATCH)["job"]
+        ]
+        found: pd.DataFrame = arrow().concat_tables(parts).to_pandas()
+        return found
+
+    def _file(self, name: str, batch: str, ending: str = ".parquet") -> Path:
+        return self.folder / name / f"{batch}{ending}"
+
+    def _read(self, name: str, batch: str, **how: Any) -> Any:  # noqa: ANN401 - as pyarrow takes and gives it
+        """One table of one batch."""
+        path = self._file(name, batch)
+        try:
+            table = arrow().parquet.read_table(path, partitioning=None, **how)
+        except arrow().ArrowInvalid as error:
+            raise ValueError(
+                f"{path}: expected a whole Parquet table; remove the batch and add it again"
+            ) from error
+        version = (table.schema.metadata or {}).get(b"rotorid_fleet", b"").decode()
+        if version != VERSION:
+            raise ValueError(f"{path}: expected tables of version {VERSION}, not {version!r}: update rotorid")
+        return table
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Hold the lock of the store: SQLite has one on every system, and no other part here."""
+        try:
+            lock = sqlite3.connect(self.folder / ".lock", timeout=LONGEST_WAIT, isolation_level=None)
+            lock.execute("BEGIN EXCLUSIVE")
+        except sqlite3.Error as error:
+            raise ValueError(f"{self.folder}: cannot be written: {error}") from error
+        with contextlib.closing(lock):
+            yield
+
+    def _remove_leftovers(self) -> None:
+        whole = {f"{batch}.parquet" for batch in self.batches()}
+        for name in TABLES:
+            for path in (self.folder / name).glob("*"):
+                if path.name not in whole and path.suffix in (".tmp", ".parquet"):
+                    path.unlink()
+
+
+def trials_of(store: FleetStore, job: str) -> Trials:
+    """The trial runs of a job as they were read, in SI.
+
+    Raises
+    ------
+    ValueError
+        For a job that the store has not, or that was superseded.
+    """
+    jobs, readings, weights = (store.table(name, jobs=[job]) for name in ("jobs", "readings", "weights"))
+    if jobs.empty:
+        raise ValueError(f"{store.folder}: there is no job {job!r}, or a newer one stands in its place")
+    readings, weights = (frame[frame["kind"] == "trial"] for frame in (readings, weights))
+    (runs, r), (speeds, s), (sensors, c) = (
+        _numbered(readings[name]) for name in ("run", "speed_rad_s", "sensor")
+    )
+    planes, p = _numbered(weights["plane"])
+    k = readings["repeat"].to_numpy() - 1
+    place = k, r, s, c
+    values = np.full((k.max() + 1, len(runs), len(speeds), len(sensors)), np.nan, dtype=complex)
+    values[place] = polar(readings["amplitude"], np.radians(readings["phase_deg"]))
+    covariance = None
+    if readings["std_re"].notna().all():
+        covariance = np.full((2, 2, *values.shape), np.nan)
+        covariance[0, 0][place], covariance[1, 1][place] = readings["std_re"] ** 2, readings["std_im"] ** 2
+        covariance[0, 1][place] = covariance[1, 0][place] = readings["cov_re_im"]
+    mounted = np.zeros((len(runs), len(planes)), dtype=complex)
+    row = [runs.index(run) for run in weights["run"]]
+    mounted[row, p] = polar(weights["weight"], np.radians(weights["angle_deg"]))
+    unbalances = jobs["weight_kind"][0] == "unbalance"
+    return Trials(
+        runs=tuple(runs),
+        speeds=np.array(speeds),
+        sensors=tuple(sensors),
+        planes=tuple(planes),
+        readings=values,
+        weights=mounted,
+        covariance=covariance,
+        labels=Labels(
+            vibration_unit=_SI.get(jobs["quantity"][0], jobs["vibration_unit"][0]),
+            weight_unit="kg_m" if unbalances else "kg",
+        ),
+    )
+
+
+def _numbered(column: pd.Series[Any]) -> tuple[list[Any], Any]:
+    """Different values in the order in which they come, and the index of each row's."""
+    codes, values = column.factorize()
+    return list(values), codes

@@ -1,0 +1,177 @@
+"""`fleet fit`: coefficients of a type of machines, how machines differ, and which are odd."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import counted, figures
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from balancing.data.conventions import Labels
+    from rotorid.base.arrays import FloatArray
+    from rotorid.workflows.fleet.type_records import KnownType
+
+
+@dataclass(frozen=True)
+class FleetFitOptions:
+    """Options of `fleet fit`.
+
+    Attributes
+    ----------
+    machine_type : NAME
+        The type.
+    """
+
+    machine_type: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TypeFound(Outcome):
+    """Coefficients of a type.
+
+    Attributes
+    ----------
+    known
+        As the store knows it.
+    labels
+        Units to print in, those of most of its jobs; phases lead.
+    """
+
+    known: KnownType
+    labels: Labels
+
+    @property
+    def _columns(self) -> tuple[Column, ...]:
+        kind, found = self.known.kind, self.known.kind.influence(self.labels).to_frame()
+        (along, across), (run, turn) = map(kind.scatter, (kind.effects.between, kind.effects.within))
+        angle = "{:.1f}".format
+        return (
+            Column("speed_rpm", found["speed_rpm"].tolist(), "{:.6g}".format, "rpm"),
+            Column("sensor", found["sensor"].tolist(), str),
+            Column("plane", found["plane"].tolist(), str),
+            Column(
+                "influence",
+                found["influence"].tolist(),
+                partial(figures, digits=3),
+                kind.influence(self.labels).unit,
+            ),
+            Column("phase_deg", found["phase_deg"].tolist(), angle, "°"),
+            Column("between_percent", 100 * along.ravel(), angle, "± % between"),
+            Column("between_deg", np.degrees(across.ravel()), angle, "± °"),
+            Column("within_percent", 100 * run.ravel(), angle, "± % within"),
+            Column("within_deg", np.degrees(turn.ravel()), angle, "± °"),
+        )
+
+    @property
+    def _odd(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "machine": record.machine,
+                "job": record.job,
+                "path": self.known.jobs["path"][record.job],
+                "times_the_limit": float(np.sqrt(far)),
+                "reason": reason or None,
+            }
+            for (record, far), reason in zip(self.known.kind.odd, self.known.reasons, strict=True)
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; scatters are one standard deviation, percent of the mean and degrees."""
+        kind = self.known.kind
+        return {
+            "machine_type": self.known.name,
+            "machines": list(kind.machines),
+            "jobs": len(self.known.jobs) - len(kind.odd),
+            "unit": kind.influence(self.labels).unit,
+            "phase": "lead",
+            "angles": "with rotation",
+            "rows": rows(self._columns),
+            "odd": self._odd,
+            "left_out": self.known.lacking,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed, sensor and plane."""
+        return frame(self._columns)
+
+    @property
+    def answer(self) -> Answer:
+        """How machines differ, and which are odd; the coefficients."""
+        kind, jobs = self.known.kind, len(self.known.jobs) - len(self.known.kind.odd)
+        between, within = (
+            _typical(*kind.scatter(part)) for part in (kind.effects.between, kind.effects.within)
+        )
+        again = f"; from run to run of one {within}" if jobs > len(kind.machines) else ""
+        head = f"{self.known.name}: {counted(len(kind.machines), 'machine')}, {counted(jobs, 'job')}."
+        once = "" if again else "each machine was balanced once: nothing tells how one changes by itself"
+        odd = tuple(map(_odd_words, self._odd))
+        return Answer(
+            f"{head} Coefficients differ between machines {between}{again}.",
+            text(self._columns, left=3, width=COLUMNS),
+            warnings=odd,
+            notes=((once,) if once else ()) + self.known.notes,
+        )
+
+    def figure(self) -> Figure:
+        """Coefficients of all machines over their mean, each plane and sensor for itself."""
+        from rotorid.workflows.fleet.type_picture import type_picture
+
+        return type_picture(self.known)
+
+
+def _odd_words(one: Mapping[str, Any]) -> str:
+    """What an odd machine is, and what would make it fit."""
+    why = f"it would fit if {one['reason']}" if one["reason"] else "nothing that was tried makes it fit"
+    times = f"{one['times_the_limit']:.2g} times as far off as machines of a type are"
+    return f"{one['machine']} ({one['path']}) is odd, {times}, and was left out: {why}"
+
+
+def _typical(along: FloatArray, across: FloatArray) -> str:
+    """Root mean square over the coefficients, in words."""
+    percent, degrees = 100 * np.sqrt(np.mean(along**2)), np.degrees(np.sqrt(np.mean(across**2)))
+    if not along.any():
+        return "no more than the errors of their runs explain"
+    return f"by {figures(float(percent), 2)} % and {figures(float(degrees), 2)}°"
+
+
+@workflow
+def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
+    """Coefficients of a type: their mean, how machines and runs differ, and the machines that are odd.
+
+    Parameters
+    ----------
+    fleet
+        Folder of the store.
+    options
+        The type.
+
+    Raises
+    ------
+    ValueError
+        For a fleet or a type that are not there; UndeterminedError with fewer than three machines.
+    """
+    from balancing.data.conventions import Labels
+    from rotorid.tables.fleet.fleet_store import FleetStore
+    from rotorid.tables.reader.units import vibration, weight
+    from rotorid.workflows.fleet.type_records import known_type
+
+    store = FleetStore(Path(fleet))
+    known = known_type(store, options.machine_type)
+    read, mounted = (str(known.jobs[name].mode()[0]) for name in ("vibration_unit", "weight_unit"))
+    labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
+    return TypeFound(
+        known=known, labels=labels, provenance=provenance(store.files("jobs", "coefficients"), options)
+    )

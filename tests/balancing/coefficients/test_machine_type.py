@@ -1,0 +1,152 @@
+"""Coefficients of a type: what the example prints for many types, with few; reasons of odd machines."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from balancing import ReadingErrors, Trials, UndeterminedError, estimate_influence
+from balancing.coefficients.machine_type import MachineRecord, fit_type, on_grid, record_of, why_odd
+from balancing.data.conventions import Labels
+
+PATH = Path(__file__).parents[3] / "examples" / "coverage_fleet.py"
+
+
+@pytest.fixture(scope="module")
+def example():
+    spec = importlib.util.spec_from_file_location("coverage_fleet", PATH)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["coverage_fleet"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def lower(share, n, deviations=3.0):
+    return share - deviations * np.sqrt(share * (1 - share) / n)
+
+
+def test_first_shots_hold_what_they_say(example):
+    found = []
+    for seed in range(8):
+        rng = np.random.default_rng([7, seed])
+        drawn = example.draw(rng, "each coefficient")
+        known = fit_type(drawn.records, *drawn[2:])
+        found += [example.shots(rng, drawn, known, m)[0] for m in range(50, 62)]
+    found = [shot for shot in found if shot is not None]
+    assert len(found) > 60  # of 96; two types have planes that act alike
+    left, weights, readings, *_ = np.array(found, dtype=float).T
+    assert np.median(left) < 0.32
+    assert weights.mean() > lower(0.95, len(found))
+    assert 0.90 < readings.mean() < 0.99
+
+
+def test_odd_machines_are_found_with_their_reason_and_few_others(example):
+    told, others = [], []
+    for seed in range(6):
+        rng = np.random.default_rng([8, seed])
+        own, rest = example.odd_machines(rng, example.draw(rng, "each coefficient"))
+        told += own
+        others += rest
+    assert np.mean([found and why for _, found, why in told]) >= 0.88  # 16 of 18
+    assert np.mean(others) < 0.02
+
+
+def drawn_type(seed=1, machines=30, S=1, C=2, P=2, noise=0.02):
+    """Machines with trial weights at odd angles, from runs."""
+    rng = np.random.default_rng(seed)
+    cn = lambda *shape: rng.standard_normal(shape) + 1j * rng.standard_normal(shape)  # noqa: E731
+    W = cn(S, C, P) * (1 + 0.1 * cn(machines, S, C, P))
+    T = np.vstack((np.zeros(P), np.diag(0.7 * np.exp(1j * np.arange(1, P + 1)))))
+    each = []
+    for m in range(machines):
+        Y = np.einsum("scp,rp->rsc", W[m], T) + cn(S, C)
+        Y = Y * (1 + noise * cn(*Y.shape))
+        each.append(
+            Trials(
+                tuple("abc"[: P + 1]),
+                100.0 * np.arange(1, S + 1),
+                ("x", "y", "z")[:C],
+                ("L", "R")[:P],
+                Y,
+                T,
+                errors=ReadingErrors(noise, noise),
+            )
+        )
+    return each
+
+
+def records(runs):
+    return [record_of(f"m{k}", str(k), estimate_influence(trials)) for k, trials in enumerate(runs)]
+
+
+def test_lag_is_told_where_trial_weights_stood_at_other_angles():
+    runs = drawn_type()
+    lag = Trials(
+        *(getattr(runs[4], name) for name in ("runs", "speeds", "sensors", "planes")),
+        np.conj(runs[4].readings),
+        runs[4].weights,
+        errors=runs[4].errors,
+    )
+    every = records([*runs[:4], lag, *runs[5:]])
+    kind = fit_type(every, runs[0].speeds, runs[0].sensors, runs[0].planes)
+    assert [record.machine for record, _ in kind.odd] == ["m4"]
+    assert "lag for lead" in why_odd(kind, every[4], lag)
+    assert "lag for lead" not in why_odd(kind, every[4])  # conj(W) is another thing
+
+
+@pytest.mark.parametrize(("degrees", "words"), [(84, "lagged 84° more"), (-120, "led 120° more")])
+def test_a_keyphasor_mark_is_told_with_its_angle(degrees, words):
+    runs = drawn_type(2)
+    every = records(runs)
+    W = every[7].W * np.exp(1j * np.radians(degrees))
+    every[7] = every[7]._replace(W=W)
+    kind = fit_type(every, runs[0].speeds, runs[0].sensors, runs[0].planes)
+    told = why_odd(kind, every[7])
+    number = words.split()[1].rstrip("°")
+    near = [words.replace(number, str(int(number) + off)) for off in range(-8, 9)]
+    assert [record.machine for record, _ in kind.odd] == ["m7"]
+    assert any(one in told for one in near)
+
+
+def test_planes_that_were_exchanged_are_told():
+    runs = drawn_type(3)
+    every = records(runs)
+    every[9] = every[9]._replace(W=every[9].W[..., ::-1], covariance=every[9].covariance[:, :, ::-1])
+    kind = fit_type(every, runs[0].speeds, runs[0].sensors, runs[0].planes)
+    assert "planes L and R were exchanged" in why_odd(kind, every[9])
+    broken = every[9]._replace(W=every[9].W * 30)
+    assert why_odd(kind, broken) == ""
+
+
+def test_scatter_is_what_was_drawn_and_own_jobs_narrow_it():
+    runs = drawn_type(4, machines=400, noise=0.002)
+    every = records(runs)
+    kind = fit_type(every, runs[0].speeds, runs[0].sensors, runs[0].planes)
+    along, across = kind.scatter(kind.effects.between)
+    assert along == pytest.approx(0.1, rel=0.15)
+    assert across == pytest.approx(0.1, rel=0.15)
+    new, own = kind.influence(Labels()), kind.influence(Labels(), "m3")
+    assert np.all(own.covariance.trace(axis1=-2, axis2=-1) < new.covariance.trace(axis1=-2, axis2=-1))
+    assert np.abs(own.W - every[3].W).max() < 0.5 * np.abs(new.W - every[3].W).max()
+
+
+def test_few_machines_are_refused_and_widen_what_is_said():
+    runs = drawn_type(5, machines=8)
+    grid = runs[0].speeds, runs[0].sensors, runs[0].planes
+    every = records(runs)
+    with pytest.raises(UndeterminedError, match=r"2 machines with these speeds.*3 or more"):
+        fit_type(every[:2], *grid)
+    with pytest.raises(UndeterminedError, match="0 machines"):
+        fit_type([], *grid)
+    assert fit_type(every, *grid).widening == pytest.approx(2 * 4.7374 / 5.9915, rel=1e-3)  # F(2, 7)
+    with pytest.raises(ValueError, match="no coefficients of q; there are some of x and y"):
+        on_grid(estimate_influence(runs[0]), runs[0].speeds, ("x", "q"), ("L",))
+
+
+def test_a_record_has_its_own_variances():
+    influence = estimate_influence(drawn_type(6, machines=1)[0])
+    record = record_of("m", "j", influence)
+    assert isinstance(record, MachineRecord)
+    assert record.covariance[0, 1, 1] == pytest.approx(influence.covariance[0, 1, 4:6, 4:6])

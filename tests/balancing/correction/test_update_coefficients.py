@@ -1,0 +1,116 @@
+"""Coefficients brought up to date by runs: closed forms, limits, and the test whether runs fit."""
+
+import numpy as np
+import pytest
+
+from balancing import Influence, ReadingErrors, Trials, correct
+from balancing.coefficients.coefficients_from_model import with_parameters
+from balancing.coefficients.run_errors import marginal
+from balancing.correction.update_coefficients import OWN, update
+
+SPEEDS = np.array([100.0, 200.0])
+
+
+def cn(rng, *shape):
+    return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+
+def prior(std=0.3, S=1, C=1, P=1, seed=1, alike=False):
+    """Coefficients with independent errors, or one error for all."""
+    rng = np.random.default_rng(seed)
+    W = cn(rng, S, C, P)
+    n = W.size
+    columns = std * np.concatenate((np.eye(n), 1j * np.eye(n))).reshape(2 * n, S, C, P)
+    if alike:
+        columns = std * np.array([1, 1j])[:, None, None, None] * np.ones((S, C, P))
+    known = Influence(SPEEDS[:S], tuple("abc"[:C]), tuple("PQ"[:P]), W)
+    return with_parameters(known, columns, 0.0)
+
+
+def runs(known, W, D, T, rng, floor=0.05):
+    S = len(W)
+    Y = np.einsum("scp,rp->rsc", W, np.asarray(T) - D)
+    Y = Y + floor * cn(rng, *Y.shape)
+    names = tuple(f"run {r}" for r in range(len(Y)))
+    return Trials(names, SPEEDS[:S], known.sensors, known.planes, Y, T, errors=ReadingErrors(floor=floor))
+
+
+def test_one_trial_run_is_the_weighted_mean():
+    known, rng = prior(), np.random.default_rng(2)
+    trials = runs(known, known.W + 0.2, np.array([1.0]), [[0.0], [0.8j]], rng)
+    found, _ = update(known, trials)
+    measured = (trials.mean[1] - trials.mean[0]) / 0.8j
+    variance = 2 * 0.05**2 / 0.8**2
+    share = 0.3**2 / (0.3**2 + variance)
+    assert found.W[0, 0, 0] == pytest.approx(known.W[0, 0, 0] * (1 - share) + measured[0, 0] * share)
+    assert found.covariance[0, 0, 2, 2] == pytest.approx((1 + OWN) / (1 / 0.3**2 + 1 / variance))
+    # Y0 is read directly, and through the second run
+    through = 0.05**2 + 0.8**2 * 0.3**2
+    assert found.covariance[0, 0, 0, 0] == pytest.approx((1 + OWN) / (1 / 0.05**2 + 1 / through))
+
+
+def test_a_bare_run_leaves_the_coefficients_and_is_the_baseline():
+    known, rng = prior(S=2, C=3, P=2), np.random.default_rng(2)
+    trials = runs(known, known.W, np.array([1.0, 2.0]), [[0.0, 0.0]], rng)
+    found, chance = update(known, trials)
+    assert chance == 1.0
+    assert pytest.approx(known.W) == found.W
+    assert found.baseline == pytest.approx(trials.mean[0])
+    assert found.covariance[..., 2:, 2:] == pytest.approx((1 + OWN) * known.covariance[..., 2:, 2:])
+
+
+def test_without_knowledge_it_is_the_measurement():
+    known, rng = prior(std=1e4, S=2, C=3, P=2), np.random.default_rng(3)
+    T = [[0, 0], [0.5, 0], [0, 0.7j], [0.3, 0.2]]
+    trials = runs(known, known.W, np.array([1.0, 2.0]), T, rng)
+    found, _ = update(known, trials)
+    A = np.column_stack((np.ones(len(T)), np.array(T)))
+    alone = np.linalg.lstsq(A, trials.mean.reshape(len(T), -1), rcond=None)[0].reshape(3, 2, 3)
+    assert pytest.approx(np.moveaxis(alone[1:], 0, -1), rel=1e-6) == found.W
+    assert found.baseline == pytest.approx(alone[0], rel=1e-6)
+
+
+def test_runs_one_after_the_other_are_all_at_once():
+    known, rng = prior(S=2, C=2, P=2), np.random.default_rng(4)
+    trials = runs(known, known.W + 0.1, np.array([1.0, 2.0]), [[0, 0], [0.5, 0], [0, 0.7j]], rng)
+
+    def part(which):
+        Y, T = trials.mean[which], trials.weights[which]
+        return Trials(
+            tuple(map(str, which)), trials.speeds, trials.sensors, trials.planes, Y, T, errors=trials.errors
+        )
+
+    once, _ = update(known, trials)
+    first, _ = update(known, part([0, 1]))
+    twice, _ = update(first, part([2]))
+    assert pytest.approx(once.W) == twice.W
+    assert twice.baseline == pytest.approx(once.baseline)
+    assert twice.covariance == pytest.approx(once.covariance)
+
+
+def test_a_plane_that_was_not_tried_follows_the_one_that_was():
+    known, rng = prior(P=2, alike=True), np.random.default_rng(5)
+    trials = runs(known, known.W + 0.4, np.array([1.0, 2.0]), [[0, 0], [5.0, 0]], rng, floor=0.01)
+    found, _ = update(known, trials)
+    assert pytest.approx(known.W + 0.4, abs=0.02) == found.W
+
+
+def test_little_is_added_to_what_is_known_so_that_readings_can_be_weighed():
+    known, rng = prior(S=2, C=2, P=2, alike=True), np.random.default_rng(6)
+    trials = runs(known, known.W, np.array([1.0, 2.0]), [[0, 0], [0.5, 0]], rng)
+    found, _ = update(known, trials)
+    whole = marginal(None, found.parameters)
+    assert found.covariance == pytest.approx((1 + OWN) * whole)
+    assert correct(found).covariance is not None
+
+
+def test_chance_is_that_of_machines_of_the_type_and_small_for_others():
+    rng, chances = np.random.default_rng(7), []
+    known = prior(S=1, C=2, P=2)
+    T = [[0, 0], [0.5, 0], [0, 0.7j]]
+    for _ in range(300):
+        W = known.W + 0.3 * cn(rng, *known.W.shape)
+        chances.append(update(known, runs(known, W, np.array([1.0, 2.0]), T, rng))[1])
+    assert np.mean(np.array(chances) < 0.1) == pytest.approx(0.1, abs=0.052)  # three deviations
+    other = update(known, runs(known, -known.W + 1, np.array([1.0, 2.0]), T, rng))[1]
+    assert other < 1e-3

@@ -1,0 +1,8 @@
+"""Commands over fleets say what is stored: see `tests/golden`."""
+
+import pytest
+
+from golden.checks import checks
+
+pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
+test_as_stored = checks("fleet")
