@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-VERSION = "1"
+from rotorid.base.versions import SCHEMA_VERSION
+
+VERSION = str(SCHEMA_VERSION)
 _JOB = {"job": "text"}
 _READING = {"speed_rad_s": "number", "sensor": "text"}
 _WEIGHT = {"plane": "text", "weight": "number", "angle_deg": "number"}
@@ -71,7 +73,7 @@ def schema(name: str) -> Any:  # noqa: ANN401 - of pyarrow
         "date": pa.date32(),
     }
     columns = [(column, kinds[kind]) for column, kind in TABLES[name].items()]
-    return pa.schema(columns, metadata={"rotorid_fleet": VERSION})
+    return pa.schema(columns, metadata={"schema_version": VERSION})
 
 
 def no_rows() -> Rows:
