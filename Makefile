@@ -70,10 +70,11 @@ test-latest:
 	rm -rf $(LATEST_VENV)
 	$(MAKE) test VENV=$(LATEST_VENV) CONSTRAINTS=
 
-# The lowest versions that pyproject.toml promises, on the lowest Python; without three stored outputs: two have the
-# words of the tested typer, and one has two modes at the same speed, which rounding puts in order.
+# The lowest versions that pyproject.toml promises, on the lowest Python; without studies, which need an extra, and three
+# stored outputs: two have the words of the tested typer, and one has two modes at the same speed, which rounding puts
+# in order.
 test-lowest: $(LOWEST_VENV)/lowest.txt
-	PYTEST_ADDOPTS="-k 'not (no-such-option or no-such-choice or campbell-model-job)'" $(MAKE) test VENV=$(LOWEST_VENV) PYTHON=$(LOWEST_PYTHON) CONSTRAINTS=$< GROUPS='test docs'
+	PYTEST_ADDOPTS="-k 'not (no-such-option or no-such-choice or campbell-model-job or study)'" $(MAKE) test VENV=$(LOWEST_VENV) PYTHON=$(LOWEST_PYTHON) CONSTRAINTS=$< GROUPS='test docs'
 
 $(LOWEST_VENV)/lowest.txt: pyproject.toml constraints.txt .ci/lowest.py
 	mkdir -p $(@D)

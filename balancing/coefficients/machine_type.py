@@ -249,8 +249,9 @@ def on_grid(
     at = match_speeds(speeds, influence.speeds)
     for wanted, there in ((sensors, influence.sensors), (planes, influence.planes)):
         if lacking := [name for name in wanted if name not in there]:
+            known = listing(there, "and")
             raise ValueError(
-                f"there are no coefficients of {listing(lacking, 'and')}; there are some of {listing(there, 'and')}"
+                f"there are no coefficients of {listing(lacking, 'and')}; there are some of {known}"
             )
     rows = [influence.sensors.index(c) for c in sensors]
     return influence.part(at, rows, [influence.planes.index(p) for p in planes])

@@ -140,7 +140,9 @@ def correct(  # noqa: PLR0913
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
     covariance, dof = (None, None) if errors is None else errors.weights(fitted)
-    if method == "weighted" and covariance is not None and influence.run_errors.origin != "estimated":
+    tested = start.parameters is not None and start.parameters[..., 0].any()  # docs/coverage_fleet.md
+    estimated = influence.run_errors.origin == "estimated"
+    if method == "weighted" and covariance is not None and not (tested or estimated):
         small = "" if unclear else uncertain(D, covariance)
         unclear_regions = (small,) if small else ()
     result = Correction(

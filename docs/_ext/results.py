@@ -28,11 +28,12 @@ ANSWERS = (
         "unbalance-model-job",
         "split-holes",
     ),
-    *("fleet-add", "fleet-show"),
+    *("fleet-add", "fleet-show", "fleet-fit"),
     *("split-drill", "trial-weight", "tolerance", "critical-rotor23", "campbell-compressor"),
     *(
         "response-compressor",
         "influence-compressor",
+        "study",
         "bearings",
         "motion",
         "periodic-jumps",

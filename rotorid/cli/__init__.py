@@ -39,6 +39,7 @@ from rotorid.cli.commands import (
     vectors,
 )
 from rotorid.cli.fleet import fleet
+from rotorid.cli.study import study
 from rotorid.cli.terminal import markup_mode
 from rotorid.cli.verbose import verbosely
 from rotorid.cli.worksheet import worksheet
@@ -67,6 +68,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "campbell": campbell.campbell,
         "response": response.response,
         "influence": influence.influence,
+        "study": study,
     },
     "Reduce rotors, let them move": {
         "reduce": reduce.reduce,

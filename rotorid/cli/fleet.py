@@ -36,7 +36,7 @@ def _add(
 
     Example: rotorid fleet add fans sample_data/fleet
     """
-    to.deliver("jobs", lambda: fleet_add(fleet, trees, options))
+    to.deliver("reading jobs", lambda: fleet_add(fleet, trees, options))
 
 
 def _show(fleet: FleetArgument, options: FleetShowOptions, to: Destination) -> None:
@@ -52,9 +52,7 @@ def _fit(fleet: FleetArgument, options: FleetFitOptions, to: Destination) -> Non
 
     Example: rotorid fleet fit fans --type fan-132
 
-    Example: rotorid balance job.toml --type fans:fan-132
-
-    The second balances a machine of the type from its baseline alone.
+    With `balance --type FLEET:TYPE` a machine of the type is balanced from its baseline alone.
     """
     to.deliver("coefficients", lambda: fleet_fit(fleet, options))
 

@@ -10,12 +10,14 @@ from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.models.small_model_file import SMALL_MODEL
 from rotorid.tables.reader.settings_keys import Key, file_schema
 from rotorid.tables.rotor.rotor_file import ROTOR
+from rotorid.tables.study_file import STUDY
 from rotorid.tables.waveforms.waveform_keys import WAVEFORMS
 
 FILES: dict[str, tuple[str, Sequence[Key]]] = {
     "job": ("Job file of rotorid", JOB),
     "rotor": ("Rotor file of rotorid", ROTOR),
     "small": ("Small model for motion of rotorid", SMALL_MODEL),
+    "study": ("Study file of rotorid", STUDY),
     "waveforms": ("Waveforms file of rotorid", WAVEFORMS),
 }
 """What the file is, and its keys, by the names that `rotorid schema` takes."""

@@ -22,6 +22,8 @@ from rotorid.workflows.response import ResponseOptions, RotorResponse, response
 from rotorid.workflows.result_provenance import Outcome
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.split import SplitOptions, SplitWeight, split
+from rotorid.workflows.studies.study import StudyOptions, study
+from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
 from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
 from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
 from rotorid.workflows.unbalance import UnbalanceAtStations, UnbalanceOptions, unbalance
@@ -72,6 +74,9 @@ __all__ = [
     "Simulation",
     "SplitOptions",
     "SplitWeight",
+    "StudiedMachines",
+    "StudiedStarts",
+    "StudyOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
     "TrialWeights",
@@ -98,6 +103,7 @@ __all__ = [
     "runup",
     "simulate",
     "split",
+    "study",
     "tolerance",
     "trial_weight",
     "unbalance",

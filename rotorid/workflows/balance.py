@@ -202,6 +202,7 @@ class Balance(Parts):
             "trade_off": self.curve,
             "history": self.history,
             "next_trial": self.next_trial,
+            "of_type": self.of_type,
         }
 
     @property
@@ -212,8 +213,6 @@ class Balance(Parts):
         weights, sound = self.result.answer, self.result.sound
         if needs_trial_run(self.job, self.influence):
             weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-        if self.of_type is not None and self.of_type.foreign:
-            weights, sound = replace(weights, judgement=self.of_type.foreign), False
         if sound and (self.check or self.mounted):
             weights = replace(weights, judgement="")
         if self.mounted:
@@ -318,6 +317,8 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     influence = known[0]
     planes, subsets = _planes(read, known, options)
     result = _correct(read, known, planes, options)
+    if of_type is not None:
+        result = of_type.judged(result)
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
     mounted = _mount(result, read, known, options) if options.split else None

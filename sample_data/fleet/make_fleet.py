@@ -1,7 +1,8 @@
 """Draws nine fans of one type, balanced in two planes: python sample_data/fleet/make_fleet.py
 
 writes fan-132/MACHINE/ with job.toml, runs.csv, weights.csv, and where there was a check run check.csv and,
-mostly, check_weights.csv. The last has nothing but its baseline. Everything is fixed by SEED; README.md says how.
+mostly, check_weights.csv. The last has nothing but its baseline. Everything is fixed by SEED; README.md says
+how.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ PLANES, SENSORS, SPEEDS_RPM = ("DE", "NDE"), ("A", "B"), (1480, 2960)
 SIZE = [[[0.42, 0.18], [0.16, 0.47]], [[0.95, 0.61], [0.55, 1.08]]]
 LEAD = [[[-35, -50], [-48, -38]], [[-118, -140], [-137, -121]]]
 OF_ALL, OF_EACH, READING = (0.10, 12.0), (0.05, 6.0), 0.005
-"""Standard deviations, relative and in degrees: of all coefficients of a machine alike, of each by itself; of a
-reading, relative."""
+"""Standard deviations, relative and in degrees: of all coefficients of a machine alike, of each by itself; of
+a reading, relative."""
 
 
 class Fan(NamedTuple):

@@ -110,7 +110,7 @@ def test_every_command_and_every_option_is_on_its_page(built):
     described = list(command_pages.all_commands())
     assert len(described) >= 13
     for name, command in described:
-        found = re.search(rf'<section id="rotorid-{name}">(.*?)</section>', text, re.DOTALL)
+        found = re.search(rf'<section id="rotorid-{name.replace(" ", "-")}">(.*?)</section>', text, re.DOTALL)
         assert found, name
         terms = " ".join(text_of(term) for term in re.findall(r"<dt>(.*?)</dt>", found[1], re.DOTALL))
         words = set(re.split(r"[\s,]+", terms))
@@ -288,7 +288,8 @@ def test_measured_times_are_shown_and_differing_answers_are_refused():
 
 def test_the_answers_of_all_commands_are_counted_and_fit_a_terminal(built):
     counted = [results.answer_row(name) for name in results.ANSWERS]
-    assert {row[0].split()[1] for row in counted} == {
+    typed = [row[0].removeprefix("`rotorid ") for row in counted]
+    assert {re.match(r"(fleet )?\S+", words)[0] for words in typed} == {
         name for name, _ in command_pages.all_commands() if name not in ("schema", "worksheet")
     }
     text = text_of(page(built, "commands"))

@@ -125,6 +125,9 @@ critical-calibrated         critical sample_data/calibration/calibrated.toml -n 
 reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
+study                       study sample_data/study/study.toml --samples 50 --plot study.png
+study-starts                study sample_data/study/starts.toml --samples 8 --output minima.csv
+study-misspelt              study misspelt.toml
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
 influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
 vectors                     vectors sample_data/waveforms/waveforms.toml --orders 1,2 --output runs.csv
@@ -366,8 +369,20 @@ COMMANDS = (
         "tolerance",
         "fleet add",
         "fleet show",
+        "fleet fit",
     ),
-    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "calibrate", "schema", "validate"),
+    *(
+        "unbalance",
+        "study",
+        "reduce",
+        "identify",
+        "fit",
+        "simulate",
+        "modes",
+        "calibrate",
+        "schema",
+        "validate",
+    ),
 )
 
 MODELLED = {
@@ -410,6 +425,7 @@ EDITS = {
         )
     },
     "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
+    "study-misspelt": {"misspelt.toml": ("sample_data/study/study.toml", "sensors.A", "senzors.A")},
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {
         "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
@@ -504,6 +520,7 @@ def _all() -> list[Case]:
     ]
     added = "fleet add fans sample_data/fleet"
     shown = "fleet show fans"
+    of_type, typed = "balance sample_data/fleet/fan-132/132-0", "--type fans:fan-132"
     cases += [
         Case("fleet-add", "fleet add d sample_data/fleet", "fleet"),
         Case("fleet-add-known", added, "fleet", before=(added,)),
@@ -511,6 +528,10 @@ def _all() -> list[Case]:
         Case("fleet-show", shown, "fleet", before=(added,)),
         Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
         Case("fleet-show-other", f"{shown} --type fan-123", "fleet", (TEXT,), before=(added,)),
+        Case("fleet-fit", "fleet fit fans --type fan-132 --plot t.png", "fleet", before=(added,)),
+        Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=(added,)),
+        Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
+        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", (TEXT,), before=(added,)),
     ]
     for name in DEMOS:
         forms = (TEXT, JSON) if name == "identification" else (TEXT,)

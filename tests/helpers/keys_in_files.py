@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from rotorid.tables import study_file
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
@@ -37,6 +38,12 @@ TABLES = {
     "key of [[bow]]": small_model_file.BOW,
     "key of a waveforms file": waveform_keys.WAVEFORMS,
     "key of [channels.NAME]": waveform_keys.CHANNEL,
+    "key of a study file": study_file.STUDY,
+    "key of [planes.NAME] of a study": study_file.PLANE,
+    "key of [sensors.NAME] of a study": study_file.SENSOR,
+    "key of [unbalance.STATION]": study_file.UNBALANCE,
+    "key of [readings]": study_file.READINGS,
+    "key of [calibrate]": study_file.CALIBRATE,
     **{f"key of [[{kind}]]": keys for kind, keys in node_forces.KEYS_OF_FORCE.items()},
 }
 

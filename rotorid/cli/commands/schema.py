@@ -13,11 +13,11 @@ from rotorid.cli.output import Destination, json_text
 @command(to=("json",))
 def schema(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model) or waveforms.")
+        str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model), study or waveforms.")
     ],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """JSON schema of a kind of settings file, for editors to check its keys.
+    """JSON schema of a job, a rotor file or other settings, for editors to check keys.
 
     Example: rotorid schema job
     """

@@ -19,7 +19,7 @@ import numpy as np
 
 from balancing.data.conventions import Labels, polar
 from balancing.data.trials import Trials
-from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, Rows, arrow, schema
+from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, JobRows, arrow, arrow_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,7 +67,7 @@ class FleetStore:
 
     def batches(self) -> list[str]:
         """Numbers of the batches that are whole, in the order in which they were added."""
-        return sorted(path.stem for path in (self.folder / "jobs").glob("[!.]*.parquet"))
+        return sorted(path.stem for path in (self.folder / "jobs").glob("[0-9]*.parquet") if _is_ours(path))
 
     def files(self, *names: str) -> list[Path]:
         """The files of these tables."""
@@ -82,8 +82,8 @@ class FleetStore:
             files.update(table["files"].combine_chunks().flatten().to_pylist())
         return Known(frozenset(jobs), frozenset(files))
 
-    def append(self, rows: Rows) -> int:
-        """Add a batch: all of it or nothing; gives the number of jobs that were new.
+    def append(self, jobs: Sequence[JobRows]) -> int:
+        """Add different jobs: all or nothing; gives the number of those that were new.
 
         Raises
         ------
@@ -91,23 +91,19 @@ class FleetStore:
             Where it cannot be written.
         """
         pa = arrow()
-        self.folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / "jobs").mkdir(parents=True, exist_ok=True)
         with self._alone():
             self._remove_leftovers()
-            known = pa.array(self.known().jobs, pa.string())
+            known = self.known().jobs
+            new = [job for job in jobs if job["jobs"][0]["job"][0] not in known]
             batch = f"{max(map(int, self.batches()), default=0) + 1:06d}"
-            count = 0
-            for name, columns in TABLES.items():
-                own = schema(name)
-                cells = [pa.array(rows[name][c], own.field(c).type, from_pandas=True) for c in columns]
-                table = pa.Table.from_arrays(cells, schema=own)
-                table = table.filter(pa.compute.invert(pa.compute.is_in(table["job"], known)))
-                count = len(table)  # of jobs, the last
+            for name in TABLES if new else ():
                 (self.folder / name).mkdir(exist_ok=True)
+                table = arrow_table(name, [part for job in new for part in job.get(name, ())])
                 pa.parquet.write_table(table, self._file(name, f".{batch}", ".tmp"), compression="zstd")
-            for name in TABLES if count else ():
+            for name in TABLES if new else ():
                 os.replace(self._file(name, f".{batch}", ".tmp"), self._file(name, batch))
-        return count
+        return len(new)
 
     def table(
         self,
@@ -138,14 +134,14 @@ class FleetStore:
         batches = [
             self._read("jobs", batch).to_pandas().assign(**{_BATCH: batch}) for batch in self.batches()
         ]
-        own: pd.DataFrame = pd.concat(batches) if batches else schema("jobs").empty_table().to_pandas()
+        own: pd.DataFrame = pd.concat(batches) if batches else arrow_table("jobs", []).to_pandas()
         own = own.drop_duplicates(["machine", "path"], keep="last", ignore_index=True)
         if jobs is not None:
             own = own[own["job"].isin(list(jobs))]
         if machine_type is not None:
             own = own[own["machine_type"] == machine_type]
         if name == "jobs" or own.empty:
-            there = own if name == "jobs" else schema(name).empty_table().to_pandas()
+            there = own if name == "jobs" else arrow_table(name, []).to_pandas()
             return there.reset_index(drop=True)[list(columns or TABLES[name])]
         parts = [
             self._read(name, str(batch), columns=columns, filters=[("job", "in", list(part))])
@@ -183,11 +179,15 @@ class FleetStore:
             yield
 
     def _remove_leftovers(self) -> None:
-        whole = {f"{batch}.parquet" for batch in self.batches()}
-        for name in TABLES:
-            for path in (self.folder / name).glob("*"):
-                if path.name not in whole and path.suffix in (".tmp", ".parquet"):
-                    path.unlink()
+        whole = self.batches()
+        for path in (path for name in TABLES for path in (self.folder / name).glob("*")):
+            if _is_ours(path) and path.stem not in whole:
+                path.unlink()
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file is a table of a batch, or one that was being written; others are left alone."""
+    return path.suffix in (".parquet", ".tmp") and path.stem.removeprefix(".").isdecimal()
 
 
 def trials_of(store: FleetStore, job: str) -> Trials:

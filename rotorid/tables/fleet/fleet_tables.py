@@ -2,48 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.versions import SCHEMA_VERSION
 
 VERSION = str(SCHEMA_VERSION)
-_JOB = {"job": "text"}
-_READING = {"speed_rad_s": "number", "sensor": "text"}
-_WEIGHT = {"plane": "text", "weight": "number", "angle_deg": "number"}
-TABLES: dict[str, dict[str, str]] = {
-    "readings": {
-        **_JOB,
-        **{"kind": "text", "run": "text", "repeat": "count"},
-        **_READING,
-        **{"amplitude": "number", "phase_deg": "number"},
-        **{"std_re": "number", "std_im": "number", "cov_re_im": "number"},
-    },
-    "weights": {**_JOB, "kind": "text", "run": "text", **_WEIGHT},
-    "coefficients": {
-        **_JOB,
-        **_READING,
-        **{"plane": "text", "re": "number", "im": "number"},
-        **{"var_re": "number", "cov_re_im": "number", "var_im": "number", "source": "text"},
-    },
-    "corrections": {**_JOB, **_WEIGHT, "mounted": "flag"},
-    "outcomes": {
-        **_JOB,
-        **{"run": "text"},
-        **_READING,
-        **{"before": "number", "after": "number", "limit": "number"},
-    },
-    "jobs": {
-        **_JOB,
-        **{"path": "text", "machine": "text", "machine_type": "text", "date": "date"},
-        **{"quantity": "text", "weight_kind": "text", "vibration_unit": "text", "weight_unit": "text"},
-        **{"files": "texts", "runs_file": "text", "warnings": "texts"},
-        **{"trial_runs": "count", "check_runs": "count", "vectors": "count", "undetermined": "text"},
-    },
+_COLUMNS = {
+    "readings": "job kind run repeat speed_rad_s sensor amplitude phase_deg std_re std_im cov_re_im",
+    "weights": "job kind run plane weight angle_deg",
+    "coefficients": "job speed_rad_s sensor plane re im var_re cov_re_im var_im source",
+    "corrections": "job plane weight angle_deg mounted",
+    "outcomes": "job run speed_rad_s sensor before after limit",
+    "jobs": "job path machine machine_type date quantity weight_kind vibration_unit weight_unit files "
+    "runs_file warnings trial_runs check_runs vectors undetermined",
 }
-"""Kind of each column of each table, in the order in which they are written: `jobs` last."""
-Rows = dict[str, dict[str, list[Any]]]
-"""Cells of each column of each table."""
+_KINDS = {
+    "number": "speed_rad_s amplitude phase_deg std_re std_im cov_re_im weight angle_deg re im var_re var_im "
+    "before after limit",
+    "count": "repeat trial_runs check_runs vectors",
+    "flag": "mounted",
+    "date": "date",
+    "texts": "files warnings",
+}
+"""Columns that are no texts."""
+TABLES = {name: tuple(columns.split()) for name, columns in _COLUMNS.items()}
+"""Columns of each table, in the order in which they are written: `jobs` last."""
+Columns = dict[str, Sequence[Any]]
+"""Cells by column."""
+JobRows = dict[str, list[Columns]]
+"""Rows of one job, in parts, by table."""
 
 
 def arrow() -> Any:  # noqa: ANN401 - the module
@@ -65,24 +53,22 @@ def schema(name: str) -> Any:  # noqa: ANN401 - of pyarrow
     """The schema of a table, with the version of the tables."""
     pa = arrow()
     kinds = {
-        "text": pa.string(),
-        "texts": pa.list_(pa.string()),
         "number": pa.float64(),
         "count": pa.int64(),
         "flag": pa.bool_(),
         "date": pa.date32(),
+        "texts": pa.list_(pa.string()),
     }
-    columns = [(column, kinds[kind]) for column, kind in TABLES[name].items()]
+    kind_of = {column: kinds[kind] for kind, columns in _KINDS.items() for column in columns.split()}
+    columns = [(column, kind_of.get(column, pa.string())) for column in TABLES[name]]
     return pa.schema(columns, metadata={"schema_version": VERSION})
 
 
-def no_rows() -> Rows:
-    """Tables without any row, to add to."""
-    return {name: {column: [] for column in columns} for name, columns in TABLES.items()}
-
-
-def add_rows(rows: Rows, more: Mapping[str, Mapping[str, Sequence[Any]]]) -> None:
-    """Add rows to each column of each table."""
-    for name, columns in more.items():
-        for column, cells in columns.items():
-            rows[name][column].extend(cells)
+def arrow_table(name: str, parts: Sequence[Columns]) -> Any:  # noqa: ANN401 - of pyarrow
+    """A table of rows in parts; NaN is null."""
+    own = schema(name)
+    cells = ([cell for part in parts for cell in part[field.name]] for field in own)
+    arrays = [
+        arrow().array(each, field.type, from_pandas=True) for each, field in zip(cells, own, strict=True)
+    ]
+    return arrow().Table.from_arrays(arrays, schema=own)

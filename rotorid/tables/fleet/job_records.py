@@ -13,10 +13,10 @@ from balancing.coefficients.machine_type import record_of
 from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.tables.fleet.fleet_tables import Columns, JobRows
 from rotorid.tables.job.job_data import Job
 from rotorid.tables.reader.units import vibration
 
-Columns = dict[str, Sequence[Any]]
 QUANTITIES = {"length": "displacement", "velocity": "velocity", "acceleration": "acceleration"}
 """Of a reading, by the kind of its unit."""
 
@@ -38,7 +38,7 @@ def job_rows(
     influence: Influence | None,
     proposed: tuple[Sequence[str], ComplexArray] | None,
     before: ComplexArray | None,
-) -> dict[str, Columns]:
+) -> JobRows:
     """Rows of all tables.
 
     Parameters
@@ -54,29 +54,21 @@ def job_rows(
     before
         Vibration of the bare rotor, shape (S, C), or None.
     """
-    trials, check = job.trials, job.check
-    labels = trials.labels
-    corrections = proposed
-    if check is not None and job.check_mounted:
-        corrections = check.planes, check.weights[-1]
-    tables: dict[str, list[Columns]] = {
-        "readings": [_readings(trials, "trial")] + ([_readings(check, "check")] if check else []),
-        "weights": [_weights(trials, "trial")]
-        + ([_weights(check, "check")] if check and job.check_mounted else []),
-        "coefficients": []
-        if influence is None
-        else [_coefficients(influence, stored=job.influence is not None)],
-        "corrections": [] if corrections is None else [_corrections(*corrections, mounted=job.check_mounted)],
-        "outcomes": [] if check is None else [_outcomes(job, check, before)],
-    }
-    found: dict[str, Columns] = {
-        name: {column: [cell for part in parts for cell in part[column]] for column in parts[0]}
-        for name, parts in tables.items()
-        if parts
-    }
-    for columns in found.values():
-        columns["job"] = [own["job"]] * len(columns[next(iter(columns))])
-    known = {
+    trials, check, labels = job.trials, job.check, job.trials.labels
+    rows: JobRows = {"readings": [_readings(trials, "trial")], "weights": [_weights(trials, "trial")]}
+    if influence is not None:
+        rows["coefficients"] = [_coefficients(influence, stored=job.influence is not None)]
+    if check is not None:
+        rows["readings"].append(_readings(check, "check"))
+        rows["outcomes"] = [_outcomes(job, check, before)]
+        if job.check_mounted:
+            rows["weights"].append(_weights(check, "check"))
+            proposed = check.planes, check.weights[-1]
+    if proposed is not None:
+        rows["corrections"] = [_corrections(*proposed, mounted=job.check_mounted)]
+    for part in (part for parts in rows.values() for part in parts):
+        part["job"] = [own["job"]] * len(next(iter(part.values())))
+    more = {
         "date": job.date or own["date"],
         "machine": job.machine or own["machine"],
         "machine_type": job.machine_type or own["machine_type"],
@@ -85,9 +77,9 @@ def job_rows(
         "weight_unit": labels.weight_unit,
         "trial_runs": len(trials.runs),
         "check_runs": 0 if check is None else len(check.runs),
-        "vectors": len(found["readings"]["run"]),
+        "vectors": sum(len(part["run"]) for part in rows["readings"]),
     }
-    return {**found, "jobs": {column: [value] for column, value in (own | known).items()}}
+    return {**rows, "jobs": [{column: [value] for column, value in (own | more).items()}]}
 
 
 def _readings(trials: Trials, kind: str) -> Columns:

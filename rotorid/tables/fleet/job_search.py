@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
 import io
 import os
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any
 from rotorid.tables.fleet.job_records import job_id
 from rotorid.tables.job.job_from_excel import SETTINGS
 from rotorid.tables.job.job_keys import TABLES
-from rotorid.tables.reader.input_file import file_content, sha256
+from rotorid.tables.reader.input_file import file_content
 from rotorid.tables.reader.problems import InputError, Problem, Problems
 from rotorid.tables.reader.toml_file import read_toml
 
@@ -63,11 +64,14 @@ class FoundJob:
         OSError
             For a file that cannot be read.
         """
-        return job_id(map(sha256, (self.file, *self.tables.values())))
+        files = self.file, *self.tables.values()
+        return job_id(hashlib.sha256(file_content(file)).hexdigest() for file in files)
 
 
-def job_files(tree: Path) -> Iterator[Path]:
+def job_files(tree: Path, closed: Callable[[OSError], None]) -> Iterator[Path]:
     """Files that may be jobs, by name; without hidden ones, and without folders that links lead to.
+
+    `closed` is called for a folder that cannot be read.
 
     Raises
     ------
@@ -78,7 +82,7 @@ def job_files(tree: Path) -> Iterator[Path]:
         yield tree
         return
     root = tree.resolve(strict=True)
-    for folder, folders, names in os.walk(tree):
+    for folder, folders, names in os.walk(tree, onerror=closed):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
             path = Path(folder, name)
@@ -117,14 +121,14 @@ def found_job(file: Path, tree: Path, machine_type: str = "") -> FoundJob | None
             return None
     parts = (file.relative_to(tree) if file != tree else Path(file.name)).parts
     dates = map(_date, (file.name, file.parent.resolve().name, *reversed(parts[:-1])))
-    named = {key: said.get(key) for key in TABLES}
+    named = {key: str(said[key]) for key in TABLES if isinstance(said.get(key), str)}
     return FoundJob(
         file=file,
         path="/".join(parts),
         machine=machine_of(file),
         machine_type=machine_type or (parts[0] if len(parts) > 2 else ""),
         date=next((date for date in dates if date is not None), None),
-        tables={key: file.parent / name for key, name in named.items() if isinstance(name, str)},
+        tables={key: file.parent / name for key, name in named.items() if name.isprintable()},
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotorid.base.answer import Answer
 from rotorid.workflows.input_checks import file_of, rotor_source
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.calibration import RunReadings
+    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
 
     DataFiles = Path | str | Sequence[Path | str]
     """Jobs, tables of critical speeds or natural frequencies, tables of modes."""
@@ -127,6 +127,53 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
         For files or options that cannot be, and for data that say nothing of the rotor.
     """
     from rotorid import calibration
+    from rotorid.workflows.calibration.unknown_options import unknowns
+
+    model, numbers, readings, frequencies, files, read, assumed = prepared(rotor, data, options)
+    probes = probes_of(readings)
+    log_rotor(model, unknowns=len(numbers))
+    told = provenance([*files, *read], options)
+    if options.design is not None:
+        from rotorid.workflows.calibration.calibration_design import design
+
+        wished = [u.path for u in unknowns(model, probes, options.estimate, "", "", exact=True)]
+        runs = _candidates(readings, options.speeds)
+        return Calibrated(found=design(model, numbers, wished, runs, options.design), provenance=told)
+    if options.speeds is not None:
+        raise ValueError("--speeds are candidates for --design: the data have their own")
+    paths = {number.path for number in numbers}
+    beside = unknowns(model, probes, options.estimate, "", "", exact=False) if options.exact else []
+    held = [number for number in beside if number.path not in paths]
+    with phase("calibration"):
+        found = calibration.calibrate(model, numbers, readings, frequencies, held=held, starts=options.starts)
+    of_rotor = {one["sha256"] for one in told["inputs"][: len(files)]}  # which jobs name, too
+    made_from = [one for one in told["inputs"] if one["sha256"] not in of_rotor]
+    hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
+    known = replace(found.rotor.calibration, data=hashes)  # type: ignore[type-var]
+    found = replace(found, rotor=replace(found.rotor, calibration=known))
+    return Calibrated(found=found, assumed=tuple(assumed), provenance=told)
+
+
+class Prepared(NamedTuple):
+    """What is calibrated: the rotor, unknown numbers, data; files of both; what was assumed."""
+
+    rotor: Rotor
+    numbers: list[Unknown]
+    readings: list[RunReadings]
+    frequencies: list[MeasuredFrequencies]
+    rotor_files: tuple[Path, ...]
+    data_files: list[Path]
+    assumed: list[str]
+
+
+def prepared(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Prepared:
+    """Read what is calibrated.
+
+    Raises
+    ------
+    ValueError
+        As `calibrate`.
+    """
     from rotorid.workflows.calibration.calibration_data import read_data
     from rotorid.workflows.calibration.unknown_options import unknowns
 
@@ -149,29 +196,15 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
         options.bow,
         candidates=options.design is not None,
     )
-    probes = list(dict.fromkeys(sensor for each in readings for sensor in each.trials.sensors))
-    numbers = unknowns(model, probes, options.estimate, options.prior, options.bounds, exact=options.exact)
-    log_rotor(model, unknowns=len(numbers))
-    told = provenance([*files, *read], options)
-    if options.design is not None:
-        from rotorid.workflows.calibration.calibration_design import design
+    numbers = unknowns(
+        model, probes_of(readings), options.estimate, options.prior, options.bounds, exact=options.exact
+    )
+    return Prepared(model, numbers, readings, frequencies, files, read, assumed)
 
-        wished = [u.path for u in unknowns(model, probes, options.estimate, "", "", exact=True)]
-        runs = _candidates(readings, options.speeds)
-        return Calibrated(found=design(model, numbers, wished, runs, options.design), provenance=told)
-    if options.speeds is not None:
-        raise ValueError("--speeds are candidates for --design: the data have their own")
-    paths = {number.path for number in numbers}
-    beside = unknowns(model, probes, options.estimate, "", "", exact=False) if options.exact else []
-    held = [number for number in beside if number.path not in paths]
-    with phase("calibration"):
-        found = calibration.calibrate(model, numbers, readings, frequencies, held=held, starts=options.starts)
-    of_rotor = {one["sha256"] for one in told["inputs"][: len(files)]}  # which jobs name, too
-    made_from = [one for one in told["inputs"] if one["sha256"] not in of_rotor]
-    hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
-    known = replace(found.rotor.calibration, data=hashes)  # type: ignore[type-var]
-    found = replace(found, rotor=replace(found.rotor, calibration=known))
-    return Calibrated(found=found, assumed=tuple(assumed), provenance=told)
+
+def probes_of(readings: Sequence[RunReadings]) -> list[str]:
+    """Names of all sensors, each once."""
+    return list(dict.fromkeys(sensor for each in readings for sensor in each.trials.sensors))
 
 
 def _candidates(readings: Sequence[RunReadings], speeds: Speeds | None) -> RunReadings:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rotorid.tables.fleet.fleet_store import FleetStore
+    from rotorid.tables.fleet.fleet_tables import JobRows
     from rotorid.tables.fleet.job_search import FoundJob
 
 BATCH = 200_000
@@ -35,7 +36,7 @@ class FleetAddOptions:
     machine_type : NAME
         Of the jobs that do not say it; default: the first folder below TREE, of those two folders deep.
     workers : N
-        Processes that read, default 1; 2 and more for hundreds of jobs.
+        Processes that read; 2 and more for hundreds of jobs.
     """
 
     machine_type: str | None = None
@@ -85,6 +86,7 @@ class FleetAdded(Outcome):
             head += f" {counted(len(self.damaged), 'file')} cannot be read:"
         told = [f"{printable(str(file))}: {reason}" for file, reason in self.damaged.items()]
         untyped = f"{counted(self.untyped, 'job')} without a type: machine_type in the job, or --type"
+        told.append(f"What is in it: rotorid fleet show {self.store.folder}")
         return Answer(head, "\n".join(told), notes=(untyped,) if self.untyped else ())
 
 
@@ -109,7 +111,6 @@ def fleet_add(
         Where nothing can be read, and for a folder that is something else.
     """
     from rotorid.tables.fleet.fleet_store import FleetStore
-    from rotorid.tables.fleet.fleet_tables import add_rows, no_rows
 
     options = options or FleetAddOptions()
     store = FleetStore(Path(fleet))
@@ -117,24 +118,23 @@ def fleet_add(
     found, damaged = _found([Path(tree) for tree in trees], options.machine_type or "")
     seen = set(store.known().jobs)
     new = [job for job in found if not seen or not _is_known(job, seen)]
-    batch, jobs, vectors, untyped = no_rows(), 0, 0, 0
+    batch: list[JobRows] = []
+    jobs = vectors = waiting = untyped = 0
     unread: Damaged = {}
     begun = time.monotonic()
     for count, read in enumerate(read_jobs(new, options.workers), 1):
         if read.rows is None:
             unread[read.found.file] = read.reason
-        elif (own := read.rows["jobs"])["job"][0] not in seen:
+        elif (own := read.rows["jobs"][0])["job"][0] not in seen:
             seen.add(own["job"][0])
-            add_rows(batch, read.rows)
-            vectors += own["vectors"][0]
+            batch.append(read.rows)
+            waiting += own["vectors"][0]
             untyped += not own["machine_type"][0]
         left = (time.monotonic() - begun) / count * (len(new) - count)
-        progress.info("%d of %d jobs, %.0f s left", count, len(new), left)
-        if len(batch["readings"]["job"]) >= BATCH:
+        progress.info("%d of %d, %.0f s left", count, len(new), left)
+        if batch and (waiting >= BATCH or count == len(new)):
             jobs += store.append(batch)
-            batch = no_rows()
-    if batch["jobs"]["job"]:
-        jobs += store.append(batch)
+            batch, vectors, waiting = [], vectors + waiting, 0
     known = len(found) - len(unread) - jobs
     if not jobs + known:
         raise ValueError(_nothing(trees, damaged | unread))
@@ -156,8 +156,9 @@ def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Da
 
     found: dict[Path, FoundJob] = {}
     damaged: Damaged = {}
+    closed: list[OSError] = []
     for tree in trees:
-        for file in job_files(tree):
+        for file in job_files(tree, closed.append):
             try:
                 job = apart(found_job, file, tree, machine_type)
             except (OSError, ValueError) as error:
@@ -165,6 +166,7 @@ def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Da
                 continue
             if job is not None:
                 found.setdefault(file.resolve(), job)
+    damaged |= {Path(error.filename): reason_of(error) for error in closed}
     tables = (table for job in found.values() for table in job.tables.values())
     named = {table.resolve() for table in tables if is_workbook(table)}
     return [job for file, job in found.items() if file not in named], damaged
@@ -173,7 +175,7 @@ def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Da
 def _is_known(job: FoundJob, seen: set[str]) -> bool:
     try:
         return apart(job.quick_id) in seen
-    except OSError:  # reading says it better
+    except (OSError, ValueError):  # reading says it better
         return False
 
 

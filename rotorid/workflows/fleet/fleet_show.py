@@ -116,7 +116,7 @@ def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> Fl
     Raises
     ------
     ValueError
-        For a folder that is no store, and a type that it has not.
+        For a folder that is no store, and where it has no job, or none of that type.
     """
     from rotorid.base.suggestions import did_you_mean
     from rotorid.tables.fleet.fleet_store import FleetStore
@@ -126,9 +126,10 @@ def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> Fl
     store.check()
     wanted = options.machine_type
     jobs = store.table("jobs", machine_type=wanted)
-    if wanted is not None and jobs.empty:
+    if jobs.empty:
         known = sorted(set(store.table("jobs")["machine_type"]))
-        raise ValueError(f"{fleet}: no machine of type {wanted!r}{did_you_mean(wanted, known)}")
+        what = "job" if wanted is None else f"machine of type {wanted!r}{did_you_mean(wanted, known)}"
+        raise ValueError(f"{fleet}: there is no {what}")
     own = jobs["job"]
     coefficients = store.table("coefficients", jobs=own, columns=["job"])["job"].value_counts()
     outcomes = store.table("outcomes", jobs=own, columns=["job", "run", "before", "after"])

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import contextvars
 import os
+import signal
+import threading
 import warnings
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from balancing import Influence
     from rotorid.base.arrays import ComplexArray
     from rotorid.tables import Job
-    from rotorid.tables.fleet.job_records import Columns
+    from rotorid.tables.fleet.fleet_tables import JobRows
     from rotorid.tables.fleet.job_search import FoundJob
 
 CHUNK = 16
@@ -28,7 +30,7 @@ class ReadJob(NamedTuple):
     """A job, and its rows by table, or why there are none."""
 
     found: FoundJob
-    rows: dict[str, Columns] | None
+    rows: JobRows | None
     reason: str = ""
 
 
@@ -38,22 +40,28 @@ def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[ReadJob]:
     if workers == 1:
         yield from (read for chunk in chunks for read in _read_chunk(chunk))
         return
-    threads = os.environ.get("OPENBLAS_NUM_THREADS")
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # is read when a process starts
-    try:
-        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-            under_way: deque[Future[list[ReadJob]]] = deque()
-            for chunk in chunks:
-                under_way.append(pool.submit(_read_chunk, chunk))
-                if len(under_way) > 3 * workers:
-                    yield from under_way.popleft().result()
-            while under_way:
+    with ProcessPoolExecutor(workers, get_context("spawn"), _begin) as pool:
+        under_way: deque[Future[list[ReadJob]]] = deque()
+        for chunk in chunks:
+            under_way.append(pool.submit(_read_chunk, chunk))
+            if len(under_way) > 3 * workers:
                 yield from under_way.popleft().result()
-    finally:
-        if threads is None:
-            del os.environ["OPENBLAS_NUM_THREADS"]
-        else:
-            os.environ["OPENBLAS_NUM_THREADS"] = threads
+        while under_way:
+            yield from under_way.popleft().result()
+
+
+def _begin() -> None:
+    """In a process that reads: Ctrl+C is for the one that asks, and where that is gone this one goes, too."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy is not loaded yet
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _read_chunk(chunk: Sequence[FoundJob]) -> list[ReadJob]:
@@ -67,7 +75,8 @@ def apart(function: Any, *given: Any) -> Any:  # noqa: ANN401 - any function
 
 def reason_of(error: Exception) -> str:
     """The first lines of what is wrong with a file."""
-    lines = str(error).splitlines() or [type(error).__name__]
+    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    lines = text.splitlines() or [type(error).__name__]
     more = f"\nand {len(lines) - _SHOWN} more lines" if len(lines) > _SHOWN else ""
     return "\n".join(lines[:_SHOWN]) + more
 
@@ -85,7 +94,7 @@ def _read(found: FoundJob) -> ReadJob:
     return ReadJob(found, rows)
 
 
-def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> dict[str, Columns]:
+def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> JobRows:
     """Rows of a job with its coefficients, and what `correct` proposes where that was mounted."""
     from balancing import estimate_influence
     from rotorid.tables.fleet.job_records import job_id, job_rows

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from rotorid.workflows.fleet.type_records import Grid, KnownType, known_type
 from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
+    from balancing.correction.correction_result import Correction
     from rotorid.tables import Job
 
 LEVEL = 0.001
@@ -29,12 +30,54 @@ LEVEL = 0.001
 _RARE = 1e-12
 
 
-class TypeKnowledge(NamedTuple):
-    """Coefficients with a baseline; files that they are from; why the machine is not of its type, or ""."""
+@dataclass(frozen=True, eq=False)
+class TypeKnowledge:
+    """What a type says of a machine.
 
+    Attributes
+    ----------
+    known
+        The type.
+    influence
+        Coefficients and baseline, with what the job's own runs have added.
+    files
+        Those that the type was read from.
+    earlier
+        How many earlier jobs of the machine count.
+    probability
+        Of runs farther from the type than those of the job; 1: nothing tells.
+    reason
+        Where it is below `LEVEL`: what would make the machine one of the type; "": not found.
+    """
+
+    known: KnownType
     influence: Influence
     files: tuple[Path, ...]
-    foreign: str
+    earlier: int
+    probability: float
+    reason: str
+
+    def judged(self, result: Correction) -> Correction:
+        """A correction that is not to be mounted where the machine is not of its type."""
+        if self.probability >= LEVEL:
+            return result
+        rare = f"{self.probability:.1g}" if self.probability > _RARE else f"below {_RARE:g}"
+        cause = f"by its runs this machine is not of the type {self.known.name!r} (χ², probability {rare})"
+        cause += f"; it would fit if {self.reason}" if self.reason else ""
+        instead = ("Instead: balance it without --type.",)
+        decision = replace(result.decision, word="do not mount", cause=cause, instead=instead)
+        return replace(result, decision=decision)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        return {
+            "machine_type": self.known.name,
+            "machines": len(self.known.kind.machines),
+            "earlier_jobs": self.earlier,
+            "probability": self.probability,
+            "of_type": self.probability >= LEVEL,
+            "reason": self.reason or None,
+        }
 
 
 def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeKnowledge:
@@ -78,31 +121,19 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
         found, chance = update(prior, trials)
     odd = f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count"
     warnings = (odd,) * any(record.machine == machine for record, _ in known.kind.odd)
-    notes = (*found.notes, _words(known, machine), *known.notes)
-    return TypeKnowledge(
-        replace(found, notes=notes, warnings=(*found.warnings, *warnings)),
-        tuple(store.files("jobs", "coefficients")),
-        _foreign(known, trials, chance) if chance < LEVEL else "",
-    )
+    earlier = int((known.jobs["machine"] == machine).sum()) if machine in known.kind.machines else 0
+    words = f"coefficients of the type {name!r}, {counted(len(known.kind.machines), 'machine')}"
+    words += f", and of {counted(earlier, 'earlier job')} of {machine!r}" if earlier else ""
+    found = replace(found, notes=(*found.notes, words, *known.notes), warnings=(*found.warnings, *warnings))
+    reason = _reason(known, trials) if chance < LEVEL else ""
+    return TypeKnowledge(known, found, tuple(store.files("jobs", "coefficients")), earlier, chance, reason)
 
 
-def _words(known: KnownType, machine: str) -> str:
-    """Where the coefficients come from."""
-    words = f"coefficients of the type {known.name!r}, {counted(len(known.kind.machines), 'machine')}"
-    if machine not in known.kind.machines:
-        return words
-    own = int((known.jobs["machine"] == machine).sum())
-    return f"{words}, and of {counted(own, 'earlier job')} of {machine!r}"
-
-
-def _foreign(known: KnownType, trials: Trials, chance: float) -> str:
-    """That a machine is not of its type, and what would make it one."""
-    kind, why = known.kind, ""
+def _reason(known: KnownType, trials: Trials) -> str:
+    """What would make a machine one of the type."""
+    kind = known.kind
     if np.isfinite(kind.limit):
         with suppress(UndeterminedError, ValueError):
             measured = on_grid(estimate_influence(trials), kind.speeds, kind.sensors, kind.planes)
-            why = why_odd(kind, record_of("", "", measured), trials)
-    rare = f"{chance:.1g}" if chance > _RARE else f"below {_RARE:g}"
-    what = f"by its runs this machine is not of the type {known.name!r} (χ², probability {rare})"
-    fits = f"; it would fit if {why}" if why else ""
-    return f"Do not mount these weights: {what}{fits}. Balance it without --type."
+            return why_odd(kind, record_of("", "", measured), trials)
+    return ""

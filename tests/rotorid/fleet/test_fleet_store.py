@@ -39,13 +39,18 @@ def tree(tmp_path, monkeypatch):
     return tmp_path / "tree"
 
 
-def test_the_same_job_twice_changes_nothing_wherever_it_lies(tree, cli):
+def test_the_same_job_twice_changes_nothing_wherever_it_lies(tree, cli, monkeypatch):
     first = cli("fleet", "add", "F", "tree", "--json").json
     assert (first["jobs"], first["vectors"], first["known"], first["damaged"]) == (2, 28, 0, [])
     assert first["tables"]["readings"].endswith("readings")
     before = {path: path.read_bytes() for path in (tree.parent / "F").rglob("*.parquet")}
     shutil.copytree(tree / "fan" / "132-08", tree / "elsewhere")
+    read = []
+    monkeypatch.setattr(
+        "rotorid.workflows.fleet.fleet_add.read_jobs", lambda found, _: read.extend(found) or ()
+    )
     again = cli("fleet", "add", "F", "tree", "tree/fan").out
+    assert read == []  # what its files hold says it, before they are read as a job
     assert again.startswith("Added 0 jobs with 0 vectors to F; 3 jobs known already.")
     assert {path: path.read_bytes() for path in (tree.parent / "F").rglob("*.parquet")} == before
 
@@ -122,7 +127,13 @@ def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
         assert done.returncode == 9
         assert len(list((tree.parent / "F").rglob("*.parquet"))) == renamed
         assert FleetStore(tree.parent / "F").table("readings").empty
+        with pytest.raises(ValueError, match="F: there is no job"):
+            fleet_show("F")
+    own = tree.parent / "F" / "jobs" / "mine.parquet"  # of somebody else
+    own.touch()
     assert fleet_add("F", [tree / "fan" / "132-01"]).jobs == 1
+    assert own.exists()
+    own.unlink()
     assert len(list((tree.parent / "F").rglob("*.parquet"))) == len(TABLES)
     assert list((tree.parent / "F").rglob("*.tmp")) == []
 
@@ -135,8 +146,8 @@ def test_two_writers_at_once_one_with_two_processes(tmp_path):
     ]
     assert [one.wait(60) for one in both] == [0, 0]
     store = FleetStore(tmp_path / "F")
-    assert len(pd.read_parquet(tmp_path / "F" / "jobs")) == len(store.table("jobs")) == 8
-    assert len(store.table("readings")) == 116
+    assert len(pd.read_parquet(tmp_path / "F" / "jobs")) == len(store.table("jobs")) == 9
+    assert len(store.table("readings")) == 120
     fleet_add(tmp_path / "G", [sample_data() / "fleet"])
     for name in TABLES:
         one, other = store.table(name), FleetStore(tmp_path / "G").table(name)
@@ -151,11 +162,11 @@ def test_show_tells_types_and_machines(tmp_path, cli):
     assert own["fan-132"] | {"rms_before": 0, "rms_after": 0} == {
         "machine_type": "fan-132",
         "quantity": "displacement",
-        "machines": 8,
-        "jobs": 8,
+        "machines": 9,
+        "jobs": 9,
         "first_date": "2026-01-14",
-        "last_date": "2026-05-11",
-        "vectors": 116,
+        "last_date": "2026-06-02",
+        "vectors": 120,
         "coefficients": 60,
         "outcomes": 7,
         "rms_before": 0,
@@ -172,7 +183,7 @@ def test_show_tells_types_and_machines(tmp_path, cli):
     assert own["fan-132"]["rms_after"] == pytest.approx(np.median(after))
     assert [row["machine"] for row in document["machines"]][:2] == ["turbo_job", "132-01"]
     only = cli("fleet", "show", tmp_path / "F", "--type", "fan-132", "--output", tmp_path / "t.csv")
-    assert only.out.startswith("8 machines, 8 jobs.")
+    assert only.out.startswith("9 machines, 9 jobs.")
     assert pd.read_csv(tmp_path / "t.csv")["jobs"].tolist() == [8]
     assert max(map(len, cli("fleet", "show", tmp_path / "F", "--table").out.splitlines())) <= 100
     with pytest.raises(ValueError, match="did you mean 'fan-132'"):

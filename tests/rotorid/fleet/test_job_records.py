@@ -25,7 +25,7 @@ def fans(tmp_path_factory):
     """The sample, as a store."""
     folder = tmp_path_factory.mktemp("fleet") / "fans"
     added = fleet_add(folder, [FLEET])
-    assert (added.jobs, added.known, added.damaged) == (8, 0, {})
+    assert (added.jobs, added.known, added.damaged) == (9, 0, {})
     return FleetStore(folder)
 
 
@@ -210,7 +210,7 @@ def test_workbooks_are_jobs_with_machine_and_date_in_their_cells(tmp_path, cli):
     "folders, said, option, expected",
     [
         ("pump/7", "", "", ("7", "pump", None)),
-        ("pump/7/2026-03-17", "", "", ("2026-03-17", "pump", datetime.date(2026, 3, 17))),
+        ("pump/7/2026-03-17", "", "", ("7", "pump", datetime.date(2026, 3, 17))),
         ("pump/2026-03-17 7", 'machine = 7\nmachine_type = "p"', "x", ("7", "p", datetime.date(2026, 3, 17))),
         ("7", "date = 2026-03-18T10:00:00", "", ("7", "", datetime.date(2026, 3, 18))),
         ("2026-13-17", 'machine = "7"', "x", ("7", "x", None)),

@@ -1,0 +1,1 @@
+"""Studies by simulation: samples drawn by number, in chunks on any executor, streamed to Parquet."""

@@ -1,0 +1,59 @@
+"""A study of the starts of a calibration: where searches from drawn starting values end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotorid.calibration.calibrate import SPREAD, calibrate
+
+if TYPE_CHECKING:
+    from rotorid.base.arrays import AnyArray, FloatArray
+    from rotorid.workflows.calibration.calibrate import Prepared
+
+SAME = 1e-3
+"""Relative: ends of searches whose numbers and χ² (besides 0.01) differ by less are one."""
+
+
+def draw_start(given: Prepared, rng: np.random.Generator) -> dict[str, Any]:
+    """χ² of data and priors where the search from one drawn start ends, and the numbers there."""
+    begun = []
+    for unknown in given.numbers:
+        first = unknown.first(given.rotor)
+        spread = unknown.prior[1] if unknown.prior else SPREAD * abs(first)
+        begun.append(replace(unknown, start=first + spread * rng.uniform(-1.0, 1.0)))
+    end = calibrate(given.rotor, begun, given.readings, given.frequencies, starts=1)
+    numbers = dict(zip(end.found.names, end.found.estimate.solution.tolist(), strict=True))
+    return {"converged": end.found.converged, "chi_square": end.chi_square, **numbers}
+
+
+def count_minima(parts: Iterable[Mapping[str, AnyArray]], names: tuple[str, ...]) -> dict[str, Any]:
+    """Distinct ends of all starts, the lowest χ² first, as fields of `StudiedStarts`."""
+    minima: list[tuple[float, FloatArray]] = []
+    found: list[int] = []
+    lost = 0
+    for columns in parts:
+        ends = np.column_stack([columns[name] for name in names])
+        for chi_square, end, converged in zip(columns["chi_square"], ends, columns["converged"], strict=True):
+            if not (converged and np.isfinite(chi_square)):
+                lost += 1
+                continue
+            for k, (known, place) in enumerate(minima):
+                near = abs(known - chi_square) <= SAME * known + 0.01
+                if near and np.allclose(end, place, rtol=SAME, atol=0.0):
+                    found[k] += 1
+                    break
+            else:
+                minima.append((float(chi_square), end))
+                found.append(1)
+    order = sorted(range(len(minima)), key=lambda k: minima[k][0])
+    return {
+        "lost": lost,
+        "names": names,
+        "chi_square": np.array([minima[k][0] for k in order]),
+        "found": np.array([found[k] for k in order]),
+        "ends": np.array([minima[k][1] for k in order]).reshape(-1, len(names)),
+    }

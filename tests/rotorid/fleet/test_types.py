@@ -1,0 +1,223 @@
+"""Types of machines: `fleet fit`, and `balance --type` from the files to the answer."""
+
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from balancing import UndeterminedError
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+from rotorid.workflows import balance
+from rotorid.workflows.balance import BalanceOptions
+from rotorid.workflows.fleet.fleet_add import fleet_add
+from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
+from rotorid.workflows.fleet.type_coefficients import type_coefficients
+
+pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
+FANS = sample_data() / "fleet" / "fan-132"
+SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")
+
+
+def cn(rng, *shape):
+    return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+
+class Machine:
+    """A drawn fan, and its jobs as people write them: µm pp, lag, g, angles against the rotation."""
+
+    MEAN = np.array([[3 + 2j, 0.6 + 0.9j], [-2 + 1j, 2.5 + 0.5j]])  # µm pp per g
+
+    def __init__(self, rng, along=0.1, degrees=10.0):
+        n = self.MEAN.shape
+        turn = np.exp(1j * np.radians(degrees) * rng.standard_normal(n))
+        self.W = self.MEAN * (1 + along * rng.standard_normal(n)) * turn
+        self.rng, self.D = rng, 5 * cn(rng, 2)
+
+    def job(self, folder, runs=3, check=False, within=0.0, more=""):
+        rng = self.rng
+        W = self.W * (1 + within * cn(rng, 2, 2))
+        T = np.array([[0, 0], [8 * np.exp(0.5j), 0], [0, 8 * np.exp(2j)]])[:runs]
+        folder.mkdir(parents=True)
+        self._table(folder / "runs.csv", W, T)
+        said = f'runs = "runs.csv"\nphase = "lag"\nangles = "against rotation"\n{more}'
+        if runs > 1:
+            self._weights(folder / "weights.csv", T)
+            said = f'weights = "weights.csv"\n{said}'
+        else:
+            said = f'machine_type = "fan"\n{said}'
+        if check:
+            mounted = 0.9 * self.D[None]
+            self._table(folder / "check.csv", W, mounted, "check")
+            self._weights(folder / "check_weights.csv", mounted, "check")
+            said = f'check = "check.csv"\ncheck_weights = "check_weights.csv"\n{said}'
+        (folder / "job.toml").write_text(f"{said}[errors]\namplitude_percent = 1\nphase_deg = 0.6\n")
+        return folder / "job.toml"
+
+    def _table(self, path, W, T, name="run"):
+        lines = ["run,speed_rpm,sensor,amplitude_um_pp,phase_deg"]
+        for r, Y in enumerate((T - self.D) @ W.T):
+            Y = Y * (1 + 0.01 * cn(self.rng, 2))
+            phase = -np.degrees(np.angle(Y)) % 360
+            lines += [f"{name} {r},{SPEED},{SENSORS[c]},{abs(Y[c]):.4f},{phase[c]:.3f}" for c in (0, 1)]
+        path.write_text("\n".join(lines) + "\n")
+
+    def _weights(self, path, T, name="run"):
+        lines = ["run,plane,mass_g,angle_deg"]
+        for r, p in np.argwhere(T):
+            angle = -np.degrees(np.angle(T[r, p])) % 360
+            lines.append(f"{name} {r},{PLANES[p]},{abs(T[r, p]):.6f},{angle:.6f}")
+        path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    """A store of 25 machines, five of them balanced three times."""
+    folder, rng = tmp_path_factory.mktemp("types"), np.random.default_rng(11)
+    machines = [Machine(rng) for _ in range(25)]
+    for k, machine in enumerate(machines):
+        for day in range(3 if k < 5 else 1):
+            machine.job(folder / "tree" / "fan" / f"F{k}" / f"2026-01-0{day + 1}", within=0.03)
+    added = fleet_add(folder / "store", [folder / "tree"])
+    assert (added.jobs, added.damaged) == (35, {})
+    return folder, machines
+
+
+def address(fleet):
+    return f"{fleet[0] / 'store'}:fan"
+
+
+def test_a_fit_gives_back_what_was_drawn(fleet):
+    found = fleet_fit(fleet[0] / "store", FleetFitOptions("fan"))
+    table = found.to_frame()
+    assert len(found.known.kind.machines) == 25
+    mean = Machine.MEAN.ravel()
+    W = table["influence"] * np.exp(1j * np.radians(table["phase_deg"]))
+    assert np.abs(W.to_numpy() / mean - 1).max() < 0.12  # 0.1/√25 and 10°/√25, four deviations
+    assert np.sqrt((table["between_percent"] ** 2).mean()) == pytest.approx(10, rel=0.3)
+    assert np.sqrt((table["between_deg"] ** 2).mean()) == pytest.approx(10, rel=0.3)
+    assert np.sqrt((table["within_percent"] ** 2).mean()) == pytest.approx(3, rel=0.5)
+    document = found.to_dict()
+    assert (document["jobs"], document["unit"], document["odd"]) == (35, "um_pp/g", [])
+    assert "35 jobs" in found.summary()
+    assert len(found.figure().axes) == 4
+
+
+def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
+    machine = Machine(np.random.default_rng(21))
+    found = balance(machine.job(tmp_path / "new", runs=1), BalanceOptions(machine_type=address(fleet)))
+    weights = found.result.weights * 1e3
+    assert found.result.planes == PLANES
+    left = machine.W @ (weights - machine.D)
+    assert np.linalg.norm(left) < 0.4 * np.linalg.norm(machine.W @ machine.D)
+    assert found.result.labels.weight_unit == "g"
+    assert found.to_dict()["of_type"]["machines"] == 25
+    assert found.result.covariance is not None
+    assert "coefficients of the type 'fan', 25 machines" in " ".join(found.result.notes)
+
+
+def test_each_run_narrows_what_is_known(fleet, tmp_path):
+    machine, sizes, lefts = Machine(np.random.default_rng(22)), [], []
+    for runs in (1, 2, 3):
+        job = machine.job(tmp_path / str(runs), runs=runs, more="" if runs != 2 else "[planes.L]\n")
+        found = balance(job, BalanceOptions(machine_type=address(fleet))).result
+        sizes.append(np.trace(found.covariance))
+        lefts.append(np.linalg.norm(machine.W @ (found.weights * 1e3 - machine.D)) if runs != 2 else np.nan)
+    assert sizes[0] > sizes[2]
+    assert lefts[2] < 0.5 * lefts[0]
+
+
+def test_a_check_run_refines(fleet, tmp_path):
+    machine = Machine(np.random.default_rng(23))
+    job = machine.job(tmp_path / "checked", check=True)
+    plain, refined = (
+        balance(job, BalanceOptions(machine_type=address(fleet), refine=refine)) for refine in (False, True)
+    )
+    assert plain.check is not None
+    assert refined.check is None
+    assert np.trace(refined.result.covariance) < np.trace(plain.result.covariance)
+    assert refined.result.mounted[0] == "check 0"
+
+
+def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
+    folder, machines = fleet
+    own = folder / "tree" / "fan" / "F2" / "2026-01-01" / "job.toml"
+    known = type_coefficients(read_job(own), address(fleet))
+    assert known.earlier == 2
+    copy = shutil.copytree(own.parent, tmp_path / "elsewhere")
+    assert type_coefficients(read_job(copy / "job.toml"), address(fleet)).earlier == 0
+    alone = folder / "tree" / "fan" / "F7" / "2026-01-01" / "job.toml"
+    assert len(type_coefficients(read_job(alone), address(fleet)).known.kind.machines) == 24
+    new = machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1)
+    first, other = (
+        type_coefficients(read_job(new), address(fleet)),
+        type_coefficients(read_job(machines[2].job(tmp_path / "X", runs=1)), address(fleet)),
+    )
+    assert (first.earlier, other.earlier) == (3, 0)
+    assert (
+        np.trace(first.influence.covariance, axis1=2, axis2=3).sum()
+        < 0.3 * np.trace(other.influence.covariance, axis1=2, axis2=3).sum()
+    )
+    W = machines[2].W * 1e-6 / 2 / 1e-3
+    assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
+
+
+def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
+    machine = Machine(np.random.default_rng(24))
+    machine.W = machine.W * np.exp(1j * np.radians(100))
+    found = balance(machine.job(tmp_path / "turned"), BalanceOptions(machine_type=address(fleet)))
+    assert found.answer.judgement.startswith("Do not mount these weights: by its runs this machine is not")
+    assert "lagged" in found.of_type.reason
+    assert "keyphasor" in found.of_type.reason
+    assert not found.to_dict()["of_type"]["of_type"]
+    assert found.to_dict()["judgement"]["word"] == "do not mount"
+
+
+def test_machines_of_the_type_are_seldom_called_others(fleet, tmp_path):
+    rng, said = np.random.default_rng(25), 0
+    for k in range(30):
+        job = Machine(rng).job(tmp_path / str(k))
+        said += type_coefficients(read_job(job), address(fleet)).probability < 0.001
+    assert said <= 1
+
+
+def test_limits_and_planes_of_a_job_without_weights_hold(fleet, tmp_path):
+    machine = Machine(np.random.default_rng(26))
+    job = machine.job(tmp_path / "limited", runs=1, more="[planes.L]\nmax_mass_g = 1\n[planes.R]\n")
+    found = balance(job, BalanceOptions(machine_type=address(fleet))).result
+    assert found.planes == PLANES
+    assert abs(found.weights[0]) == pytest.approx(1e-3, rel=1e-4)
+    single = machine.job(tmp_path / "single", runs=1, more="[planes.R]\n")
+    assert balance(single, BalanceOptions(machine_type=address(fleet))).result.planes == ("R",)
+
+
+def test_what_is_wrong_is_told(fleet, tmp_path):
+    machine, store = Machine(np.random.default_rng(27)), fleet[0] / "store"
+    job = machine.job(tmp_path / "new", runs=1)
+
+    def refused(text, error=ValueError, job=job, **options):
+        with pytest.raises(error, match=text):
+            balance(job, BalanceOptions(**options))
+
+    refused("expected the folder of a fleet and a type, FLEET:TYPE", machine_type="fan")
+    refused("there is no such fleet", machine_type=f"{tmp_path / 'none'}:fan")
+    refused("there is no type 'fun'.*did you mean 'fan'", machine_type=f"{store}:fun")
+    refused("leave --coefficients and --influence away", machine_type=address(fleet), coefficients="measured")
+    refused("no check runs to refine with", machine_type=address(fleet), refine=True)
+    other = machine.job(tmp_path / "other", runs=1)
+    table = pd.read_csv(other.parent / "runs.csv")
+    table.assign(speed_rpm=2000).to_csv(other.parent / "runs.csv", index=False)
+    refused("0 machines with these speeds", UndeterminedError, other, machine_type=address(fleet))
+    table.assign(sensor=["S1", "S9"]).to_csv(other.parent / "runs.csv", index=False)
+    refused("0 machines with these speeds", UndeterminedError, other, machine_type=address(fleet))
+    job.write_text(job.read_text().replace("machine_type", "machine"))
+    refused("or machine_type, whose coefficients come with balance --type", machine_type=address(fleet))
+
+
+def test_the_sample_has_one_odd_machine_which_lags(tmp_path):
+    fleet_add(tmp_path / "fans", [sample_data() / "fleet"])
+    found = fleet_fit(tmp_path / "fans", FleetFitOptions("fan-132"))
+    assert [(one["machine"], one["reason"]) for one in found.to_dict()["odd"]] == [
+        ("132-07", "its phases were of the other sense (lag for lead)")
+    ]

@@ -1,0 +1,264 @@
+"""Studies: probabilities against closed forms, balancing by runs, starts of calibrations, files, pictures."""
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binomtest
+from studies.drawn import SCATTER, STUDY, write
+
+import fem
+from balancing import Trials, correct, refine
+from rotorid import read_rotor
+from rotorid.samples import sample_data
+from rotorid.tables.reader.problems import InputError
+from rotorid.tables.study_file import read_study
+from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
+from rotorid.workflows.studies import drawn_machine
+from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED, UNSTABLE
+
+pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
+
+SAMPLE = sample_data() / "study"
+TWO = STUDY.replace(
+    "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
+).replace(
+    "[unbalance.3]",
+    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nmedian_g_mm = 300\n[unbalance.4]",
+)
+
+
+def run(file, **options):
+    with ThreadPoolExecutor(2) as pool:
+        return study(file, StudyOptions(**options), executor=pool)
+
+
+def test_the_probability_is_that_of_rayleigh(tmp_path):
+    """One node, one sensor: P(|W u| < limit) = 1 - exp(-(limit / (|W| rms))²)."""
+    found = run(write(tmp_path), samples=5000)
+    rotor = read_rotor(tmp_path / "rotor.csv")
+    W = abs(fem.influence(rotor, [3], [3], [3000 * np.pi / 30]).W.item())
+    exact = 1 - np.exp(-((10e-6 / (W * 500e-6)) ** 2))
+    document = found.to_dict()
+    assert 0.2 < exact < 0.8
+    assert document["probability"] == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / 5000))
+    assert document["samples"] == 5000
+    met = int(found.met[0])
+    expected = binomtest(met, 5000).proportion_ci(0.95, "exact")
+    assert document["interval"] == pytest.approx([expected.low, expected.high], rel=1e-9)
+    # the picture: the same at the limit, and the median of the distribution where it belongs
+    shares = np.cumsum(found.ratios[0]) / 5000
+    assert np.interp(1.0, EDGES[1:], shares) == pytest.approx(met / 5000)
+    median = W * 500e-6 * np.sqrt(np.log(2)) / 10e-6
+    assert np.interp(0.5, shares, EDGES[1:]) == pytest.approx(median, rel=0.05)
+
+
+def test_the_median_of_rayleigh_and_a_velocity_are_as_their_units_say(tmp_path):
+    job = read_study(write(tmp_path, TWO)).machine
+    assert job.unbalance[2] * np.sqrt(2 * np.log(2)) == pytest.approx(300e-6)
+    assert job.unbalance[4] * np.sqrt(2) == pytest.approx(500e-6)
+    omega = 3000 * np.pi / 30
+    assert job.gains[0] == pytest.approx([1 / 10e-6, 1j * omega / (1.2e-3 * np.sqrt(2))])
+
+
+def test_without_errors_one_correction_is_enough(tmp_path):
+    found = run(write(tmp_path, TWO), results=tmp_path / "kept")
+    table = pd.read_parquet(tmp_path / "kept")
+    shot = table[table.ratio_0 > 1]
+    assert 5 < len(shot) < 60
+    assert (shot.ratio_1 < 1e-6).all()
+    assert (shot.runs_needed == 4).all()
+    assert (table[table.ratio_0 <= 1].runs_needed == 1).all()
+    assert found.met.tolist() == [60 - len(shot), 60, 60, 60]
+    assert found.runs.tolist() == [1, 4, 5, 6]
+    assert (found.held == 0).all()
+
+
+def test_counts_are_those_of_the_table_and_later_corrections_help(tmp_path):
+    text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 2") + SCATTER.replace("= 2\n", "= 3\n")
+    found = run(write(tmp_path, text), samples=150, results=tmp_path / "kept")
+    table = pd.read_parquet(tmp_path / "kept")
+    assert table["sample"].tolist() == list(range(150))
+    counts = [(table.runs_needed <= runs).sum() for runs in (1, 4, 5, 6)]
+    assert found.met.tolist() == counts
+    assert counts[0] < counts[1] < counts[2] <= counts[3] < 150
+    for k, warned in enumerate((False, True)):
+        own = table[table.warned == warned]
+        assert found.held[k].tolist() == [(own.held == True).sum(), len(own)]  # noqa: E712 - pandas
+    assert found.reasons == {UNDETERMINED: table.why.notna().sum()}
+    assert 0 < found.reasons[UNDETERMINED] < 75
+    rows = found.to_dict()["rows"]
+    assert [row["probability"] for row in rows] == [n / 150 for n in counts]
+    assert found.to_frame()["met"].tolist() == counts
+
+
+def test_small_errors_within_the_model_are_covered(tmp_path):
+    """The engine draws errors as the analysis takes them: 95 % of the regions hold the truth."""
+    text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 1").replace("corrections = 3", "corrections = 1")
+    found = run(write(tmp_path, text + "[readings]\namplitude_percent = 0.5\nphase_deg = 0.3\n"), samples=400)
+    good, n = found.held.sum(axis=0).tolist()
+    assert n > 390
+    low, high = binomtest(good, n).proportion_ci(0.999)
+    assert low < 0.95 < high
+
+
+def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
+    """A sample again, its runs given to `balancing.refine` one by one."""
+    text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 0.02") + SCATTER
+    machines = drawn_machine.ready(read_study(write(tmp_path, text)).machine)
+    seen = []
+    real = drawn_machine.estimate_influence
+    monkeypatch.setattr(
+        drawn_machine, "estimate_influence", lambda trials: seen.append(trials) or real(trials)
+    )
+    row = drawn_machine.draw_machine(machines, np.random.default_rng([1, 4]))
+    assert row["ratio_3"] is not None
+    first, last = seen[0], seen[-1]
+
+    def part(runs):
+        names = tuple(last.runs[r] for r in runs)
+        shared = {"speeds": last.speeds, "sensors": last.sensors, "planes": last.planes}
+        errors = {"errors": last.errors, "run_errors": last.run_errors}
+        return Trials(names, readings=last.readings[:, runs], weights=last.weights[runs], **shared, **errors)
+
+    refined = refine(part([0, 1, 2]), part([3]), part([4]))
+    assert first.weights == pytest.approx(last.weights[:3])
+    assert correct(refined).weights == pytest.approx(correct(real(last)).weights, rel=1e-9)
+
+
+def test_an_unstable_rotor_is_told(tmp_path):
+    (tmp_path / "rotor.toml").write_text(
+        'shaft = "shaft.csv"\n[[bearing]]\nnode = 1\nstiffness_N_per_m = 1e7\ndamping_N_s_per_m = 2000\n'
+        "[[bearing]]\nnode = 5\nstiffness_N_per_m = 1e7\ndamping_N_s_per_m = 2000\n"
+        "[[seal]]\nnode = 3\nkxy_N_per_m = 9e5\nkyx_N_per_m = -9e5\n"
+    )
+    (tmp_path / "shaft.csv").write_text(
+        "element,length_m,diameter_m,mass_kg\n1,0.2,0.04,0\n2,0.2,0.04,5\n3,0.2,0.04,0\n4,0.2,0.04,0\n"
+    )
+    text = STUDY.replace("rotor.csv", "rotor.toml")
+    file = write(tmp_path, text)
+    with pytest.raises(ValueError, match="unstable at the speeds of the study"):
+        run(file)
+    stable = (tmp_path / "rotor.toml").read_text().replace("9e5", "4e4")
+    (tmp_path / "rotor.toml").write_text(stable)
+    found = run(write(tmp_path, text + '[scatter]\n"seal.kxy" = 300\n'), samples=100)
+    assert list(found.reasons) == [UNSTABLE]
+    assert 0 < found.reasons[UNSTABLE] < 100
+    assert found.met[0] <= 100 - found.reasons[UNSTABLE]
+
+
+def test_what_the_model_leaves_out_is_told(tmp_path):
+    (tmp_path / "rotor.toml").write_text(
+        'shaft = "rotor.csv"\n[[disc]]\nnode = 3\nmass_kg = 2\npolar_inertia_kg_m2 = 0.1\n'
+        "diametral_inertia_kg_m2 = 0.06\n"
+    )
+    found = run(write(tmp_path, STUDY.replace("rotor.csv", "rotor.toml")), samples=2)
+    known = fem.influence(read_rotor(tmp_path / "rotor.toml"), [3], [3], [100.0]).warnings
+    assert known
+    assert found.to_dict()["warnings"] == list(known)
+    assert found.answer.warnings == known
+
+
+def test_starts_end_where_calibrate_does():
+    found = run(SAMPLE / "starts.toml", samples=6)
+    options = CalibrateOptions("bearing[*].stiffness", exact=True)
+    rotor, data = sample_data() / "rotor23.csv", sample_data() / "calibration" / "critical.csv"
+    known = calibrate(rotor, data, options).found
+    assert found.found.tolist() == [6]
+    assert found.ends[0] == pytest.approx(known.found.estimate.solution, rel=1e-4)
+    assert found.chi_square[0] == pytest.approx(known.chi_square, rel=1e-3)
+    document = found.to_dict()
+    assert (document["probability"], document["not_converged"]) == (1.0, 0)
+    assert document["interval"][1] == 1.0
+    assert found.summary().startswith("6 starts of 6 end at the best of 1 minimum.")
+
+
+def test_ends_of_searches_are_told_apart_by_their_numbers():
+    from rotorid.workflows.studies.calibration_starts import count_minima
+
+    columns = {
+        "converged": np.array([True, True, True, False, True]),
+        "chi_square": np.array([5.0, 2.0, 2.0001, 1.0, 2.0]),
+        "k": np.array([1e7, 2e7, 2.0001e7, 0.0, 3e7]),
+    }
+    found = count_minima([columns, columns], ("k",))
+    assert found["lost"] == 2
+    assert found["found"].tolist() == [4, 2, 2]
+    assert found["chi_square"].tolist() == [2.0, 2.0, 5.0]
+    assert found["ends"].ravel() == pytest.approx([2e7, 3e7, 1e7])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('kind = "balance"', 'kind = "balanse"', "'balance' or 'calibrate'"),
+        ('kind = "balance"\n', "", "key kind"),
+        ("speeds_rpm = [3000]\n", "", "key speeds_rpm"),
+        ("node = 3\nlimit", "node = 9\nlimit", "key sensors.probe.node"),
+        ("limit_um_pp = 20\n", "", "the limit of the sensor"),
+        ("[unbalance.3]", "[unbalance.middle]", "key unbalance"),
+        ("rms_g_mm = 500", "rms_g_mm = -500", "key unbalance.3.rms_g_mm"),
+        ("rms_g_mm = 500", "rms_g_mm = 500\nmedian_g_mm = 50", "one key of them"),
+        ("samples = 60", "samples = 0", "key samples"),
+        ("rotor.csv", "roter.csv", "roter.csv"),
+        ("[planes.middle]", "[planer.middle]", "did you mean"),
+        ("= 500\n", '= 500\n[scatter]\n"bearing[9].kxx" = 10\n', "key scatter"),
+        (
+            "= 500\n",
+            '= 500\n[scatter]\n"bearing.kxx" = 10\n"bearing[1].kxx" = 10\n',
+            "each number of the rotor once",
+        ),
+        ("= 500\n", '= 500\n[scatter]\n"probe[probe].angle" = 10\n', "each number of the rotor once"),
+        ("= 500\n", '= 500\n[scatter]\n"bearing[3].stiffness" = 9\n', "of 2 bearings none is called '3'"),
+        ("= 500\n", "= 500\n[readings]\nrun_percent = 200\n", "key readings.run_percent"),
+        ("= 500\n", '= 500\n[calibrate]\ndata = ["a.csv"]\nestimate = "disc.scale"\n', "key calibrate"),
+        ('kind = "balance"', 'kind = "calibrate"', "key calibrate"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told_with_its_key(tmp_path, old, new, words):
+    assert old in STUDY
+    with pytest.raises(InputError) as told:
+        read_study(write(tmp_path, STUDY.replace(old, new)))
+    assert words in str(told.value)
+    assert len(told.value.problems) <= 4
+
+
+def test_the_command(cli, tmp_path, monkeypatch):
+    file = write(tmp_path, TWO)
+    monkeypatch.setattr(sys.modules["rotorid.workflows.studies.study"], "MACHINES", 30)
+    outcome = cli("study", file, "--json", "--results", tmp_path / "kept", "--plot", tmp_path / "a.png")
+    assert outcome.code == 0, outcome.err
+    assert {"probability", "interval", "samples"} < set(outcome.json)
+    assert sorted(p.name for p in (tmp_path / "kept").iterdir())[-2:] == [
+        "part-000000.parquet",
+        "part-000001.parquet",
+    ]
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+    assert cli("study", file, "--samples", "0").code == 2
+    refused = cli("study", file, "--seed", "5", "--results", tmp_path / "kept")
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+
+
+def test_without_pyarrow_one_sentence_says_how_to_get_it(cli, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    outcome = cli("study", write(tmp_path))
+    assert outcome.code == 2
+    assert outcome.err == 'rotorid: a study needs pyarrow: pip install "rotorid[fleet]"\n'
+
+
+def test_the_pictures_have_a_limit_and_units(tmp_path):
+    figure = run(write(tmp_path, TWO)).figure()
+    (ax,) = figure.axes
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [
+        "as built",
+        "after the last correction",
+        "limit",
+    ]
+    assert ax.get_xlabel() == "largest reading over its limit"
+    assert "%" in ax.get_ylabel()
+    (ax,) = run(write(tmp_path)).figure().axes
+    assert len(ax.get_legend().get_texts()) == 2
+    with pytest.raises(ValueError, match="no picture"):
+        run(SAMPLE / "starts.toml", samples=1).figure()

@@ -1,0 +1,189 @@
+"""Chunks on any executor: the same bytes, dead workers, breaks, memory."""
+
+import logging
+import os
+import subprocess
+import sys
+import time
+import tracemalloc
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from studies.drawn import SCATTER, STUDY, fatal, kept, noted, task, write
+
+import rotorid.workflows.studies.study as module
+from rotorid.workflows import StudyOptions, study
+from rotorid.workflows.studies.chunks import SampleError, rows_in, run_study, single_threads
+
+pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
+
+NUMBERS = [float(np.random.default_rng([7, k]).standard_normal()) for k in range(12)]
+
+SMALL = "import rotorid.workflows.studies.study as s, rotorid.cli; s.MACHINES = 50; rotorid.cli.main()"
+"""The command line with small parts."""
+
+
+def numbers(folder):
+    return [x for part in sorted(folder.glob("part-*")) for x in pq.read_table(part)["x"].to_pylist()]
+
+
+@pytest.fixture
+def threads():
+    with ThreadPoolExecutor(2) as pool:
+        yield pool
+
+
+def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypatch, threads):
+    distributed = pytest.importorskip("distributed", reason="without the extra rotorid[cluster]")
+
+    monkeypatch.setattr(module, "MACHINES", 20)
+    file = write(tmp_path, STUDY.replace("samples", "corrections = 2\nsamples") + SCATTER)
+    found = [study(file, StudyOptions(workers=n, results=tmp_path / f"own{n}")) for n in (1, 2)]
+    found.append(study(file, StudyOptions(results=tmp_path / "threads"), executor=threads))
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        found.append(study(file, StudyOptions(results=tmp_path / "dask"), executor=client.get_executor()))
+    one, *others = (kept(tmp_path / name) for name in ("own1", "own2", "threads", "dask"))
+    assert list(one) == [f"part-{k:06d}.parquet" for k in range(3)]
+    assert others == [one] * 3
+    assert len({str(each.to_dict()) for each in found}) == 1
+    ratios = np.concatenate([pq.read_table(p)["ratio_0"] for p in sorted((tmp_path / "own1").glob("part*"))])
+    assert len(set(ratios)) == 60
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threads, monkeypatch):
+    """The workers end with their parent."""
+    file = write(tmp_path, STUDY.replace("= 60", "= 400") + '[scatter]\n"bearing[*].stiffness" = 20')
+    monkeypatch.setattr(module, "MACHINES", 50)
+    words = [file, "--workers", "2", "--results", tmp_path / "killed"]
+    started = subprocess.Popen([sys.executable, "-c", SMALL, "study", *words], stderr=subprocess.DEVNULL)
+    while not kept(tmp_path / "killed"):
+        time.sleep(0.02)
+        assert started.poll() is None
+    workers = subprocess.run(["pgrep", "-P", str(started.pid)], capture_output=True, text=True).stdout.split()
+    assert len(workers) >= 2
+    started.kill()
+    started.wait()
+    left = kept(tmp_path / "killed")
+    assert len(left) < 8
+    for _ in range(100):
+        if not [pid for pid in workers if os.path.exists(f"/proc/{pid}")]:
+            break
+        time.sleep(0.05)
+    assert [pid for pid in workers if os.path.exists(f"/proc/{pid}")] == []
+    continued = study(file, StudyOptions(results=tmp_path / "killed"), executor=threads)
+    unbroken = study(file, StudyOptions(results=tmp_path / "unbroken"), executor=threads)
+    assert kept(tmp_path / "killed") == kept(tmp_path / "unbroken")
+    assert continued.to_dict() == unbroken.to_dict()
+
+
+def test_a_worker_that_dies_once_is_replaced_and_its_samples_repeated(tmp_path):
+    data = {"flag": str(tmp_path / "died"), "deadly": NUMBERS[5], "always": False}
+    run_study(task(fatal, data), 12, tmp_path, 2, None)
+    assert (tmp_path / "died").exists()
+    assert numbers(tmp_path) == NUMBERS
+
+
+def test_samples_that_kill_every_worker_are_named(tmp_path):
+    data = {"flag": str(tmp_path / "died"), "deadly": NUMBERS[5], "always": True}
+    with pytest.raises(ValueError, match=r"a worker died 3 times on the samples 4 to 5: BrokenProcessPool"):
+        run_study(task(fatal, data), 12, tmp_path, 2, None)
+
+
+class Losing(Executor):
+    """Runs what it is given at once; of some submissions the worker is lost."""
+
+    def __init__(self, lost):
+        self.lost, self.submitted = lost, []
+
+    def submit(self, function, *args):
+        future = Future()
+        self.submitted.append(args[1])
+        if len(self.submitted) in self.lost:
+            future.set_exception(ConnectionError("worker lost"))
+        else:
+            future.set_result(function(*args))
+        return future
+
+
+def test_a_given_executor_that_loses_workers_gets_their_samples_again(tmp_path):
+    pool = Losing({1, 4, 7})
+    run_study(task(), 12, tmp_path, 1, pool)
+    assert numbers(tmp_path) == NUMBERS
+    assert sorted(pool.submitted) == sorted([*range(0, 12, 2), *(pool.submitted[k - 1] for k in (1, 4, 7))])
+    with pytest.raises(ValueError, match=r"died 3 times on the samples 12 to 13: ConnectionError"):
+        run_study(task(), 14, tmp_path, 1, Losing({1, 2, 3}))
+
+
+def test_what_a_sample_raises_is_told_with_its_number_and_not_repeated(tmp_path, threads):
+    data = {"calls": str(tmp_path / "calls"), "wrong": NUMBERS[3]}
+    with pytest.raises(SampleError, match=r"^sample 3 \(seed 7\): ZeroDivisionError: no such bearing$"):
+        run_study(task(noted, data), 12, tmp_path, 1, threads)
+    assert (tmp_path / "calls").read_text().split().count(str(NUMBERS[3])) == 1
+
+
+def test_more_samples_continue_a_study_and_a_damaged_part_is_made_anew(tmp_path, threads, monkeypatch):
+    monkeypatch.setattr(module, "MACHINES", 20)
+    file = write(tmp_path)
+    for samples in (50, 90):
+        grown = study(file, StudyOptions(samples=samples, results=tmp_path / "grown"), executor=threads)
+    at_once = study(file, StudyOptions(samples=90, results=tmp_path / "at once"), executor=threads)
+    assert kept(tmp_path / "grown") == kept(tmp_path / "at once")
+    assert grown.to_dict() == at_once.to_dict()
+    fewer = study(file, StudyOptions(samples=50, results=tmp_path / "grown"), executor=threads)
+    assert fewer.to_dict() == study(file, StudyOptions(samples=50), executor=threads).to_dict()
+    part = tmp_path / "grown" / "part-000001.parquet"
+    part.write_bytes(part.read_bytes()[:-100])
+    assert rows_in(part) == 0
+    study(file, StudyOptions(samples=90, results=tmp_path / "grown"), executor=threads)
+    assert kept(tmp_path / "grown") == kept(tmp_path / "at once")
+
+
+def test_a_folder_of_another_study_is_refused_as_it_is(tmp_path, threads):
+    file = write(tmp_path)
+    study(file, StudyOptions(results=tmp_path / "kept"), executor=threads)
+    before = kept(tmp_path / "kept")
+    with pytest.raises(ValueError, match="another study is kept here"):
+        study(file, StudyOptions(seed=2, results=tmp_path / "kept"), executor=threads)
+    (tmp_path / "rotor.csv").write_text((tmp_path / "rotor.csv").read_text().replace("0.04", "0.05"))
+    with pytest.raises(ValueError, match="another study is kept here"):
+        study(file, StudyOptions(results=tmp_path / "kept"), executor=threads)
+    assert kept(tmp_path / "kept") == before
+    with pytest.raises(ValueError, match="no study is kept here, but other files"):
+        study(file, StudyOptions(results=tmp_path), executor=threads)
+
+
+def test_memory_does_not_grow_with_the_samples(tmp_path, monkeypatch):
+    """Neither the chunks that are to come nor those that are done are kept."""
+
+    def peak(samples):
+        folder = tmp_path / str(samples)
+        folder.mkdir()
+        tracemalloc.start()
+        run_study(task(chunk=1), samples, folder, 1, Losing(set()))
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    monkeypatch.setattr(logging.getLogger("rotorid.progress"), "disabled", True)  # pytest keeps what is said
+    peak(1)  # imports
+    assert peak(1200) < 1.2 * peak(400)
+
+
+def test_progress_tells_the_time_that_is_left(tmp_path, caplog):
+    with caplog.at_level(logging.INFO, "rotorid.progress"):
+        run_study(task(), 6, tmp_path, 1, Losing(set()))
+    said = [record.getMessage() for record in caplog.records]
+    assert [line.partition(",")[0] for line in said] == [f"{n} of 6 samples" for n in (2, 4, 6)]
+    assert said[-1].endswith("about 0 s left")
+
+
+def test_the_environment_is_restored(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "5")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    before = dict(os.environ)
+    with single_threads():
+        assert os.environ["OMP_NUM_THREADS"] == os.environ["MKL_NUM_THREADS"] == "1"
+    assert dict(os.environ) == before
