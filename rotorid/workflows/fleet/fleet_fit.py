@@ -7,8 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, figures
@@ -55,6 +53,8 @@ class TypeFound(Outcome):
 
     @property
     def _columns(self) -> tuple[Column, ...]:
+        import numpy as np
+
         kind, found = self.known.kind, self.known.kind.influence(self.labels).to_frame()
         (along, across), (run, turn) = map(kind.scatter, (kind.effects.between, kind.effects.within))
         angle = "{:.1f}".format
@@ -82,7 +82,7 @@ class TypeFound(Outcome):
                 "machine": record.machine,
                 "job": record.job,
                 "path": self.known.jobs["path"][record.job],
-                "times_the_limit": float(np.sqrt(far)),
+                "times_the_limit": float(far) ** 0.5,
                 "reason": reason or None,
             }
             for (record, far), reason in zip(self.known.kind.odd, self.known.reasons, strict=True)
@@ -141,6 +141,8 @@ def _odd_words(one: Mapping[str, Any]) -> str:
 
 def _typical(along: FloatArray, across: FloatArray) -> str:
     """Root mean square over the coefficients, in words."""
+    import numpy as np
+
     percent, degrees = 100 * np.sqrt(np.mean(along**2)), np.degrees(np.sqrt(np.mean(across**2)))
     if not along.any():
         return "no more than the errors of their runs explain"

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import contextvars
-import os
-import signal
-import threading
 import warnings
 from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
+from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rotorid.base.worker_processes import single_threads, worker_pool
 
 if TYPE_CHECKING:
     from balancing import Influence
@@ -40,7 +38,7 @@ def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[ReadJob]:
     if workers == 1:
         yield from (read for chunk in chunks for read in _read_chunk(chunk))
         return
-    with ProcessPoolExecutor(workers, get_context("spawn"), _begin) as pool:
+    with single_threads(), worker_pool(workers) as pool:
         under_way: deque[Future[list[ReadJob]]] = deque()
         for chunk in chunks:
             under_way.append(pool.submit(_read_chunk, chunk))
@@ -48,20 +46,6 @@ def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[ReadJob]:
                 yield from under_way.popleft().result()
         while under_way:
             yield from under_way.popleft().result()
-
-
-def _begin() -> None:
-    """In a process that reads: Ctrl+C is for the one that asks, and where that is gone this one goes, too."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy is not loaded yet
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _read_chunk(chunk: Sequence[FoundJob]) -> list[ReadJob]:

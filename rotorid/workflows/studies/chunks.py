@@ -6,12 +6,10 @@ sample raises is told with its number; any other failure of a future is the exec
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import closing, contextmanager
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ import numpy as np
 
 from rotorid.base.logs import progress
 from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.worker_processes import single_threads, worker_pool
 
 ATTEMPTS = 3
 AHEAD, AHEAD_ELSEWHERE = 4, 256
@@ -129,7 +128,7 @@ class _Underway:
     given: Executor | None
 
     def __post_init__(self) -> None:
-        self.pool = self.given or local_pool(self.workers)
+        self.pool = self.given or worker_pool(self.workers)
         self.running: dict[Future[list[Row]], tuple[Chunk, int]] = {}
         self.waiting: list[tuple[Chunk, int]] = []
 
@@ -185,7 +184,7 @@ class _Underway:
     def _renew(self) -> None:
         self.running.clear()
         self.pool.shutdown()
-        self.pool = local_pool(self.workers)
+        self.pool = worker_pool(self.workers)
 
     def close(self) -> None:
         """Leave nothing at the executor."""
@@ -193,40 +192,3 @@ class _Underway:
             future.cancel()
         if self.given is None:
             self.pool.shutdown(cancel_futures=True)
-
-
-def local_pool(workers: int) -> Executor:
-    """Processes of their own, alike on every system, which end with this one."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent)
-
-
-def _end_with_parent() -> None:
-    """A worker whose parent is killed waits for work for ever: end it then; Ctrl+C is the parent's alone."""
-    import signal
-    import threading
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        parent = multiprocessing.parent_process()
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@contextmanager
-def single_threads() -> Iterator[None]:
-    """One thread of linear algebra in processes that start now: more change digits, and are slower."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name)
-            if value is not None:
-                os.environ[name] = value

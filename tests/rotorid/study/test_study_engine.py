@@ -13,8 +13,9 @@ import pytest
 from studies.drawn import SCATTER, STUDY, fatal, kept, noted, task, write
 
 import rotorid.workflows.studies.study as module
+from rotorid.base.worker_processes import single_threads
 from rotorid.workflows import StudyOptions, study
-from rotorid.workflows.studies.chunks import SampleError, rows_in, run_study, single_threads
+from rotorid.workflows.studies.chunks import SampleError, rows_in, run_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
