@@ -4,6 +4,7 @@ VENV ?= .venv
 BENCH_VENV ?= .venv-bench
 HSBALANCE_VENV ?= .venv-hsbalance
 ROTA_ORDER_VENV ?= .venv-rota-order
+HOUSE_VENV ?= .venv-house
 LATEST_VENV ?= .venv-latest
 LOWEST_VENV ?= .venv-lowest
 LOWEST_PYTHON ?= python3.11
@@ -21,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-latest test-lowest mutants fuzz golden golden-exact lint docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -102,9 +103,24 @@ bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer $(ROTA_ORDER_VENV)/.peer
 	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python ROTORID_ROTA_ORDER_PYTHON=$(ROTA_ORDER_VENV)/bin/python \
 	  $(BENCH_VENV)/bin/python -m benchmarks --json docs/benchmarks.json
 
-build: $(VENV)/.dev
-	$(BIN)/python -m pip -q install build
-	$(BIN)/python -m build
+# Wheel and sdist, the wheel made from the sdist.
+DIST ?= dist
+build: $(HOUSE_VENV)/.house
+	rm -rf $(DIST)
+	$(HOUSE_VENV)/bin/python -m build --outdir $(DIST) > /dev/null
+	$(HOUSE_VENV)/bin/twine check --strict $(DIST)/*
+
+# Every test against the installed wheel: a folder with all of the source but the packages, and an environment in it.
+# Left out are the tests of how the source is written.
+WHEEL ?= .wheel
+OF_SOURCE = tests/test_house.py tests/mutants tests/docs/test_architecture.py tests/docs/test_names.py
+test-wheel: build
+	rm -rf $(WHEEL)
+	mkdir $(WHEEL)
+	git ls-files -z | grep -zvE '^(fem|balancing|rotorid)/' | tar --null -T - -c | tar -x -C $(WHEEL)
+	$(call environment,$(WHEEL)/.venv)
+	$(WHEEL)/.venv/bin/python -m pip -q install $(DIST)/*.whl $(GROUPS:%=--group %)
+	cd $(WHEEL) && .venv/bin/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder $(OF_SOURCE:%=--ignore %)
 
 # Makes constraints.txt anew, one file for every Python and system, with the newest versions that fit together.
 constraints: CONSTRAINTS =
@@ -132,6 +148,11 @@ $(BENCH_VENV)/.bench: pyproject.toml $(CONSTRAINTS)
 	$(BENCH_VENV)/bin/python -m pip -q install -e . --group bench
 	touch $@
 
+$(HOUSE_VENV)/.house: pyproject.toml $(CONSTRAINTS)
+	$(call environment,$(HOUSE_VENV))
+	$(HOUSE_VENV)/bin/python -m pip -q install --group house
+	touch $@
+
 # hsbalance in its own environment, without XPRESS, whose free licence refuses all but small problems
 $(HSBALANCE_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
 	$(call environment,$(HSBALANCE_VENV))
@@ -146,5 +167,5 @@ $(ROTA_ORDER_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(ROTA_ORDER_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) build dist demo docs/_build
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(ROTA_ORDER_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) $(HOUSE_VENV) $(WHEEL) build dist demo docs/_build
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .mutants

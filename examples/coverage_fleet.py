@@ -35,7 +35,8 @@ ODD = {"lag for lead": "lag", "another keyphasor mark": "mark", "two sensors exc
 
 class Shot(NamedTuple):
     """What a correction left, relative to the vibration; which intervals held; whether it was warned, or called
-    a machine of another type."""
+    a machine of another type.
+    """
 
     left: float
     weights: bool
@@ -118,7 +119,7 @@ def judged(
     D: ComplexArray,
     left: float,
     check: ComplexArray,
-    foreign: bool,  # noqa: FBT001
+    foreign: bool,
 ) -> Shot:
     """Against the truth, and a check run."""
     assert found.covariance is not None

@@ -3,12 +3,11 @@
 import ast
 import re
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
-from rotorid.samples import sample_data
-
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("fem", "balancing", "rotorid")
 MOST, LEAST = 24, 4
 """Modules of a folder: more is a corridor, fewer (with a package's own page) is a module."""

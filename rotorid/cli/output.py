@@ -169,6 +169,9 @@ def json_text(document: Mapping[str, Any]) -> str:
 
 def figure_bytes(figure: Figure, path: Path) -> bytes:
     """A figure in the format that the name of its file asks for."""
+    import matplotlib as mpl
+
     stream = io.BytesIO()
-    figure.savefig(stream, dpi=150, format=path.suffix.lower().lstrip("."))
+    with mpl.rc_context({"svg.hashsalt": "rotorid"}):  # the same ids each time
+        figure.savefig(stream, dpi=150, format=path.suffix.lower().lstrip("."))
     return stream.getvalue()

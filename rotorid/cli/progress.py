@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from rotorid.base.logs import progress as log
 from rotorid.cli.terminal import dumb
 
 PATIENCE = 1.0
@@ -44,7 +45,6 @@ def busy(what: str) -> Iterator[None]:
         What takes so long.
     """
     done, stage = threading.Event(), _Stage()
-    log = logging.getLogger("rotorid.progress")
     log.setLevel(logging.INFO)
     log.propagate = False
     log.addHandler(stage)

@@ -13,6 +13,8 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from rotorid.base.logs import workflows as log
+
 VerboseOption = Annotated[
     bool,
     typer.Option(
@@ -67,7 +69,6 @@ SHOWN = (
 """Keys of the JSON documents that say how a result came about, at any depth."""
 MOST = 12
 """So many numbers of a list are printed."""
-log = logging.getLogger("rotorid.workflows")
 
 
 class _Kept(logging.Handler):

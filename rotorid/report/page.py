@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.report.document import Document
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def render_report(
     jinja2.UndefinedError
         If the template names something that the context does not hold.
     """
-    whole = Document({**document, "provenance": dict(provenance)})
+    whole = Document({**document, "schema_version": SCHEMA_VERSION, "provenance": dict(provenance)})
     page = _environment().get_template(template)
     text = page.render(
         document=whole.data,

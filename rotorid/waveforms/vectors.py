@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
+from rotorid.base.logs import progress
 from rotorid.base.text import listing
 from rotorid.waveforms.order_tracking import Orders, track_orders
 from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
@@ -30,7 +30,6 @@ LEAST_TURNS = 2.0
 MOVES = 0.1
 """A vector that moves by more, of its size, at a steady speed is worth a word."""
 TOLD = 3.0
-log = logging.getLogger("rotorid.progress")
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,7 @@ def _found(
     def parts() -> Iterator[tuple[FloatArray, FloatArray]]:
         for start in range(begin, end, PART):
             stop = min(end, start + PART)
-            log.info("%s at %.0f %%", record.run, 100 * (start - begin) / (end - begin))
+            progress.info("%s at %.0f %%", record.run, 100 * (start - begin) / (end - begin))
             turns = tacho.turn_at(np.arange(start, stop) / record.rate)
             yield turns, np.stack([c.samples[start:stop] * c.factor for c in record.sensors], axis=1)
 

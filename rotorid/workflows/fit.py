@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.logs import workflows as log
 from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import Times, check_names, number, pairs, times
-from rotorid.workflows.result_provenance import Parts, log, phase, provenance, text_of, workflow
+from rotorid.workflows.result_provenance import Parts, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

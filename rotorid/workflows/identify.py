@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.logs import workflows as log
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import Speeds, speeds
-from rotorid.workflows.result_provenance import Found, Parts, log, phase, provenance, text_of, workflow
+from rotorid.workflows.result_provenance import Found, Parts, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

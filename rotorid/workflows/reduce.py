@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from rotorid.base.logs import workflows as log
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 from rotorid.workflows.input_checks import rotor_source
@@ -25,7 +26,7 @@ from rotorid.workflows.option_values import (
     option_name,
     rising_speeds,
 )
-from rotorid.workflows.result_provenance import log, provenance, workflow
+from rotorid.workflows.result_provenance import provenance, workflow
 
 if TYPE_CHECKING:
     from fem import Rotor

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
+from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.workflows.option_values import one_of
 from rotorid.workflows.result_provenance import Parts
 
@@ -199,7 +200,7 @@ class ReducedRotor(Parts):
 
         small = self.with_small().small
         assert small is not None
-        document = small.state_space(self.speed).to_dict()
+        document = {"schema_version": SCHEMA_VERSION, **small.state_space(self.speed).to_dict()}
         if ending == ".json":
             return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
         arrays = {key: np.array(value) for key, value in document.items()}
@@ -209,9 +210,11 @@ class ReducedRotor(Parts):
 
             named = {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED}
             savemat(stream, arrays | named)
-        else:
-            # numpy before 2.1 would store allow_pickle= as an array
-            np.savez(stream, **arrays)  # type: ignore[arg-type]
+            # the text at the top, of 116 bytes, has the date of the clock
+            head = f"MATLAB 5.0 MAT-file, written by rotorid, {now():%Y-%m-%d %H:%M:%S} UTC"
+            return head.encode().ljust(116) + stream.getvalue()[116:]
+        # numpy before 2.1 would store allow_pickle= as an array
+        np.savez(stream, **arrays)  # type: ignore[arg-type]
         return stream.getvalue()
 
     def _motion(self) -> fem.Motion:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-import logging
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rotorid.base.answer import Answer, Answered, together
+from rotorid.base.logs import workflows as log
+from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.workflows.input_checks import changed, checked, plain
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-log = logging.getLogger("rotorid.workflows")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,7 +65,7 @@ class Outcome(Answered):
     @property
     def document(self) -> dict[str, Any]:
         """What `--json` prints."""
-        return {**self.to_dict(), "provenance": dict(self.provenance)}
+        return {**self.to_dict(), "schema_version": SCHEMA_VERSION, "provenance": dict(self.provenance)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -158,7 +157,7 @@ def provenance(
     return {
         "program": "rotorid",
         "version": __version__,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "date": now().isoformat(timespec="seconds"),
         "inputs": [{"file": str(f), "sha256": hash_of(f)} for f in files],
         "options": {key: plain(value) for key, value in (given | changed(options)).items()},
     }

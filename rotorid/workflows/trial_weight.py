@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from rotorid.base.answer import Answer, together
+from rotorid.base.logs import workflows as log
 from rotorid.workflows.input_checks import job_source, refuse
 from rotorid.workflows.option_values import Names, degrees, names, number, one_of
-from rotorid.workflows.result_provenance import Outcome, log, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.workflows import balance
 
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "architecture.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 STATIONS = re.findall(r"^\|[^|]*\| `(\w+)` \| `([\w/.]+)` \|$", TEXT, re.MULTILINE)

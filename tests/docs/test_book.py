@@ -3,6 +3,7 @@
 import re
 import shlex
 import shutil
+from pathlib import Path
 
 import pytest
 from golden.cases import CASES, TEXT
@@ -10,7 +11,7 @@ from golden.storing import read
 
 from rotorid.samples import sample_data
 
-PAGE = sample_data().parent / "docs" / "book" / "index.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "book" / "index.md"
 
 
 def _to(last, first=1, text="({})"):

@@ -5,13 +5,13 @@ import re
 import subprocess
 import sys
 from importlib import import_module, metadata
+from pathlib import Path
 
 import pytest
 
 from rotorid.base.answer import COLUMNS, LINES
-from rotorid.samples import sample_data
 
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 for _folder in (DOCS / "_ext", DOCS):
     sys.path.insert(0, str(_folder))

@@ -1,6 +1,7 @@
 """docs/files.md names every column and every key that the readers know."""
 
 import re
+from pathlib import Path
 
 import pytest
 from cases import each_of
@@ -21,7 +22,7 @@ from rotorid.tables.runs import influence_table as influence
 from rotorid.tables.runs import runs_table as runs
 from rotorid.tables.runs import weights_table as weights
 
-TEXT = (sample_data().parent / "docs" / "files.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
 WORDS = {
     word for code in re.findall(r"`([^`]+)`", TEXT.replace("```", "")) for word in re.findall(r"\w+", code)
 }

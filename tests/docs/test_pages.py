@@ -12,7 +12,7 @@ from docs_blocks import blocks, commands, first_difference, renewed, run_page
 from rotorid.base.compiled import COMPILED
 from rotorid.samples import sample_data
 
-DOCS = sample_data().parent / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})

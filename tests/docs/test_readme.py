@@ -3,14 +3,13 @@
 import re
 import shlex
 import shutil
+from pathlib import Path
 
 import pytest
 from golden.cases import CASES, TEXT
 from golden.storing import read
 
-from rotorid.samples import sample_data
-
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[2]
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
 COMMANDS = [
     line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith("rotorid ")

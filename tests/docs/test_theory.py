@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,10 +14,9 @@ from fem import equations_of_motion, influence, probe
 from fem.solvers.receptance_derivatives import receptance_with_derivatives
 from rotorid import equivalent_masses, stretch
 from rotorid.harmonic.experiments import experiments
-from rotorid.samples import sample_data
 from rotorid.timedomain import simulate
 
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "theory"
 INDEX = (FOLDER / "index.md").read_text(encoding="utf-8")
 TOCTREE = re.search(r"```\{toctree\}\n(.*?)```", INDEX, re.DOTALL)

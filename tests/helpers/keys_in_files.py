@@ -1,15 +1,15 @@
 """Tables of keys in docs/files.md: `python tests/helpers/keys_in_files.py` writes them."""
 
 import re
+from pathlib import Path
 
-from rotorid.samples import sample_data
 from rotorid.tables import study_file
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
 from rotorid.tables.waveforms import waveform_keys
 
-PAGE = sample_data().parent / "docs" / "files.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
 TABLES = {
     "key": job_keys.JOB,
     "key of [errors]": job_keys.ERRORS,

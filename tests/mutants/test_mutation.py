@@ -1,13 +1,14 @@
 """Mutations: the same from a seed, of one line, still Python; and the tests that they meet."""
 
+from pathlib import Path
+
 import mutants
 import mutation
 from cases import each_of
 
 import fem
-from rotorid.samples import sample_data
 
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def changed(source):

@@ -164,7 +164,7 @@ class FleetStore:
             raise ValueError(
                 f"{path}: expected a whole Parquet table; remove the batch and add it again"
             ) from error
-        version = (table.schema.metadata or {}).get(b"rotorid_fleet", b"").decode()
+        version = (table.schema.metadata or {}).get(b"schema_version", b"").decode()
         if version != VERSION:
             raise ValueError(f"{path}: expected tables of version {VERSION}, not {version!r}: update rotorid")
         return table

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-VERSION = "1"
+from rotorid.base.versions import SCHEMA_VERSION
+
+VERSION = str(SCHEMA_VERSION)
 _COLUMNS = {
     "readings": "job kind run repeat speed_rad_s sensor amplitude phase_deg std_re std_im cov_re_im",
     "weights": "job kind run plane weight angle_deg",
@@ -59,7 +61,7 @@ def schema(name: str) -> Any:  # noqa: ANN401 - of pyarrow
     }
     kind_of = {column: kinds[kind] for kind, columns in _KINDS.items() for column in columns.split()}
     columns = [(column, kind_of.get(column, pa.string())) for column in TABLES[name]]
-    return pa.schema(columns, metadata={"rotorid_fleet": VERSION})
+    return pa.schema(columns, metadata={"schema_version": VERSION})
 
 
 def arrow_table(name: str, parts: Sequence[Columns]) -> Any:  # noqa: ANN401 - of pyarrow

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import BoolArray
+from rotorid.base.versions import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from fem.matrices.equations_of_motion import Motion
@@ -58,6 +59,7 @@ def ode_model_bytes(
     _check(motion, inputs, outputs)
     massless = np.asarray(~(motion.M.any(axis=0) | motion.M.any(axis=1)), dtype=bool)
     lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
+    lines.append(f"schema_version = {SCHEMA_VERSION}")
     if motion.speed:
         lines.append(f"speed_rad_s = {float(motion.speed)!r}")
     if inputs:

@@ -16,6 +16,7 @@ from fem.model.supports import KINDS
 from fem.static import GRAVITY
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.motion.small_model import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.problems import Problems, TableWarning
@@ -184,7 +185,7 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
     """
     import tomli_w
 
-    lines = [f"# {comment}" for comment in comments]
+    lines = [*(f"# {comment}" for comment in comments), f"schema_version = {SCHEMA_VERSION}"]
     for name, key in _ATTRIBUTES.items():
         array = np.array(getattr(model, name))
         if array.ndim == 1:

@@ -5,14 +5,19 @@ from __future__ import annotations
 import io
 import math
 import re
+import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from decimal import Decimal
 from typing import Any
 
+from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.tables.reader.grid import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
+_FIRST = datetime(1980, 1, 1, tzinfo=UTC)
+"""Date of an archive."""
 MOST_ROWS = 1048576
 _LONGEST_LIST = 255
 _WIDEST, _NARROWEST, _LOOKED_AT = 60, 9, 200
@@ -68,18 +73,31 @@ def book_bytes(pages: Sequence[Page], shown: str) -> bytes:
         For what no workbook holds: control characters, cells and sheets that are too long.
     """
     import openpyxl
+    from openpyxl.packaging.custom import IntProperty
+    from openpyxl.writer.excel import ExcelWriter
 
     book = openpyxl.Workbook()
     book.remove(book.active)
     book.properties.creator = "rotorid"
+    book.properties.created = book.properties.modified = now().replace(tzinfo=None)
+    book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
     for page in pages:
         sheet = book.create_sheet(page.title)
         _write(sheet, page)
         sheet.sheet_view.tabSelected = page.title == shown
     book.active = [page.title for page in pages].index(shown)
     stream = io.BytesIO()
-    book.save(stream)
+    ExcelWriter(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
     return stream.getvalue()
+
+
+class _Archive(zipfile.ZipFile):
+    """Dates its parts as the workbook, not by the clock."""
+
+    def open(self, name: Any, mode: Any = "r", *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
+        if mode == "w":
+            name.date_time = max(now(), _FIRST).timetuple()[:6]
+        return super().open(name, mode, *args, **kwargs)
 
 
 def header_row(lines: Sequence[Line]) -> int:

@@ -48,7 +48,7 @@ def sheets_in(path: Path, data: bytes, problems: Problems) -> dict[str, list[Row
         return None
     try:
         _check_size(data)
-        return _sheets(data, time.monotonic() + MOST_SECONDS)
+        return _sheets(str(path), data, time.monotonic() + MOST_SECONDS, problems)
     except _TooLarge as error:
         problems.add(str(path), None, None, None, str(error))
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
@@ -72,7 +72,7 @@ def _check_size(data: bytes) -> None:
         )
 
 
-def _sheets(data: bytes, deadline: float) -> dict[str, list[Row]]:
+def _sheets(source: str, data: bytes, deadline: float, problems: Problems) -> dict[str, list[Row]]:
     import openpyxl
     from openpyxl.cell.read_only import ReadOnlyCell
     from openpyxl.worksheet._reader import FORMULA_TAG, WorkSheetParser
@@ -89,6 +89,8 @@ def _sheets(data: bytes, deadline: float) -> dict[str, list[Row]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about styles and validation rules, which do not concern us
         book = openpyxl.load_workbook(io.BytesIO(data), data_only=True, read_only=True)
+        if "schema_version" in book.custom_doc_props.names:
+            problems.refuse_newer(source, book.custom_doc_props["schema_version"].value)
         found: dict[str, list[Row]] = {}
         for sheet in book.worksheets:
             # not its iter_rows, which fills gaps up to the last format and drops rows that are not in order

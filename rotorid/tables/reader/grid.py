@@ -21,6 +21,7 @@ MOST_CELLS = 5_000_000
 
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])")
 """#N/A, #DIV/0!, #ИМЯ?"""
+_VERSION = re.compile(r"schema_version\s*=\s*(\d{1,9})")
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u202f\u2007\u2009"), " ") | {0xFEFF: None}
 
 
@@ -162,6 +163,8 @@ def make_grid(
             comments.append(_comment(cells, separator))
         elif not all(cell == "" for cell in cells):
             filled.append((number, cells))
+    for version in filter(None, map(_VERSION.fullmatch, comments)):
+        problems.refuse_newer(source, int(version[1]))
     if not filled:
         if complete:
             problems.add(source, None, None, None, "a table with a header row; the file is empty")

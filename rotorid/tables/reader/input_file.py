@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
+from rotorid.base.logs import files
+
 STANDARD_INPUT = "-"
 MOST_BYTES = 200_000_000
 reading: ContextVar[Callable[[Path], None] | None] = ContextVar("reading", default=None)
@@ -53,6 +55,7 @@ def file_content(path: Path) -> bytes:
         data = first_bytes(path, MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
+    files.debug("read %s, %d bytes", path, len(data))
     if seen is not None:
         seen[path] = data
     return data

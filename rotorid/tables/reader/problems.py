@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from rotorid.base.suggestions import suggest
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.input_file import STANDARD_INPUT
 
 __all__ = ["InputError", "Problem", "Problems", "TableWarning"]
@@ -110,6 +111,12 @@ class Problems:
     def of(self, file: str) -> list[Problem]:
         """Problems of one file so far."""
         return [problem for problem in self._items if problem.file == file]
+
+    def refuse_newer(self, file: str, version: object) -> None:
+        """Note a file of a later `schema_version`, which may mean something else, and what is none."""
+        if isinstance(version, bool) or version not in range(1, SCHEMA_VERSION + 1):  # or 1.0, of a workbook
+            expected = f"{SCHEMA_VERSION}: a file of a later version needs a newer rotorid"
+            self.add(file, None, "schema_version", str(version), expected)
 
     def stop(self) -> None:
         """Raise `InputError` with all problems, file by file and row by row, if there are any."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader
 
@@ -187,4 +188,9 @@ def object_schema(keys: Sequence[Key]) -> dict[str, Any]:
 
 def file_schema(keys: Sequence[Key], title: str) -> dict[str, Any]:
     """Keys of a whole file as a JSON schema (draft 2020-12), for editors."""
-    return {"$schema": DRAFT, "title": title, **object_schema(keys)}
+    schema = object_schema(keys)
+    schema["properties"]["schema_version"] = {
+        "const": SCHEMA_VERSION,
+        "description": "of the keys of this file; unstated: this one",
+    }
+    return {"$schema": DRAFT, "title": title, **schema}

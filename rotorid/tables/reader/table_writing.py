@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotorid.base import logs
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.excel_pages import Page, book_bytes
 from rotorid.tables.reader.problems import InputError, Problem
 
@@ -108,6 +110,7 @@ def write_files(files: Mapping[Path, bytes], last_look: Callable[[], None] | Non
             last_look()
         for path, temporary in waiting.items():
             temporary.replace(targets[path])
+            logs.files.debug("written %s, %d bytes", path, len(files[path]))
     except OSError as error:
         expected = f"a file that can be written ({error.strerror or error})"
         raise InputError([Problem(str(path), None, None, None, expected)]) from error
@@ -128,8 +131,12 @@ def _plain(value: object) -> Value:
 
 
 def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
-    """A CSV file: comment lines, names of the columns, rows; numbers with all their digits."""
-    lines = [f"# {_one_line(comment)}" for comment in comments]
+    """A CSV file: comment lines (with the version above them), columns, rows; numbers with all their digits.
+
+    A table without comments stays one that every program reads.
+    """
+    versioned = [f"schema_version = {SCHEMA_VERSION}", *comments] if comments else []
+    lines = [f"# {_one_line(comment)}" for comment in versioned]
     lines += [",".join(map(_csv_cell, row)) for row in (names, *rows)]
     text = "\n".join([*lines, ""])
     # Excel takes a file without the mark for its own 8-bit encoding; plain ASCII needs none.

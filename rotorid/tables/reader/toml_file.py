@@ -11,6 +11,7 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
@@ -22,7 +23,7 @@ MOST_NAMES = 1_000
 
 
 def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
-    """The content of a TOML file, or None and a problem."""
+    """The content of a TOML file without its `schema_version`, or None and a problem."""
     data = read_bytes(path, problems)
     if data is None:
         return None
@@ -41,10 +42,12 @@ def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
         if _DEEP.search(text):
             raise ValueError("a key of more than 20 parts")
         # A lone carriage return ends a line for no reader of TOML.
-        return tomllib.loads(text.replace("\r\n", "\n"))
+        said = tomllib.loads(text.replace("\r\n", "\n"))
     except (ValueError, RecursionError) as error:
         problems.add(str(path), None, None, None, f"a TOML file: {error}")
         return None
+    problems.refuse_newer(str(path), said.pop("schema_version", SCHEMA_VERSION))
+    return said
 
 
 class Section:

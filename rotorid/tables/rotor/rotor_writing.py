@@ -12,6 +12,7 @@ from fem.model.rotor import Disc, Model, Rotor, Support
 from fem.model.supports import KINDS, Coefficient
 from rotorid.base.registry import names
 from rotorid.base.text import listing
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.decimal_numbers import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem
 from rotorid.tables.reader.table_writing import Value, csv_bytes, write_files
@@ -99,7 +100,7 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
 
     default = Material()
     shaft = path.with_name(f"{path.stem}_shaft.csv")
-    document: dict[str, Any] = {"shaft": shaft.name}
+    document: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "shaft": shaft.name}
     uniform = [name for name in _OF_ELEMENTS if np.ptp(getattr(rotor, name)) == 0]
     values = {name: float(getattr(rotor, name)[0]) for name in uniform}
     material = {_OF_ELEMENTS[name]: v for name, v in values.items() if v != getattr(default, name)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import Answer
+from rotorid.base.logs import progress
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
 from rotorid.workflows.fleet.job_batches import apart, read_jobs, reason_of
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 BATCH = 200_000
 """Readings that are written together."""
-log = logging.getLogger("rotorid.progress")
 Damaged = dict[Path, str]
 
 
@@ -132,7 +131,7 @@ def fleet_add(
             waiting += own["vectors"][0]
             untyped += not own["machine_type"][0]
         left = (time.monotonic() - begun) / count * (len(new) - count)
-        log.info("%d of %d, %.0f s left", count, len(new), left)
+        progress.info("%d of %d, %.0f s left", count, len(new), left)
         if batch and (waiting >= BATCH or count == len(new)):
             jobs += store.append(batch)
             batch, vectors, waiting = [], vectors + waiting, 0

@@ -6,7 +6,6 @@ sample raises is told with its number; any other failure of a future is the exec
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -17,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from rotorid.base.logs import progress
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.base.worker_processes import single_threads, worker_pool
 
-log = logging.getLogger("rotorid.progress")
 ATTEMPTS = 3
 AHEAD, AHEAD_ELSEWHERE = 4, 256
 """Chunks at an executor, for each worker or at a given one; so much and no more is in memory."""
@@ -77,7 +77,7 @@ def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Ex
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = pa.schema([("sample", "int64"), *task.columns.items()])
+    schema = pa.schema([("sample", "int64"), *task.columns.items()], {"schema_version": str(SCHEMA_VERSION)})
     begun, seen, done = time.perf_counter(), 0, 0
 
     def missing() -> Iterator[Chunk]:
@@ -97,7 +97,7 @@ def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Ex
             file.with_suffix(".tmp").replace(file)
             done, seen = done + len(rows), seen + len(rows)
             left = (time.perf_counter() - begun) * (samples - seen) / done
-            log.info("%d of %d samples, about %.0f s left", seen, samples, left)
+            progress.info("%d of %d samples, about %.0f s left", seen, samples, left)
 
 
 def part(folder: Path, task: Task, chunk: Chunk) -> Path:

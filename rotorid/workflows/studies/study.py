@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.workflows.input_checks import file_of
 from rotorid.workflows.result_provenance import hash_of, phase, provenance, workflow
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
@@ -87,7 +88,8 @@ def study(
     told = provenance(files, options)
     with ExitStack() as stack:
         folder = Path(options.results or stack.enter_context(tempfile.TemporaryDirectory()))
-        _claim(folder, {"version": told["version"], "seed": seed, "inputs": [*map(hash_of, files)]})
+        kept = {"schema_version": SCHEMA_VERSION, "version": told["version"], "seed": seed}
+        _claim(folder, {**kept, "inputs": [*map(hash_of, files)]})
         with phase("samples"):
             run_study(task, samples, folder, options.workers, executor)
         parts = _parts(task, samples, folder)

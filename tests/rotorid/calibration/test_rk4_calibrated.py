@@ -11,6 +11,7 @@ import re
 import shlex
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ PUBLISHED, SUM = 9.0, 4.0  # g·mm
 
 @cache
 def example():
-    path = sample_data().parent / "examples" / "rk4_calibrated.py"
+    path = Path(__file__).resolve().parents[3] / "examples" / "rk4_calibrated.py"
     spec = importlib.util.spec_from_file_location("examples_rk4_calibrated", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

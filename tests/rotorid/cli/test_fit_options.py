@@ -1,4 +1,4 @@
-"""Options of `rotorid fit`, standard deviations in records, and what the README shows of it."""
+"""Options of `rotorid fit`, standard deviations in records, and what a page shows of several records."""
 
 import re
 from pathlib import Path
@@ -12,10 +12,10 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain import Record, simulate
 
-ROOT = sample_data().parent
+ROOT = Path(__file__).resolve().parents[3]
 FOLDER = sample_data() / "fit"
 PRINTED = Path(__file__).parents[2] / "data" / "f_printed.csv"
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "getting_started" / "identification.md").read_text(encoding="utf-8")
 DECAY = '[states]\nx = "-a*x"\n[initial]\nx = "x0"\n[estimate]\na = 0.5\nx0 = 0.8\n[bounds]\na = [0, 5]\n'
 OWN = f'per_record = ["x0"]\n{DECAY}'
 TWO = '[states]\nx = "-a*x"\n[initial]\nx = 1\n[outputs]\ny = "x"\nz = "2*x"\n[estimate]\na = 0.5\n'
@@ -273,16 +273,8 @@ def test_help_says_what_is_assumed(cli):
         assert text in said
 
 
-def test_the_readme_shows_what_the_command_prints(cli, monkeypatch):
-    """Parameters, to the last digit that is shown."""
-    command, shown = re.search(r"```\nrotorid (fit .*?)\n.*?```text\n(.*?)```", README, re.DOTALL).groups()
-    monkeypatch.chdir(ROOT)
-    outcome = cli(*[word for word in command.split() if word not in ("--plot", "run_down.png")])
-    assert shown.rstrip("\n") in outcome.out
-
-
-def test_the_model_file_of_the_readme(cli, tmp_path):
-    text = re.search(r"```toml\n(per_record.*?)```", README, re.DOTALL).group(1)
+def test_the_model_file_for_several_records_of_the_page(cli, tmp_path):
+    text = re.search(r"```toml\n(per_record.*?)```", PAGE, re.DOTALL).group(1)
     model = saved(tmp_path, "m.toml", text)
     equations, t = read_ode_model(model), np.arange(60) / 100
     truth = {"d": 25.0, "k": 5000.0}

@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import pytest
@@ -13,7 +14,7 @@ from rotorid.cli import app
 from rotorid.cli.common_options import INPUT, command
 from rotorid.samples import sample_data
 
-sys.path.insert(0, str(sample_data().parent / "docs" / "_ext"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "docs" / "_ext"))
 
 from commands import all_commands, split_help
 

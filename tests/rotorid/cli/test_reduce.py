@@ -1,6 +1,7 @@
 """`rotorid reduce` in full: places, methods, response, stability, measured modes, files."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -295,7 +296,7 @@ def test_options_without_effect_are_refused(cli, more, message):
 
 
 def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeypatch):
-    monkeypatch.chdir(sample_data().parent)
+    monkeypatch.chdir(Path(__file__).resolve().parents[3])
     stored = MOTION / "small.toml"
     said = (MOTION / "README.md").read_text(encoding="utf-8")
     command = said.partition("`rotorid reduce ")[2].partition("small.toml`")[0]

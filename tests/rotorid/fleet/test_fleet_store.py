@@ -88,7 +88,7 @@ def test_tables_are_plain_parquet(tree):
     for name, columns in TABLES.items():
         assert list(pd.read_parquet(f"F/{name}")) == list(columns)
         file = parquet.ParquetFile(f"F/{name}/000001.parquet")
-        assert file.schema_arrow.metadata[b"rotorid_fleet"] == b"1"
+        assert file.schema_arrow.metadata[b"schema_version"] == b"1"
         assert file.metadata.row_group(0).column(0).compression == "ZSTD"
         assert "RLE_DICTIONARY" in file.metadata.row_group(0).column(0).encodings
     store = FleetStore(tree.parent / "F")
@@ -224,7 +224,7 @@ def test_refusals(tree, cli, monkeypatch):
     fleet_add("F", [tree])
     jobs = tree.parent / "F" / "jobs" / "000001.parquet"
     table = parquet.read_table(jobs)
-    parquet.write_table(table.replace_schema_metadata({"rotorid_fleet": "2"}), jobs)
+    parquet.write_table(table.replace_schema_metadata({"schema_version": "2"}), jobs)
     assert "expected tables of version 1, not '2': update rotorid" in refused("show", "F")
     jobs.write_bytes(b"PAR1")
     assert "expected a whole Parquet table" in refused("show", "F")

@@ -80,6 +80,7 @@ def test_the_document_inside_is_that_of_the_command(made):
     _, sheet, report, _ = made
     inside = dict(sheet.document)
     assert inside.pop("provenance")["program"] == "rotorid"
+    assert inside.pop("schema_version") == 1
     assert set(inside.pop("sheet")) == {
         "machine",
         "runs",

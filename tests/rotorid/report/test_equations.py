@@ -26,7 +26,7 @@ from rotorid.workflows.reduce import ReduceOptions, reduce
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
 ROTOR = sample_data() / "rotor23.csv"
 TASK_9 = sample_data() / "book_task_9"
-TASKS = sorted(path.name for path in IDENTIFY.iterdir() if path.is_dir())
+TASKS = sorted(path.parent.name for path in IDENTIFY.glob("*/model.toml"))
 
 
 def files(task):

@@ -71,7 +71,7 @@ def test_text_is_escaped_and_the_document_cannot_end_its_element():
     scripts = Scripts(made)
     assert scripts.tags.count("script") == 1
     assert "b" not in scripts.tags
-    assert json.loads(scripts.found[0]) == {**document, "provenance": PROVENANCE}
+    assert json.loads(scripts.found[0]) == {**document, "schema_version": 1, "provenance": PROVENANCE}
 
 
 def test_numbers_that_are_not_finite_are_refused():

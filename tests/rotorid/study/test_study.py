@@ -1,5 +1,6 @@
 """Studies: probabilities against closed forms, balancing by runs, starts of calibrations, files, pictures."""
 
+import json
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -19,7 +20,7 @@ from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.workflows.studies import drawn_machine
 from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED, UNSTABLE
 
-pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
+pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
 SAMPLE = sample_data() / "study"
 TWO = STUDY.replace(
@@ -236,6 +237,8 @@ def test_the_command(cli, tmp_path, monkeypatch):
         "part-000000.parquet",
         "part-000001.parquet",
     ]
+    assert json.loads((tmp_path / "kept" / "_study.json").read_text())["schema_version"] == 1
+    assert pq.read_schema(tmp_path / "kept" / "part-000000.parquet").metadata[b"schema_version"] == b"1"
     assert (tmp_path / "a.png").stat().st_size > 10_000
     assert cli("study", file, "--samples", "0").code == 2
     refused = cli("study", file, "--seed", "5", "--results", tmp_path / "kept")

@@ -118,6 +118,7 @@ def test_python_gives_what_the_command_prints(cli, tmp_path, name):
     printed, own = outcome.json, work(*data, text)
     there, here = (document.pop("provenance") for document in (printed, own.document))
     assert there | {"date": here["date"]} == here
+    assert printed.pop("schema_version") == own.document["schema_version"]
     given = {field.name for field in dataclasses.fields(text) if getattr(text, field.name) != field.default}
     assert set(here["options"]) == given
     same(printed, own.to_dict())

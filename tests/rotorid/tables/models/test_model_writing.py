@@ -247,7 +247,7 @@ def test_writing_refuses(three):
 
 def test_lines_of_a_comment_stay_comments(tmp_path, three):
     path = saved(tmp_path, "m.toml", ode_model_bytes(three, BEGIN, comments=["one\nM = 3", ""]))
-    assert path.read_text().startswith("# one\n# M = 3\n# \ncoordinates")
+    assert path.read_text().startswith("# one\n# M = 3\n# \nschema_version = 1\ncoordinates")
     assert read_ode_model(path).parameters == tuple(TRUTH)
 
 

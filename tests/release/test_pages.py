@@ -1,0 +1,93 @@
+"""The pages of what is stable and of security say what the code does."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+from golden.comparing import RELATIVE
+from golden.tolerances import TOLERANCES
+
+import rotorid
+from rotorid import expressions
+from rotorid.tables.job.job_keys import MOST_HOLES
+from rotorid.tables.reader import decimal_numbers, excel_workbook, grid, input_file, problems, toml_file
+from rotorid.tables.waveforms import array_files
+from rotorid.worksheet import app, server
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+SECURITY = (DOCS / "security.md").read_text(encoding="utf-8")
+STABILITY = (DOCS / "stability.md").read_text(encoding="utf-8")
+MB = 10**6
+
+
+@pytest.mark.parametrize(
+    ("limit", "value"),
+    [
+        ("a file, and a workbook unpacked", f"{input_file.MOST_BYTES // MB} MB"),
+        ("a file, and a workbook unpacked", f"{excel_workbook.MOST_UNPACKED // MB} MB"),
+        ("how much larger a workbook unpacks", f"{excel_workbook.MOST_PACKING} times, and 10 MB"),
+        ("seconds that reading a workbook takes", f"{excel_workbook.MOST_SECONDS:.0f}"),
+        ("cells of a table", f"{grid.MOST_CELLS:,}"),
+        ("a TOML file", f"{toml_file.MOST_BYTES // MB} MB"),
+        ("names in a list or table of a model", f"{toml_file.MOST_NAMES:,}"),
+        (
+            "characters of an expression, and how deep it nests",
+            f"{expressions.MAX_LENGTH:,}, {expressions.MAX_DEPTH}",
+        ),
+        (
+            "exponents, degree and terms of an expression",
+            f"{expressions.MAX_EXPONENT}, {expressions.MAX_DEGREE:,}, {expressions.MAX_TERMS:,}",
+        ),
+        ("holes of a plane", f"{MOST_HOLES:,}"),
+        (
+            "numbers in files, in size",
+            f"from {decimal_numbers.SMALLEST:g} to {decimal_numbers.LARGEST:g}, or 0".replace("+", ""),
+        ),
+        ("arrays of waveforms (`.npz`, `.mat`)", f"{array_files.LARGEST // 10**9} GB"),
+        ("a request to the worksheet", f"{app._LARGEST // MB} MB"),
+    ],
+)
+def test_a_limit_on_the_page_is_that_of_the_code(limit, value):
+    assert f"| {limit} | {value} |" in SECURITY
+
+
+def test_the_page_of_security_knows_the_guard_and_the_words():
+    assert f"serves {server.HOST} alone" in SECURITY
+    assert f"up to {problems.LONGEST_VALUE} characters" in SECURITY
+    assert len(expressions.FUNCTIONS) == 14
+    assert "fourteen functions" in SECURITY
+
+
+ENTITIES = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 11))
+
+
+@pytest.mark.parametrize(
+    ("kind", "cell", "reason"),
+    [
+        (f'[<!ENTITY e0 "lol">{ENTITIES}]', "&e10;", "amplification"),
+        ('[<!ENTITY out SYSTEM "file:///etc/passwd">]', "&out;", "undefined entity"),
+    ],
+)
+def test_entities_of_a_workbook_are_neither_multiplied_nor_fetched(cli, tmp_path, kind, cell, reason):
+    form, path = tmp_path / "form.xlsx", tmp_path / "bomb.xlsx"
+    assert cli("balance", "--template", form).code == 0
+    with zipfile.ZipFile(form) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            text = old.read(name)
+            if name == "xl/worksheets/sheet1.xml":
+                row = f'<c r="A1" t="inlineStr"><is><t>{cell}</t></is></c>'
+                whole = re.sub(r"<c r=\"A1\".*?</c>", row, text.decode(), count=1)
+                assert row in whole
+                text = f"<!DOCTYPE worksheet {kind}>{whole}".encode()
+            new.writestr(name, text)
+    with pytest.raises(rotorid.InputError, match=reason):
+        rotorid.read_job(path)
+
+
+def test_the_stated_tolerance_is_that_of_the_tests():
+    assert f"agree to {RELATIVE:g} of the largest of their array".replace("e-0", "e-") in STABILITY
+    stated = {float(number) for number in re.findall(r"\b\de-\d+\b", STABILITY)}
+    relative = {each.relative for each in TOLERANCES if each.relative}
+    assert max(relative) <= max(stated) == 5e-4
+    assert max(each.absolute for each in TOLERANCES) <= 1e-7
