@@ -34,9 +34,7 @@ ODD = {"lag for lead": "lag", "another keyphasor mark": "mark", "two sensors exc
 
 
 class Shot(NamedTuple):
-    """What a correction left, relative to the vibration; which intervals held; whether it was warned, or called
-    a machine of another type.
-    """
+    """What a correction left, relative to the vibration; which intervals held; what was said."""
 
     left: float
     weights: bool
