@@ -45,7 +45,7 @@ class Shot(NamedTuple):
 
 
 class Type(NamedTuple):
-    """A drawn type: its machines' true coefficients (M, S, C, P), and records of all but the last `FURTHER`."""
+    """A drawn type: true coefficients (M, S, C, P) of machines, and records of all but the last `FURTHER`."""
 
     W: ComplexArray
     records: list[MachineRecord]

@@ -1,5 +1,7 @@
 """Coefficients brought up to date by runs: closed forms, limits, and the test whether runs fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from balancing import Influence, ReadingErrors, Trials, correct
 from balancing.coefficients.coefficients_from_model import with_parameters
 from balancing.coefficients.run_errors import marginal
 from balancing.correction.update_coefficients import update
+from balancing.data.trials import RunScatter
 
 SPEEDS = np.array([100.0, 200.0])
 
@@ -62,12 +65,12 @@ def test_a_bare_run_leaves_the_coefficients_and_is_the_baseline():
 def test_without_knowledge_it_is_the_measurement():
     known, rng = prior(std=1e4, S=2, C=3, P=2), np.random.default_rng(3)
     T = [[0, 0], [0.5, 0], [0, 0.7j], [0.3, 0.2]]
-    trials = runs(known, known.W, np.array([1.0, 2.0]), T, rng)
+    trials = replace(runs(known, known.W, np.array([1.0, 2.0]), T, rng), run_errors=RunScatter(0.0))
     found, _ = update(known, trials)
     A = np.column_stack((np.ones(len(T)), np.array(T)))
     alone = np.linalg.lstsq(A, trials.mean.reshape(len(T), -1), rcond=None)[0].reshape(3, 2, 3)
-    assert pytest.approx(np.moveaxis(alone[1:], 0, -1), rel=1e-4) == found.W  # runs weigh a little unlike
-    assert found.baseline == pytest.approx(alone[0], rel=1e-4)
+    assert pytest.approx(np.moveaxis(alone[1:], 0, -1), rel=1e-6) == found.W
+    assert found.baseline == pytest.approx(alone[0], rel=1e-6)
 
 
 def test_a_plane_that_was_not_tried_follows_the_one_that_was():
