@@ -143,10 +143,11 @@ def test_a_check_run_refines(fleet, tmp_path):
 @pytest.mark.parametrize("runs", [1, 3])
 def test_a_check_run_that_does_not_say_its_weights_has_those_within_the_limits(fleet, tmp_path, runs):
     machine = Machine(np.random.default_rng(30))
-    job = machine.job(tmp_path / "limited", runs, more="[planes.L]\nmax_mass_g = 1\n[planes.R]\n")
+    job = machine.job(tmp_path / "limited", runs, more="[planes.L]\nmax_mass_g = 0.2\n[planes.R]\n")
     of_type = address(fleet) if runs == 1 else None
     found = balance(job, BalanceOptions(machine_type=of_type)).result
     mounted = found.weights[None] * 1e3
+    assert abs(mounted[0, 0]) < 0.5 * abs(machine.D[0])  # the limit binds
     machine._table(job.parent / "check.csv", machine.W, mounted, "check")
     machine._weights(job.parent / "check_weights.csv", mounted, "check")
     weights, said = [], 'check = "check.csv"\n' + job.read_text()
