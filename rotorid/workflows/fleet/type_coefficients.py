@@ -32,7 +32,7 @@ ENOUGH = 12
 """Machines, from which on the regions of first shots hold what they say."""
 _FEW = (
     "the type rests on few machines: where whole machines differ, 95 % regions of first shots held the truth "
-    "in 85 to 90 of 100 simulated ones; make a trial run"
+    "in 84 to 88 of 100 simulated ones; make a trial run"
 )
 _RARE = 1e-12
 
