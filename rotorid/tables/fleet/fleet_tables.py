@@ -11,15 +11,15 @@ VERSION = str(SCHEMA_VERSION)
 _COLUMNS = {
     "readings": "job kind run repeat speed_rad_s sensor amplitude phase_deg std_re std_im cov_re_im",
     "weights": "job kind run plane weight angle_deg",
-    "coefficients": "job speed_rad_s sensor plane re im var_re cov_re_im var_im source",
+    "coefficients": "job speed_rad_s sensor plane radius re im var_re cov_re_im var_im source",
     "corrections": "job plane weight angle_deg mounted",
     "outcomes": "job run speed_rad_s sensor before after limit",
     "jobs": "job path machine machine_type date quantity weight_kind vibration_unit weight_unit files "
     "runs_file warnings trial_runs check_runs vectors undetermined",
 }
 _KINDS = {
-    "number": "speed_rad_s amplitude phase_deg std_re std_im cov_re_im weight angle_deg re im var_re var_im "
-    "before after limit",
+    "number": "speed_rad_s amplitude phase_deg std_re std_im cov_re_im weight angle_deg radius re im "
+    "var_re var_im before after limit",
     "count": "repeat trial_runs check_runs vectors",
     "flag": "mounted",
     "date": "date",

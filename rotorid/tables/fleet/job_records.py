@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ def job_rows(
     trials, check, labels = job.trials, job.check, job.trials.labels
     rows: JobRows = {"readings": [_readings(trials, "trial")], "weights": [_weights(trials, "trial")]}
     if influence is not None:
-        rows["coefficients"] = [_coefficients(influence, stored=job.influence is not None)]
+        rows["coefficients"] = [_coefficients(influence, job.radii, stored=job.influence is not None)]
     if check is not None:
         rows["readings"].append(_readings(check, "check"))
         rows["outcomes"] = [_outcomes(job, check, before)]
@@ -116,7 +116,7 @@ def _weights(trials: Trials, kind: str) -> Columns:
     }
 
 
-def _coefficients(influence: Influence, *, stored: bool) -> Columns:
+def _coefficients(influence: Influence, radii: Mapping[str, float], *, stored: bool) -> Columns:
     """One row a speed, sensor and plane."""
     s, c, p = np.indices(influence.W.shape).reshape(3, -1)
     W = influence.W.ravel()
@@ -127,6 +127,7 @@ def _coefficients(influence: Influence, *, stored: bool) -> Columns:
         "speed_rad_s": influence.speeds[s].tolist(),
         "sensor": _named(influence.sensors, c),
         "plane": _named(influence.planes, p),
+        "radius": [radii.get(influence.planes[k]) for k in p],
         "re": W.real.tolist(),
         "im": W.imag.tolist(),
         "var_re": own[:, 0, 0].tolist(),

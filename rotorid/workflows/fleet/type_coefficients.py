@@ -112,7 +112,8 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
         raise ValueError(f"--type {address!r}: expected the folder of a fleet and a type, FLEET:TYPE")
     store, trials = FleetStore(Path(folder)), job.trials
     machine = job.machine or machine_of(job.files[0])
-    grid = Grid(trials.speeds, trials.sensors, job.used, *kind_of(trials.labels))
+    radii = tuple(job.radii.get(plane, np.nan) for plane in job.used)
+    grid = Grid(trials.speeds, trials.sensors, job.used, *kind_of(trials.labels), radii)
     known = known_type(store, name, grid, _of_itself(store, job, machine))
     if not job.planes:  # nothing but a baseline: in the unit of the others' weights
         unit = weight(str(known.jobs["weight_unit"].mode()[0]))

@@ -30,13 +30,17 @@ _YEAR = re.compile(r"(?<!\d)(19|20)\d\d(-\d\d){0,2}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Speeds (rad/s), sensors and planes (none: all); what is read, and what weights are."""
+    """Speeds (rad/s), sensors and planes (none: all); what is read, and what weights are.
+
+    Masses stand at `radii` of the planes (m, NaN: not known).
+    """
 
     speeds: FloatArray
     sensors: tuple[str, ...]
     planes: tuple[str, ...]
     quantity: str
     weight_kind: str
+    radii: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +131,7 @@ def known_type(
         usual = _usual(cells)
         if grid is None:
             grid = usual
-        grid = replace(grid, planes=usual.planes, weight_kind=usual.weight_kind)
+        grid = replace(grid, planes=usual.planes, weight_kind=usual.weight_kind, radii=usual.radii)
     complete = _records(cells, dict(jobs["machine"]), grid)
     if not complete:
         raise UndeterminedError(_none(store, name, cells, grid))
@@ -166,6 +170,8 @@ def _none(store: FleetStore, name: str, cells: pd.DataFrame, grid: Grid) -> str:
 
 def _records(cells: pd.DataFrame, machine: Mapping[Any, str], grid: Grid) -> list[MachineRecord]:
     """Of each job that has all coefficients of a grid; unknown errors count as none."""
+    import pandas as pd
+
     near = np.abs(cells["speed_rad_s"].to_numpy()[:, None] - grid.speeds)
     s = near.argmin(axis=1)
     there = near[np.arange(len(s)), s] <= SPEED_TOLERANCE * grid.speeds[s]
@@ -183,9 +189,13 @@ def _records(cells: pd.DataFrame, machine: Mapping[Any, str], grid: Grid) -> lis
     W = np.zeros((len(ids), *shape), dtype=complex)
     V = np.zeros((*W.shape, 2, 2))
     at = job, part["s"], c, p
-    W[at] = part["re"] + 1j * part["im"]
+    there = part.groupby("plane")["radius"].transform("median")
+    # a mass at another radius does as much more, or less, as its radius is larger, or smaller
+    wanted = pd.Series(np.array(grid.radii)[p], part.index).fillna(there)
+    factor = (wanted / part["radius"]).fillna(1.0).to_numpy()
+    W[at] = factor * (part["re"] + 1j * part["im"])
     each = part[["var_re", "cov_re_im", "cov_re_im", "var_im"]].fillna(0.0).to_numpy()
-    V[at] = each.reshape(-1, 2, 2)
+    V[at] = (factor[:, None] ** 2 * each).reshape(-1, 2, 2)
     return [MachineRecord(machine[name], name, W[k], V[k]) for k, name in enumerate(ids)]
 
 
@@ -208,9 +218,12 @@ def _different(column: pd.Series[str]) -> tuple[str, ...]:
 
 def _grid(cells: pd.DataFrame) -> Grid:
     """That of one job."""
+    planes = cells.drop_duplicates("plane")
     return Grid(
-        np.unique(cells["speed_rad_s"]),
-        tuple(cells["sensor"].unique()),
-        tuple(cells["plane"].unique()),
-        *(str(cells[name].iloc[0]) for name in _KIND),
+        speeds=np.unique(cells["speed_rad_s"]),
+        sensors=tuple(cells["sensor"].unique()),
+        planes=tuple(planes["plane"]),
+        quantity=str(cells["quantity"].iloc[0]),
+        weight_kind=str(cells["weight_kind"].iloc[0]),
+        radii=tuple(planes["radius"]),
     )

@@ -237,6 +237,24 @@ def test_limits_and_planes_of_a_job_without_weights_hold(fleet, tmp_path):
     assert balance(single, BalanceOptions(machine_type=address(fleet))).result.planes == ("R",)
 
 
+def test_masses_at_other_radii_are_converted(tmp_path):
+    rng = np.random.default_rng(31)
+    for k in range(8):
+        machine, radius = Machine(rng, 0.02, 2.0), 150 if k % 2 else 100
+        machine.W, machine.D = machine.W * radius / 100, machine.D * 100 / radius
+        more = f"[planes.L]\nradius_mm = {radius}\n[planes.R]\nradius_mm = {radius}\n"
+        machine.job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
+    fleet_add(tmp_path / "F", [tmp_path / "tree"])
+    found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
+    assert np.sqrt((found.to_frame()["between_percent"] ** 2).mean()) < 5
+    new = Machine(rng, 0.02, 2.0)
+    new.W = 2 * new.W
+    more = "[planes.L]\nradius_mm = 200\n[planes.R]\nradius_mm = 200\n"
+    job = read_job(new.job(tmp_path / "new", runs=1, more=more))
+    W = type_coefficients(job, f"{tmp_path / 'F'}:fan").influence.W[0] * 1e3  # µm pp per g
+    assert np.abs(W / (2 * Machine.MEAN * 0.5) - 1).max() < 0.1
+
+
 def test_what_is_wrong_is_told(fleet, tmp_path):
     machine, store = Machine(np.random.default_rng(27)), fleet[0] / "store"
     job = machine.job(tmp_path / "new", runs=1)
