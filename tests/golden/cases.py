@@ -529,6 +529,12 @@ def _all() -> list[Case]:
         Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
         Case("fleet-show-other", f"{shown} --type fan-123", "fleet", (TEXT,), before=(added,)),
         Case("fleet-fit", "fleet fit fans --type fan-132 --plot t.png", "fleet", before=(added,)),
+        Case(
+            "fleet-fit-table",
+            "fleet fit fans --type fan-132 --output t.csv --table",
+            "fleet",
+            before=(added,),
+        ),
         Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=(added,)),
         Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
         Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", (TEXT,), before=(added,)),
