@@ -12,6 +12,7 @@ import tempfile
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 ROOT = Path(__file__).parents[1]
 COMPRESSOR = "sample_data/compressor/rotor.toml"
@@ -388,8 +389,8 @@ def picture(name: str) -> bytes:
     from rotorid.cli import app
 
     commands = [shlex.split(command) for command in (FIGURES[name].first, FIGURES[name].command) if command]
-    os.environ.setdefault("SOURCE_DATE_EPOCH", "0")
     with (
+        mock.patch.dict(os.environ, {"SOURCE_DATE_EPOCH": "0"}),
         tempfile.TemporaryDirectory() as folder,
         contextlib.chdir(folder),
         contextlib.redirect_stdout(io.StringIO()),

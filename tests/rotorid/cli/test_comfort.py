@@ -286,8 +286,9 @@ def test_verbose_is_an_option_of_every_command(cli):
 
     commands = typer.main.get_command(app).commands
     assert len(commands) >= 13
-    for name in commands:
-        assert "--verbose" in cli(name, "--help").out, name
+    for name, command in commands.items():
+        for words in [[name, part] for part in getattr(command, "commands", ())] or [[name]]:
+            assert "--verbose" in cli(*words, "--help").out, words
 
 
 def test_notes_are_kept_only_for_those_who_ask(capsys):
