@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,13 +28,6 @@ LONGEST_WAIT = 600.0
 """Seconds for the batch of another writer."""
 _BATCH = "batch"
 _SI = {"displacement": "m", "velocity": "m_s", "acceleration": "m_s2"}
-
-
-class Known(NamedTuple):
-    """Ids of jobs, and SHA-256 of all files that were read for them."""
-
-    jobs: frozenset[str]
-    files: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -73,14 +66,10 @@ class FleetStore:
         """The files of these tables."""
         return [self._file(name, batch) for name in names for batch in self.batches()]
 
-    def known(self) -> Known:
-        """What has been added so far."""
-        jobs, files = set[str](), set[str]()
-        for batch in self.batches():
-            table = self._read("jobs", batch, columns=["job", "files"])
-            jobs.update(table["job"].to_pylist())
-            files.update(table["files"].combine_chunks().flatten().to_pylist())
-        return Known(frozenset(jobs), frozenset(files))
+    def known(self) -> set[str]:
+        """Ids of the jobs that have been added so far."""
+        tables = (self._read("jobs", batch, columns=["job"]) for batch in self.batches())
+        return {job for table in tables for job in table["job"].to_pylist()}
 
     def append(self, jobs: Sequence[JobRows]) -> int:
         """Add different jobs: all or nothing; gives the number of those that were new.
@@ -94,7 +83,7 @@ class FleetStore:
         (self.folder / "jobs").mkdir(parents=True, exist_ok=True)
         with self._alone():
             self._remove_leftovers()
-            known = self.known().jobs
+            known = self.known()
             new = [job for job in jobs if job["jobs"][0]["job"][0] not in known]
             batch = f"{max(map(int, self.batches()), default=0) + 1:06d}"
             for name in TABLES if new else ():

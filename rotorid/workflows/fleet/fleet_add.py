@@ -116,7 +116,7 @@ def fleet_add(
     store = FleetStore(Path(fleet))
     store.check(new=True)
     found, damaged = _found([Path(tree) for tree in trees], options.machine_type or "")
-    seen = set(store.known().jobs)
+    seen = store.known()
     new = [job for job in found if not seen or not _is_known(job, seen)]
     batch: list[JobRows] = []
     jobs = vectors = waiting = untyped = 0
