@@ -5,17 +5,18 @@ import os
 import subprocess
 import sys
 import time
-import tracemalloc
+import weakref
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from studies.drawn import SCATTER, STUDY, fatal, kept, noted, task, write
 
+import rotorid.workflows.studies.chunks as chunks
 import rotorid.workflows.studies.study as module
 from rotorid.base.worker_processes import single_threads
 from rotorid.workflows import StudyOptions, study
-from rotorid.workflows.studies.chunks import SampleError, rows_in, run_study
+from rotorid.workflows.studies.chunks import AHEAD_ELSEWHERE, SampleError, rows_in, run_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
@@ -156,24 +157,38 @@ def test_a_folder_of_another_study_is_refused_as_it_is(tmp_path, threads):
         study(file, StudyOptions(results=tmp_path), executor=threads)
 
 
-def test_memory_does_not_grow_with_the_samples(tmp_path):
-    """Neither the chunks that are to come nor those that are done are kept."""
+class Rows(list):
+    """Rows that can be watched."""
 
-    def peak(samples):
-        folder = tmp_path / str(samples)
-        folder.mkdir()
-        tracemalloc.start()
-        run_study(task(chunk=1), samples, folder, 1, Losing(set()))
-        found = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return found
+    __hash__ = object.__hash__
 
-    logging.disable()  # pytest keeps what is said
-    try:
-        peak(1)  # imports
-        assert peak(1200) < 1.2 * peak(400)
-    finally:
-        logging.disable(logging.NOTSET)
+
+class Watching(Losing):
+    """Counts the futures and rows that are alive, and the parts that were looked for in advance."""
+
+    def __init__(self, monkeypatch):
+        super().__init__(set())
+        self.alive, self.looked, self.most, self.ahead = weakref.WeakSet(), 0, 0, 0
+        monkeypatch.setattr(chunks, "rows_in", self.look)
+
+    def look(self, file):
+        self.looked += 1
+        return rows_in(file)
+
+    def submit(self, function, *args):
+        future = super().submit(lambda *args: Rows(function(*args)), *args)
+        self.alive.update([future, future.result()])
+        self.most = max(self.most, len(self.alive))
+        self.ahead = max(self.ahead, self.looked - len(self.submitted))
+        return future
+
+
+def test_neither_the_chunks_to_come_nor_those_that_are_done_are_kept(tmp_path, monkeypatch):
+    pool = Watching(monkeypatch)
+    run_study(task(chunk=1), 1200, tmp_path, 1, pool)
+    assert len(pool.submitted) == pool.looked == 1200
+    assert pool.ahead == 0
+    assert pool.most <= 2 * (AHEAD_ELSEWHERE + 1)  # futures and rows; the last that is done, too
 
 
 def test_progress_tells_the_time_that_is_left(tmp_path, caplog):
