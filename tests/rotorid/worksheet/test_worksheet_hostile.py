@@ -33,7 +33,8 @@ def corrections(state):
 @pytest.mark.parametrize("wait", [0.0, 1.5])
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl+C as terminals of POSIX send it")
 def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
-    code = "import os; os.setsid(); from rotorid.cli import main; main()"
+    listening = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # off in what shells run aside
+    code = f"import os, signal; os.setsid(); {listening}; from rotorid.cli import main; main()"
     command = [sys.executable, "-c", code, "worksheet", str(copy(tmp_path) / "job.toml"), "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     process.stdout.readline()
