@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from balancing.data.conventions import Labels
     from rotorid.base.arrays import FloatArray
     from rotorid.workflows.fleet.type_records import KnownType
 
@@ -44,30 +43,27 @@ class TypeFound(Outcome):
     ----------
     known
         As the store knows it.
-    labels
-        Units to print in, those of most of its jobs; phases lead.
+    reasons
+        Of each odd record, what would make it fit; "": not found.
     """
 
     known: KnownType
-    labels: Labels
+    reasons: tuple[str, ...]
 
     @property
     def _columns(self) -> tuple[Column, ...]:
         import numpy as np
 
-        kind, found = self.known.kind, self.known.kind.influence(self.labels).to_frame()
+        kind = self.known.kind
+        influence = kind.influence(self.known.labels)
+        found = influence.to_frame()
         (along, across), (run, turn) = map(kind.scatter, (kind.effects.between, kind.effects.within))
         angle = "{:.1f}".format
         return (
             Column("speed_rpm", found["speed_rpm"].tolist(), "{:.6g}".format, "rpm"),
             Column("sensor", found["sensor"].tolist(), str),
             Column("plane", found["plane"].tolist(), str),
-            Column(
-                "influence",
-                found["influence"].tolist(),
-                partial(figures, digits=3),
-                kind.influence(self.labels).unit,
-            ),
+            Column("influence", found["influence"].tolist(), partial(figures, digits=3), influence.unit),
             Column("phase_deg", found["phase_deg"].tolist(), angle, "°"),
             Column("between_percent", 100 * along.ravel(), angle, "± % between"),
             Column("between_deg", np.degrees(across.ravel()), angle, "± °"),
@@ -85,7 +81,7 @@ class TypeFound(Outcome):
                 "times_the_limit": float(far) ** 0.5,
                 "reason": reason or None,
             }
-            for (record, far), reason in zip(self.known.kind.odd, self.known.reasons, strict=True)
+            for (record, far), reason in zip(self.known.kind.odd, self.reasons, strict=True)
         ]
 
     def to_dict(self) -> dict[str, Any]:
@@ -95,7 +91,7 @@ class TypeFound(Outcome):
             "machine_type": self.known.name,
             "machines": list(kind.machines),
             "jobs": len(self.known.jobs) - len(kind.odd),
-            "unit": kind.influence(self.labels).unit,
+            "unit": kind.influence(self.known.labels).unit,
             "phase": "lead",
             "angles": "with rotation",
             "rows": rows(self._columns),
@@ -129,7 +125,7 @@ class TypeFound(Outcome):
         """Coefficients of all machines over their mean, each plane and sensor for itself."""
         from rotorid.workflows.fleet.type_picture import type_picture
 
-        return type_picture(self.known)
+        return type_picture(self.known.kind)
 
 
 def _odd_words(one: Mapping[str, Any]) -> str:
@@ -165,15 +161,14 @@ def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
     ValueError
         For a fleet or a type that are not there; UndeterminedError with fewer than three machines.
     """
-    from balancing.data.conventions import Labels
-    from rotorid.tables.fleet.fleet_store import FleetStore
-    from rotorid.tables.reader.units import vibration, weight
+    from balancing.coefficients.machine_type import why_odd
+    from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
     from rotorid.workflows.fleet.type_records import known_type
 
     store = FleetStore(Path(fleet))
     known = known_type(store, options.machine_type)
-    read, mounted = (str(known.jobs[name].mode()[0]) for name in ("vibration_unit", "weight_unit"))
-    labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
     return TypeFound(
-        known=known, labels=labels, provenance=provenance(store.files("jobs", "coefficients"), options)
+        known=known,
+        reasons=tuple(why_odd(known.kind, odd, trials_of(store, odd.job)) for odd, _ in known.kind.odd),
+        provenance=provenance(store.files("jobs", "coefficients"), options),
     )
