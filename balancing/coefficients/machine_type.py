@@ -58,22 +58,12 @@ def record_of(machine: str, job: str, influence: Influence) -> MachineRecord:
 
 @dataclass(frozen=True, eq=False)
 class MachineType:
-    """Coefficients of a type.
+    """Coefficients of a type at S speeds (rad/s), of C sensors and P planes.
 
-    Attributes
-    ----------
-    speeds, sensors, planes
-        rad/s (S,), names (C) and (P).
-    turn
-        Phases of the median machine, as numbers of size 1, (S, C, P).
-    effects
-        Mean and covariances of the coefficients over these phases, stretched, n = 2 S C P.
-    machines
-        Names (M,) of those it is made of.
-    odd
-        Records that were left out, and how many times farther they are than what belongs to the type.
-    limit
-        Squared distance within which machines belong to the type; infinite with fewer than `LEAST_GROUPS`.
+    `turn` (S, C, P) are the phases of the median machine, as numbers of size 1; `effects` are of the
+    coefficients over these, stretched, n = 2 S C P, with `machines` as groups. `odd` are records that were
+    left out, each with its squared distance over `limit`, within which machines belong to the type; that is
+    infinite with fewer than `LEAST_GROUPS`.
     """
 
     speeds: FloatArray
@@ -102,15 +92,7 @@ class MachineType:
         return self.effects.distance(*_rows(W, covariance, self.turn))
 
     def influence(self, labels: Labels, machine: str = "") -> Influence:
-        """Coefficients to expect of a machine of this type, with their errors.
-
-        Parameters
-        ----------
-        labels
-            Units and conventions to print in.
-        machine
-            One of `machines`, whose own jobs count then beside the type; else a further one.
-        """
+        """Coefficients to expect of one of `machines`, whose own jobs count then; else of a further one."""
         mean, covariance = self.effects.mean, self.effects.new_group
         if machine in self.machines:
             mean, covariance = self.effects.known(self.machines.index(machine))
@@ -142,10 +124,7 @@ def fit_type(
 ) -> MachineType:
     """Coefficients of a type, from jobs of its machines; those that do not belong are left out and named.
 
-    Raises
-    ------
-    UndeterminedError
-        With fewer than `LEAST_MACHINES` machines that belong together.
+    UndeterminedError with fewer than `LEAST_MACHINES` machines that belong together.
     """
     W = np.stack([record.W for record in records])
     centre = np.median(W.real, axis=0) + 1j * np.median(W.imag, axis=0)
@@ -175,14 +154,7 @@ def fit_type(
 def why_odd(kind: MachineType, record: MachineRecord, trials: Trials | None = None) -> str:
     """What would make a record fit its type, in words; "" where nothing tried does.
 
-    Parameters
-    ----------
-    kind
-        The type.
-    record
-        Coefficients that do not fit it.
-    trials
-        The runs that they were measured with; None: not known, and the weights taken to be at 0°.
+    By the runs that it was measured with; None: not known, and the weights taken to be at 0°.
     """
     found = list(_changes(kind, record, trials))
     least = min(distance for distance, _ in found)

@@ -40,24 +40,9 @@ from rotorid.regression import covariance_root, least_squares, stretch, unstretc
 def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
     """Coefficients and the bare rotor's readings, from what is known and from runs.
 
-    Parameters
-    ----------
-    known
-        Coefficients with `parameters`, as of `MachineType.influence`.
-    trials
-        Runs of at least the speeds and sensors of the coefficients; one run without weights is enough.
-
-    Returns
-    -------
-    Influence
-        With a baseline.
-    probability
-        Of readings farther from what was known than these, by χ²; 1 where nothing is spare.
-
-    Raises
-    ------
-    ValueError
-        For runs without these sensors, speeds or planes.
+    Known are coefficients with `parameters`, as of `MachineType.influence`; one bare run is enough. Beside the
+    coefficients with a baseline it gives the probability of readings farther from what was known, by χ²; 1
+    where nothing is spare. ValueError for runs without these sensors, speeds or planes.
     """
     from scipy.special import chdtrc
 
@@ -138,12 +123,8 @@ def _white(own: FloatArray, common: ComplexArray) -> FloatArray:
 def _split(covariance: FloatArray, gains: FloatArray, own: FloatArray) -> tuple[FloatArray, ComplexArray]:
     """What channels put into their own (Y₀, W), (S C, n, n), n = 2P + 2; columns (M, S C n / 2) of the rest.
 
-    Parameters
-    ----------
-    covariance
-        Of (Y₀, W) of all channels, (S C n, S C n).
-    gains, own
-        Of the readings of each run, (R, S C, n, S C, 2), and their covariances, (R, S C, 2, 2).
+    Of the covariance (S C n, S C n), with the gains (R, S C, n, S C, 2) of the readings of each run and their
+    own covariances (R, S C, 2, 2).
     """
     from scipy.linalg import block_diag
 

@@ -278,15 +278,7 @@ def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tu
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
-    """R with R Rᵀ = C, what is negative left out, for singular C too.
-
-    Parameters
-    ----------
-    covariance
-        Shape (…, n, n).
-    variance
-        In units of which numbers are taken, (…, n).
-    """
+    """R with R Rᵀ = C, shape (…, n, n), without what is negative of it; in units of a variance (…, n)."""
     size = np.sqrt(np.maximum(variance, 0.0))
     scale = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(covariance / (scale[..., :, None] * scale[..., None, :]))

@@ -33,18 +33,8 @@ _LEAST = 1e-12
 class RandomEffects:
     """M groups of n numbers: what they have in common, and each.
 
-    Attributes
-    ----------
-    mean
-        μ (n,).
-    between, within
-        B and W, (n, n).
-    groups
-        Mean of each over its jobs, (M, n).
-    error
-        Covariance of that by the errors of the jobs, pairs of numbers together, (M, n / 2, 2, 2).
-    jobs
-        How many it is the mean of, (M,).
+    `mean` is μ (n,), `between` and `within` are B and W, (n, n). `groups` (M, n) are the means of the groups
+    over so many `jobs` (M,), `error` (M, n / 2, 2, 2) their covariances by the jobs' own errors.
     """
 
     mean: FloatArray
@@ -79,14 +69,8 @@ class RandomEffects:
 def random_effects(y: FloatArray, error: FloatArray, group: IntArray) -> RandomEffects:
     """Mean and covariances by moments, of two groups or more.
 
-    Parameters
-    ----------
-    y
-        One row a job, (J, n).
-    error
-        Covariance of each by its own errors, pairs of numbers together, (J, n / 2, 2, 2).
-    group
-        Number of each job's group, (J,), from 0 without gaps.
+    y (J, n) has one row a job, `error` (J, n / 2, 2, 2) the covariances by its own errors, pairs of numbers
+    together, `group` (J,) the number of its group, from 0 without gaps.
     """
     jobs, n = np.bincount(group), y.shape[1]
     groups, own = np.zeros((len(jobs), n)), np.zeros((len(jobs), *error.shape[1:]))

@@ -37,15 +37,7 @@ class FleetFitOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TypeFound(Outcome):
-    """Coefficients of a type.
-
-    Attributes
-    ----------
-    known
-        As the store knows it.
-    reasons
-        Of each odd record, what would make it fit; "": not found.
-    """
+    """Coefficients of a type, and of each odd record what would make it fit ("": not found)."""
 
     known: KnownType
     reasons: tuple[str, ...]
@@ -90,7 +82,7 @@ class TypeFound(Outcome):
         return {
             "machine_type": self.known.name,
             "machines": list(kind.machines),
-            "jobs": len(self.known.jobs) - len(kind.odd),
+            "jobs": int(kind.effects.jobs.sum()),
             "unit": kind.influence(self.known.labels).unit,
             "phase": "lead",
             "angles": "with rotation",
@@ -106,20 +98,16 @@ class TypeFound(Outcome):
     @property
     def answer(self) -> Answer:
         """How machines differ, and which are odd; the coefficients."""
-        kind, jobs = self.known.kind, len(self.known.jobs) - len(self.known.kind.odd)
-        between, within = (
-            _typical(*kind.scatter(part)) for part in (kind.effects.between, kind.effects.within)
-        )
-        again = f"; from run to run of one {within}" if jobs > len(kind.machines) else ""
+        kind, notes, jobs = self.known.kind, self.known.notes, int(self.known.kind.effects.jobs.sum())
+        between, within = (kind.scatter(part) for part in (kind.effects.between, kind.effects.within))
         head = f"{self.known.name}: {counted(len(kind.machines), 'machine')}, {counted(jobs, 'job')}."
-        once = "" if again else "each machine was balanced once: nothing tells how one changes by itself"
-        odd = tuple(map(_odd_words, self._odd))
-        return Answer(
-            f"{head} Coefficients differ between machines {between}{again}.",
-            text(self._columns, left=3, width=COLUMNS),
-            warnings=odd,
-            notes=((once,) if once else ()) + self.known.notes,
-        )
+        head += f" Coefficients differ between machines {_typical(*between)}"
+        if jobs > len(kind.machines):
+            head += f"; from run to run of one {_typical(*within)}"
+        else:
+            notes = ("each machine was balanced once: nothing tells how one changes by itself", *notes)
+        found = text(self._columns, left=3, width=COLUMNS)
+        return Answer(f"{head}.", found, warnings=tuple(map(_odd_words, self._odd)), notes=notes)
 
     def figure(self) -> Figure:
         """Coefficients of all machines over their mean, each plane and sensor for itself."""
@@ -149,17 +137,7 @@ def _typical(along: FloatArray, across: FloatArray) -> str:
 def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
     """Coefficients of a type: their mean, how machines and runs differ, and the machines that are odd.
 
-    Parameters
-    ----------
-    fleet
-        Folder of the store.
-    options
-        The type.
-
-    Raises
-    ------
-    ValueError
-        For a fleet or a type that are not there; UndeterminedError with fewer than three machines.
+    ValueError for a fleet or a type that are not there; UndeterminedError with fewer than three machines.
     """
     from balancing.coefficients.machine_type import why_odd
     from rotorid.tables.fleet.fleet_store import FleetStore, trials_of

@@ -41,18 +41,9 @@ _RARE = 1e-12
 class TypeKnowledge:
     """What a type says of a machine.
 
-    Attributes
-    ----------
-    influence
-        Coefficients and baseline, with what the job's own runs have added.
-    files
-        Those that the type was read from.
-    earlier
-        How many earlier jobs of the machine count.
-    probability
-        Of runs farther from the type than those of the job; 1: nothing tells.
-    reason
-        Where it is below `LEVEL`: what would make the machine one of the type; "": not found.
+    `influence` has what the job's own runs have added, `files` are those that the type was read from, and so
+    many `earlier` jobs of the machine count. `probability` is that of runs farther from the type, 1 where
+    nothing tells; if it is below `LEVEL`, `reason` would make the machine one of the type ("": not found).
     """
 
     known: KnownType
@@ -99,7 +90,7 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
         raise ValueError(f"--type {address!r}: expected the folder of a fleet and a type, FLEET:TYPE")
     store, trials = FleetStore(Path(folder)), job.trials
     machine = job.machine or machine_of(job.files[0])
-    planes = _planes(job)
+    planes = tuple(plane for plane in job.planes if plane in (*job.used, *trials.planes))
     radii = tuple(job.radii.get(plane, np.nan) for plane in planes)
     grid = Grid(trials.speeds, trials.sensors, planes, *kind_of(trials.labels), radii)
     known = known_type(store, name, grid, _of_itself(store, job, machine))
@@ -126,17 +117,6 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     found = replace(found, notes=(*found.notes, words, *known.notes), warnings=tuple(warnings))
     reason = _reason(kind, trials) if chance < LEVEL else ""
     return TypeKnowledge(known, found, tuple(store.files("jobs", "coefficients")), earlier, chance, reason)
-
-
-def _planes(job: Job) -> tuple[str, ...]:
-    """Those that are used, or in which a run has a weight."""
-    needed = set(job.used)
-    for runs in (job.trials, job.check):
-        if runs is not None:
-            needed |= {
-                plane for plane, weights in zip(runs.planes, runs.weights.T, strict=True) if weights.any()
-            }
-    return tuple(plane for plane in job.planes if plane in needed)
 
 
 def _of_itself(store: FleetStore, job: Job, machine: str) -> list[str]:

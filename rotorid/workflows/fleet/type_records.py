@@ -45,14 +45,8 @@ class Grid(NamedTuple):
 class KnownType:
     """A type as the store knows it.
 
-    Attributes
-    ----------
-    kind
-        Its coefficients.
-    jobs
-        Rows of the table `jobs` that it is made of or that were found odd, by id.
-    lacking, copies
-        How many jobs of the type have not all these coefficients, and how many those of another job.
+    `jobs` are rows of that table which it is made of or which were found odd, by id; so many jobs are
+    `lacking` some of the coefficients or are `copies`, with those of another job.
     """
 
     name: str
