@@ -40,9 +40,9 @@ from rotorid.regression import covariance_root, least_squares, stretch, unstretc
 def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
     """Coefficients and the bare rotor's readings, from what is known and from runs.
 
-    Known are coefficients with `parameters`, as of `MachineType.influence`; one bare run is enough. Beside the
-    coefficients with a baseline it gives the probability of readings farther from what was known, by χ²; 1
-    where nothing is spare. ValueError for runs without these sensors, speeds or planes.
+    Known are coefficients with `parameters`, as of `MachineType.influence`; one bare run is enough. Beside
+    the coefficients with a baseline it gives the probability of readings farther from what was known, by χ²;
+    1 where nothing is spare. ValueError for runs without these sensors, speeds or planes.
     """
     from scipy.special import chdtrc
 
@@ -57,10 +57,10 @@ def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
     assert known.parameters is not None
     S, C, P = known.W.shape
     N, n = 2 * S * C, 2 * S * C + len(known.parameters)
-    F = np.zeros((n, S * C, 2 * P + 2))  # what each of θ does to (Y₀, W) of each channel
+    F = np.zeros((n, S * C, 2 * P + 2))  # (Y₀, W) of each channel by each of θ
     F[:N, :, :2] = np.eye(N).reshape(N, -1, 2)
     F[N:] = stretch(known.parameters.ravel()).reshape(n - N, S * C, -1)
-    B = stretch(np.column_stack((np.ones(len(Y)), mounted))[:, None])
+    B = stretch(np.column_stack((np.ones(len(Y)), mounted))[:, None])  # a reading of each run by (Y₀, W)
     white = np.array([_white(own[r], shared.common[:, r]) for r in range(len(Y))])
     K = white @ np.einsum("nkm,rim->rkin", F, B).reshape(-1, N, n)
     y = white @ stretch((Y - runs.effect).ravel()).reshape(-1, N, 1)
