@@ -114,6 +114,10 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     earlier = int(kind.effects.jobs[kind.machines.index(machine)]) if machine in kind.machines else 0
     if earlier:
         words += f", and of {counted(earlier, 'earlier job')} of {machine!r}"
+        if kind.effects.jobs.max() == 1:
+            warnings.append(
+                f"no machine of the type was balanced twice: the errors lack how {machine!r} changed"
+            )
     found = replace(found, notes=(*found.notes, words, *known.notes), warnings=tuple(warnings))
     reason = _reason(kind, trials) if chance < LEVEL else ""
     return TypeKnowledge(known, found, tuple(store.files("jobs", "coefficients")), earlier, chance, reason)

@@ -176,8 +176,21 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
         np.trace(first.influence.covariance, axis1=2, axis2=3).sum()
         < 0.3 * np.trace(other.influence.covariance, axis1=2, axis2=3).sum()
     )
+    assert "balanced twice" not in " ".join(first.influence.warnings)
     W = machines[2].W * 1e-6 / 2 / 1e-3
     assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
+
+
+def test_that_nothing_tells_how_a_machine_changes_is_told(tmp_path):
+    rng = np.random.default_rng(32)
+    machines = [Machine(rng) for _ in range(6)]
+    for k, machine in enumerate(machines):
+        machine.job(tmp_path / "tree" / "fan" / f"F{k}")
+    fleet_add(tmp_path / "F", [tmp_path / "tree"])
+    new = machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1)
+    found = type_coefficients(read_job(new), f"{tmp_path / 'F'}:fan")
+    assert found.earlier == 1
+    assert "no machine of the type was balanced twice" in " ".join(found.influence.warnings)
 
 
 def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(fleet, tmp_path):
