@@ -13,7 +13,8 @@ from the others' were mostly recorded otherwise; what would make them fit is loo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -28,14 +29,8 @@ from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, listing
-from rotorid.regression import stretch, unstretch
-from rotorid.regression.random_effects import (
-    Groups,
-    RandomEffects,
-    grouped,
-    oddness,
-    random_effects,
-)
+from rotorid.regression import covariance_root, stretch, unstretch
+from rotorid.regression.random_effects import RandomEffects, oddness, random_effects
 
 LEAST_MACHINES = 3
 """Fewer do not show how machines differ."""
@@ -57,35 +52,18 @@ def record_of(machine: str, job: str, influence: Influence) -> MachineRecord:
     S, C, P = influence.W.shape
     V = np.zeros((S, C, P, 2, 2))
     if influence.covariance is not None:
-        p = np.arange(P)
-        V = (
-            influence.covariance[..., 2:, 2:]
-            .reshape(S, C, P, 2, P, 2)[:, :, p, :, p]
-            .transpose(1, 2, 0, 3, 4)
-        )
+        V = np.einsum("scpipj->scpij", influence.covariance[..., 2:, 2:].reshape(S, C, P, 2, P, 2))
     return MachineRecord(machine, job, influence.W, V)
 
 
 @dataclass(frozen=True, eq=False)
 class MachineType:
-    """Coefficients of a type.
+    """Coefficients of a type at S speeds (rad/s), of C sensors and P planes.
 
-    Attributes
-    ----------
-    speeds, sensors, planes
-        rad/s (S,), names (C) and (P).
-    turn
-        Phases of the median machine, as numbers of size 1, (S, C, P).
-    effects
-        Mean and covariances of the coefficients over these phases, stretched, n = 2 S C P.
-    machines
-        Names (M,) of those it is made of.
-    groups
-        Their means over jobs, as `effects`.
-    odd
-        Records that were left out, and how many times farther they are than what belongs to the type.
-    limit
-        Squared distance within which machines belong to the type; infinite with fewer than `LEAST_GROUPS`.
+    `turn` (S, C, P) are the phases of the median machine, as numbers of size 1; `effects` are of the
+    coefficients over these, stretched, n = 2 S C P, with `machines` as groups. `odd` are records that were
+    left out, each with its squared distance over `limit`, within which machines belong to the type; that is
+    infinite with fewer than `LEAST_GROUPS`.
     """
 
     speeds: FloatArray
@@ -94,7 +72,6 @@ class MachineType:
     turn: ComplexArray
     effects: RandomEffects
     machines: tuple[str, ...]
-    groups: Groups
     odd: tuple[tuple[MachineRecord, float], ...]
     limit: float
 
@@ -112,36 +89,30 @@ class MachineType:
 
     def distance(self, W: ComplexArray, covariance: FloatArray) -> float:
         """Squared distance of coefficients measured in one job, to be compared with `limit`."""
-        y, error = _rows(W[None], covariance[None], self.turn)
-        one = Groups(y, error, np.ones(1, dtype=np.int64), self.effects.within)
-        return self.effects.distance(y[0], one.covariance(0))
+        return self.effects.distance(*_rows(W, covariance, self.turn))
 
     def influence(self, labels: Labels, machine: str = "") -> Influence:
-        """Coefficients to expect of a machine of this type, with their errors.
-
-        Parameters
-        ----------
-        labels
-            Units and conventions to print in.
-        machine
-            One of `machines`, whose own jobs count then beside the type; else a further one.
-        """
+        """Coefficients to expect of one of `machines`, whose own jobs count then; else of a further one."""
         mean, covariance = self.effects.mean, self.effects.new_group
         if machine in self.machines:
-            m = self.machines.index(machine)
-            mean, covariance = self.effects.given(self.groups.mean[m], self.groups.covariance(m))
+            mean, covariance = self.effects.known(self.machines.index(machine))
         covariance = (covariance + self.effects.within) * self.widening
-        values, vectors = np.linalg.eigh(covariance)
-        columns = self.coefficients((vectors * np.sqrt(values.clip(0.0))).T)
+        columns = self.coefficients(covariance_root(covariance, np.diag(covariance)).T)
         found = Influence(self.speeds, self.sensors, self.planes, self.coefficients(mean), labels=labels)
         return with_parameters(found, columns, 0.0)
+
+    def measured(self, trials: Trials) -> Influence:
+        """Coefficients of a job's own runs; ValueError where they do not give all that the type has."""
+        found = estimate_influence(trials)
+        sensors, planes = map(found.sensors.index, self.sensors), map(found.planes.index, self.planes)
+        return found.part(match_speeds(self.speeds, found.speeds), [*sensors], [*planes])
 
     @property
     def widening(self) -> float:
         """Times the variance: what a region of two numbers at 95 % needs with so few machines (F over χ²)."""
         from scipy.special import chdtri, fdtri
 
-        return float(2 * fdtri(2, self.effects.groups - 1, 0.95) / chdtri(2, 0.05))
+        return float(2 * fdtri(2, len(self.machines) - 1, 0.95) / chdtri(2, 0.05))
 
     def coefficients(self, values: FloatArray) -> ComplexArray:
         """Stretched (…, n) as coefficients (…, S, C, P)."""
@@ -153,12 +124,8 @@ def fit_type(
 ) -> MachineType:
     """Coefficients of a type, from jobs of its machines; those that do not belong are left out and named.
 
-    Raises
-    ------
-    UndeterminedError
-        With fewer than `LEAST_MACHINES` machines that belong together.
+    UndeterminedError with fewer than `LEAST_MACHINES` machines that belong together.
     """
-    _enough([record.machine for record in records])
     W = np.stack([record.W for record in records])
     centre = np.median(W.real, axis=0) + 1j * np.median(W.imag, axis=0)
     turn = np.exp(1j * np.angle(centre))
@@ -167,16 +134,18 @@ def fit_type(
     far, limit = oddness(y, error, np.unique(names, return_inverse=True)[1])
     fits = far <= limit
     machines = tuple(dict.fromkeys(names[fits].tolist()))
-    _enough(machines)
-    groups = grouped(y[fits], error[fits], np.array([machines.index(name) for name in names[fits]]))
+    if len(machines) < LEAST_MACHINES:
+        raise UndeterminedError(
+            f"{counted(len(machines), 'machine')} with these speeds, sensors and planes: how machines of a "
+            f"type differ shows with {LEAST_MACHINES} or more"
+        )
     return MachineType(
         speeds=speeds,
         sensors=tuple(sensors),
         planes=tuple(planes),
         turn=turn,
-        effects=random_effects(groups),
+        effects=random_effects(y[fits], error[fits], np.array([machines.index(n) for n in names[fits]])),
         machines=machines,
-        groups=groups,
         odd=tuple((records[j], float(far[j]) / limit) for j in np.flatnonzero(~fits).tolist()),
         limit=limit,
     )
@@ -185,14 +154,7 @@ def fit_type(
 def why_odd(kind: MachineType, record: MachineRecord, trials: Trials | None = None) -> str:
     """What would make a record fit its type, in words; "" where nothing tried does.
 
-    Parameters
-    ----------
-    kind
-        The type.
-    record
-        Coefficients that do not fit it.
-    trials
-        The runs that they were measured with; None: not known, and the weights taken to be at 0°.
+    By the runs that it was measured with; None: not known, and the weights taken to be at 0°.
     """
     found = list(_changes(kind, record, trials))
     least = min(distance for distance, _ in found)
@@ -203,10 +165,12 @@ def why_odd(kind: MachineType, record: MachineRecord, trials: Trials | None = No
 
 def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) -> Iterator[tuple[float, str]]:
     """Squared distance of the coefficients as they would be, and what was changed."""
+    from scipy.optimize import minimize_scalar
+
     W, V = record.W, record.covariance
-    other = np.conj(W) if trials is None else _lagging(kind, trials)
     mirror = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    yield kind.distance(other, V * mirror), "its phases were of the other sense (lag for lead)"
+    lagging = kind.distance(_lagging(kind, W, trials), V * mirror)
+    yield lagging, "its phases were of the other sense (lag for lead)"
     for names, axis, what in ((kind.sensors, 1, "sensors"), (kind.planes, 2, "planes")):
         for a, b in combinations(range(len(names)), 2):
             order = np.arange(len(names))
@@ -215,67 +179,36 @@ def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) ->
             yield exchanged, f"its {what} {names[a]} and {names[b]} were exchanged"
 
     def turned(theta: float) -> float:
-        return kind.distance(W * np.exp(1j * theta), _spun(V, np.array(theta)))
-
-    theta = _least(turned)
-    degrees = (round(np.degrees(theta)) + 180) % 360 - 180
-    words = f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
-    yield turned(theta) + _ALIKE, words  # it has a number to choose
-
-
-def _lagging(kind: MachineType, trials: Trials) -> ComplexArray:
-    """Coefficients if phases meant the other."""
-    other = estimate_influence(replace(trials, readings=np.conj(trials.readings), covariance=None))
-    return on_grid(other, kind.speeds, kind.sensors, kind.planes).W
-
-
-def _least(distance: Callable[[float], float]) -> float:
-    """The angle, rad, at which a distance is least."""
-    from scipy.optimize import minimize_scalar
+        by = np.exp(1j * np.array(theta))
+        return kind.distance(W * by, _turned(V, by))
 
     step = np.radians(10.0)
-    start = min(np.arange(0.0, 2 * np.pi, step).tolist(), key=distance)
-    return float(minimize_scalar(distance, bounds=(start - step, start + step), method="bounded").x)
+    start = min(np.arange(0.0, 2 * np.pi, step).tolist(), key=turned)
+    least = minimize_scalar(turned, bounds=(start - step, start + step), method="bounded")
+    degrees = (round(np.degrees(least.x)) + 180) % 360 - 180
+    words = f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
+    yield float(least.fun) + _ALIKE, words  # it has a number to choose
 
 
-def on_grid(
-    influence: Influence, speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
-) -> Influence:
-    """Coefficients at these speeds, of these sensors and planes.
-
-    Raises
-    ------
-    ValueError
-        For one that is not among them.
-    """
-    at = match_speeds(speeds, influence.speeds)
-    for wanted, there in ((sensors, influence.sensors), (planes, influence.planes)):
-        if lacking := [name for name in wanted if name not in there]:
-            known = listing(there, "and")
-            raise ValueError(
-                f"there are no coefficients of {listing(lacking, 'and')}; there are some of {known}"
-            )
-    rows = [influence.sensors.index(c) for c in sensors]
-    return influence.part(at, rows, [influence.planes.index(p) for p in planes])
+def _lagging(kind: MachineType, W: ComplexArray, trials: Trials | None) -> ComplexArray:
+    """Coefficients if phases meant the other, at the type's radii; without trial runs conj(W)."""
+    if trials is not None:
+        with suppress(ValueError):
+            read = kind.measured(trials).W
+            lag = replace(trials, readings=np.conj(trials.readings), covariance=None)
+            size = np.linalg.norm(W, axis=(0, 1)) / np.linalg.norm(read, axis=(0, 1))
+            return np.asarray(kind.measured(lag).W * size)
+    return np.conj(W)
 
 
 def _rows(W: ComplexArray, covariance: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (J, S, C, P) over the type's phases as rows (J, n), and covariances (J, n / 2, 2, 2)."""
-    J = len(W)
-    y = stretch((W * np.conj(turn)).ravel()).reshape(J, -1)
-    return y, _spun(covariance, -np.angle(turn)).reshape(J, -1, 2, 2)
+    """Coefficients (…, S, C, P) over the type's phases as rows (…, n), and covariances (…, n / 2, 2, 2)."""
+    several = W.shape[:-3]
+    y = stretch((W * np.conj(turn)).ravel()).reshape(*several, -1)
+    return y, _turned(covariance, np.conj(turn)).reshape(*several, -1, 2, 2)
 
 
-def _spun(covariance: FloatArray, angle: FloatArray) -> FloatArray:
-    """Covariances (…, 2, 2) of complex numbers that are turned by angles (…), rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    R = np.moveaxis(np.array([[c, -s], [s, c]]), (0, 1), (-2, -1))
+def _turned(covariance: FloatArray, by: ComplexArray) -> FloatArray:
+    """Covariances (…, 2, 2) of complex numbers that are multiplied by numbers (…) of size 1."""
+    R = stretch(by[..., None, None])
     return np.asarray(R @ covariance @ np.swapaxes(R, -1, -2))
-
-
-def _enough(machines: Collection[str]) -> None:
-    if (n := len(set(machines))) < LEAST_MACHINES:
-        raise UndeterminedError(
-            f"{counted(n, 'machine')} with these speeds, sensors and planes: how machines of a type differ "
-            f"shows with {LEAST_MACHINES} or more"
-        )

@@ -20,93 +20,96 @@ import numpy as np
 from balancing.coefficients.baseline import mounted_weights, places
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
+from balancing.coefficients.repeatability import both_directions, describe, differences
 from balancing.coefficients.run_error_estimate import known_run_errors
-from balancing.coefficients.run_errors import marginal, run_columns, runs_of
-from balancing.data.reading_errors import error_model, mean_covariance, symmetric
+from balancing.coefficients.run_errors import RunErrors, Runs, marginal, run_columns, runs_of
+from balancing.data.reading_errors import (
+    EQUAL,
+    ErrorModel,
+    error_model,
+    mean_covariance,
+    mean_variance,
+    symmetric,
+)
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import least_squares, stack, stretch, unstretch
+from rotorid.regression import covariance_root, least_squares, stretch, unstretch
 
 
 def update(known: Influence, trials: Trials) -> tuple[Influence, float]:
     """Coefficients and the bare rotor's readings, from what is known and from runs.
 
-    Parameters
-    ----------
-    known
-        Coefficients with `parameters`, as of `MachineType.influence`.
-    trials
-        Runs of at least the speeds and sensors of the coefficients; one run without weights is enough.
-
-    Returns
-    -------
-    Influence
-        With a baseline.
-    probability
-        Of readings farther from what was known than these, by χ²; 1 where nothing is spare.
-
-    Raises
-    ------
-    ValueError
-        For runs without these sensors, speeds or planes.
+    Known are coefficients with `parameters`, as of `MachineType.influence`; one bare run is enough. Beside
+    the coefficients with a baseline it gives the probability of readings farther from what was known, by χ²;
+    1 where nothing is spare. ValueError for runs without these sensors, speeds or planes.
     """
     from scipy.special import chdtrc
 
     speeds, sensors = places(known, trials)
     pick = np.ix_(range(len(trials.runs)), speeds, sensors)
-    mounted, Y, model = mounted_weights(known, trials), trials.mean[pick], error_model(trials)
+    mounted, Y = mounted_weights(known, trials), trials.mean[pick]
     runs = runs_of(Y, mounted, known.W)
-    try:
-        between = estimate_influence(trials).run_errors
-    except UndeterminedError:  # nothing is spare
-        between = known_run_errors(trials, runs)
-    columns = run_columns(between, runs)
-    own = mean_covariance(trials, model)[pick] + columns.own[..., None, None] * np.eye(2)
-    S, C = Y.shape[1:]
-    N = 2 * S * C
+    model, between = _errors(trials, runs)
+    shared = run_columns(between, runs)
+    own = _own(trials, model)[pick] + shared.own[..., None, None] * np.eye(2)
+    own += EQUAL * (mean_variance(own).max() or 1.0) * np.eye(2)  # a reading of zero has none
     assert known.parameters is not None
-    L = np.moveaxis(known.parameters[..., 1:], 0, -1).reshape(S * C, len(known.planes), -1)
-    K, y, whites = [], [], []
-    for r, T in enumerate(mounted):
-        white = _white(own[r], columns.common[:, r])
-        K.append(white @ np.column_stack((np.eye(N), stack(np.einsum("npm,p->nm", L, T)))))
-        y.append(white @ stretch((Y[r] - known.W @ T).ravel()))
-        whites.append(white)
-    n = L.shape[-1]
-    found = least_squares(np.vstack((*K, np.eye(N + n)[N:])), np.concatenate((*y, np.zeros(n))), sigma=1.0)
-    C_theta = found.solution_covariance
-    assert C_theta is not None
+    S, C, P = known.W.shape
+    N, n = 2 * S * C, 2 * S * C + len(known.parameters)
+    F = np.zeros((n, S * C, 2 * P + 2))  # (Y₀, W) of each channel by each of θ
+    F[:N, :, :2] = np.eye(N).reshape(N, -1, 2)
+    F[N:] = stretch(known.parameters.ravel()).reshape(n - N, S * C, -1)
+    B = stretch(np.column_stack((np.ones(len(Y)), mounted))[:, None])  # a reading of each run by (Y₀, W)
+    white = np.array([_white(own[r], shared.common[:, r]) for r in range(len(Y))])
+    K = white @ np.einsum("nkm,rim->rkin", F, B).reshape(-1, N, n)
+    y = white @ stretch((Y - runs.effect).ravel()).reshape(-1, N, 1)
+    rows = np.vstack((*K, np.eye(n)[N:]))
+    found = least_squares(rows, np.append(y, np.zeros(n - N)), sigma=1.0)
+    assert found.solution_covariance is not None
     assert found.chi_square is not None
-
-    def channels(theta: FloatArray) -> ComplexArray:
-        """(Y₀, W) of each channel by columns (N + n, k) of θ, (k, S, C, P + 1)."""
-        W = np.einsum("npm,mk->knp", L, theta[N:])
-        return np.concatenate((unstretch(theta[:N].T)[..., None], W), axis=-1).reshape(
-            -1, S, C, W.shape[-1] + 1
-        )
-
-    change = channels(found.solution[:, None])[0]
-    gains = [channels(C_theta @ K_r.T @ white) for K_r, white in zip(K, whites, strict=True)]
-    alone = sum((_own(G, own[r]) for r, G in enumerate(gains)), np.zeros(()))
-    parameters = _shared(channels(_root(C_theta, np.diag(C_theta))), alone)
-    last = bool(mounted[-1].any())
+    F = F.reshape(n, -1)
+    moves = F.T @ found.solution_covariance
+    gains = (moves @ np.swapaxes(K, 1, 2) @ white).reshape(-1, S * C, 2 * P + 2, S * C, 2)
+    alone, columns = _split(moves @ F, gains, own.reshape(-1, S * C, 2, 2))
+    parameters = columns.reshape(-1, S, C, P + 1)
+    change = unstretch(found.solution @ F).reshape(S, C, -1)
+    repeated = describe(differences(trials, model))
+    said = *known.warnings, *trials.warnings, *repeated, *model.warnings
     result = replace(
         known,
         W=known.W + change[..., 1:],
         baseline=change[..., 0],
         parameters=parameters,
-        covariance=alone + marginal(None, parameters),
+        covariance=alone.reshape(S, C, 2 * P + 2, -1) + marginal(None, parameters),
         errors=model.errors,
         error_source=model.source,
         reading_dof=model.dof,
         run_errors=between,
         labels=trials.labels,
-        last_run=trials.runs[-1] if last else None,
+        last_run=trials.runs[-1] if mounted[-1].any() else None,
         last_weights=mounted[-1],
-        warnings=tuple(dict.fromkeys((*known.warnings, *trials.warnings, *model.warnings))),
+        warnings=tuple(dict.fromkeys(said)),
+        contradictions=repeated,
     )
     return result, float(chdtrc(found.dof, found.chi_square)) if found.dof else 1.0
+
+
+def _errors(trials: Trials, runs: Runs) -> tuple[ErrorModel, RunErrors]:
+    """Of the readings and between the runs: as runs that tell more than the coefficients show them."""
+    model = error_model(trials)
+    try:
+        found = estimate_influence(trials)
+    except UndeterminedError:
+        return model, known_run_errors(trials, runs)
+    shown = ErrorModel(found.errors, found.reading_dof, found.error_source, model.warnings)
+    return shown, found.run_errors
+
+
+def _own(trials: Trials, model: ErrorModel) -> FloatArray:
+    """Covariance (R, S, C, 2, 2) of readings; an error that is not stated is that of the other direction."""
+    assert model.errors is not None
+    return mean_covariance(trials, replace(model, errors=both_directions(model.errors)))
 
 
 def _white(own: FloatArray, common: ComplexArray) -> FloatArray:
@@ -117,36 +120,15 @@ def _white(own: FloatArray, common: ComplexArray) -> FloatArray:
     return white(np.eye(2 * S * C).reshape(S, 2 * C, -1)).reshape(2 * S * C, -1)
 
 
-def _own(gains: ComplexArray, own: FloatArray) -> FloatArray:
-    """Covariances (S, C, 2P + 2, 2P + 2) by errors (S, C, 2, 2) of a run's readings in their own channel.
+def _split(covariance: FloatArray, gains: FloatArray, own: FloatArray) -> tuple[FloatArray, ComplexArray]:
+    """What channels put into their own (Y₀, W), (S C, n, n), n = 2P + 2; columns (M, S C n / 2) of the rest.
 
-    The gains (2 S C, S, C, P + 1) are those of each real reading.
+    Of the covariance (S C n, S C n), with the gains (R, S C, n, S C, 2) of the readings of each run and their
+    own covariances (R, S C, 2, 2).
     """
-    S, C = own.shape[:2]
-    each = _real(gains).reshape(S, C, 2, S, C, -1)
-    G = np.einsum("scuscn->scnu", each)
-    return symmetric(G @ own @ np.swapaxes(G, -1, -2))
+    from scipy.linalg import block_diag
 
-
-def _shared(columns: ComplexArray, own: FloatArray) -> ComplexArray:
-    """Columns (M, S, C, P + 1) of a whole covariance that has such columns, less that of single channels."""
-    shape = columns.shape[1:]
-    F = _real(columns).reshape(len(columns), -1)
-    rest = (F.T @ F).reshape(own.shape[0] * own.shape[1], own.shape[-1], -1, own.shape[-1])
-    k = np.arange(len(rest))
-    rest[k, :, k] -= own.reshape(len(rest), *own.shape[-2:])
-    root = _root(rest.reshape(F.shape[1], -1), np.sum(F**2, axis=0))
-    return unstretch(root.T).reshape(-1, *shape)
-
-
-def _real(columns: ComplexArray) -> FloatArray:
-    """Complex numbers (…, n) as real ones, (…, 2n)."""
-    return stretch(columns[..., None])[..., 0]
-
-
-def _root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
-    """Columns of a covariance, what is negative left out; numbers in units of their own size."""
-    size = np.sqrt(variance)
-    size = np.where(size > 0, size, 1.0)
-    values, vectors = np.linalg.eigh(symmetric(covariance / np.outer(size, size)))
-    return np.asarray(size[:, None] * vectors * np.sqrt(values.clip(0.0)))
+    G = np.einsum("rknkj->rknj", gains)
+    alone = symmetric(np.sum(G @ own @ np.swapaxes(G, -1, -2), axis=0))
+    rest = covariance - block_diag(*alone)
+    return alone, unstretch(covariance_root(rest, np.diag(covariance)).T)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from balancing.data.reading_errors import symmetric
 from balancing.solvers.conditioning import check_channels, check_stack
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import stretch
+from rotorid.regression import covariance_root, stretch
 
 Solver = Callable[[ComplexArray, ComplexArray], ComplexArray]
 
@@ -62,7 +62,7 @@ def sampled_covariance(
     n = 2 * P + 2
     if draws <= n:
         raise ValueError(f"{P} planes need more than {n} draws to have a covariance; got {draws}")
-    root = _root(C)
+    root = covariance_root(C, np.einsum("nii->ni", C))
     rng = np.random.default_rng(seed)
     mean = np.column_stack((y, w))
     found = []
@@ -99,11 +99,3 @@ def _shared(rng: np.random.Generator, common: ComplexArray) -> ComplexArray:
     number = a + 1j * b
     run = np.einsum("m,mscp->scp", number[:, 0], common[0])
     return np.asarray(run + np.einsum("ms,mscp->scp", number[:, 1:], common[1])).reshape(S * C, n)
-
-
-def _root(C: FloatArray) -> FloatArray:
-    """Matrices R with R Rᵀ = C, for singular C too; scaled first, as weights are small next to readings."""
-    diagonal = np.sqrt(np.maximum(np.einsum("nii->ni", C), 0.0))
-    scale = np.where(diagonal > 0, diagonal, 1.0)
-    values, vectors = np.linalg.eigh(C / (scale[:, :, None] * scale[:, None, :]))
-    return np.asarray(scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])

@@ -3,6 +3,7 @@
 from rotorid.regression.estimate import Estimate, coverage_factor
 from rotorid.regression.linear import (
     RCOND,
+    covariance_root,
     gain,
     least_squares,
     solution,
@@ -18,6 +19,7 @@ __all__ = [
     "WORD_TOLERANCE",
     "Combination",
     "Estimate",
+    "covariance_root",
     "coverage_factor",
     "echelon",
     "gain",

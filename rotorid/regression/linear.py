@@ -277,6 +277,14 @@ def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tu
     return (found.T / scale).T, int(rank)
 
 
+def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
+    """R with R Rᵀ = C, shape (…, n, n), without what is negative of it; in units of a variance (…, n)."""
+    size = np.sqrt(np.maximum(variance, 0.0))
+    scale = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(covariance / (scale[..., :, None] * scale[..., None, :]))
+    return np.asarray(scale[..., :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
+
+
 def _real_problem(
     K: ArrayLike, Y: ArrayLike, names: Sequence[str] | None
 ) -> tuple[FloatArray, FloatArray, tuple[str, ...], bool]:

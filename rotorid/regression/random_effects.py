@@ -13,10 +13,12 @@ Biol. 4 (2005) 32; concentration steps: P. J. Rousseeuw, K. van Driessen, Techno
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray, IntArray
+from rotorid.regression.linear import covariance_root, solution
 
 LEAST_GROUPS = 5
 """Fewer do not tell an odd one from the others."""
@@ -28,102 +30,61 @@ _LEAST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Groups:
-    """Means of M groups of n numbers.
-
-    Attributes
-    ----------
-    mean
-        Shape (M, n).
-    error
-        Covariance of each by the errors of its jobs, pairs of numbers together, (M, n / 2, 2, 2).
-    jobs
-        How many each is the mean of, (M,).
-    within
-        W, (n, n).
-    """
-
-    mean: FloatArray
-    error: FloatArray
-    jobs: IntArray
-    within: FloatArray
-
-    def covariance(self, m: int) -> FloatArray:
-        """Of the mean of group m about the group itself, (n, n)."""
-        return np.asarray(_in_blocks(self.error[m]) + self.within / self.jobs[m])
-
-
-@dataclass(frozen=True, eq=False)
 class RandomEffects:
-    """What groups have in common.
+    """M groups of n numbers: what they have in common, and each.
 
-    Attributes
-    ----------
-    mean
-        μ (n,).
-    between, within
-        B and W, (n, n).
-    error
-        Covariance of a group's mean about the group itself, the mean over the groups, (n, n).
-    groups
-        How many it is made of.
+    `mean` is μ (n,), `between` and `within` are B and W, (n, n). `groups` (M, n) are the means of the groups
+    over so many `jobs` (M,), `error` (M, n / 2, 2, 2) their covariances by the jobs' own errors.
     """
 
     mean: FloatArray
     between: FloatArray
     within: FloatArray
+    groups: FloatArray
     error: FloatArray
-    groups: int
+    jobs: IntArray
 
-    @property
+    @cached_property
     def new_group(self) -> FloatArray:
         """Covariance (n, n) of a further group about the mean, which is none too well known itself."""
-        return self.between + (self.between + self.error) / self.groups
+        error = _in_blocks(self.error.mean(axis=0)) + self.within * np.mean(1 / self.jobs)
+        return np.asarray(self.between + (self.between + error) / len(self.groups))
 
     def distance(self, y: FloatArray, error: FloatArray) -> float:
-        """Squared Mahalanobis distance of a further group y (n,) with the covariance `error` (n, n)."""
-        covariance = self.new_group + error
-        size = np.sqrt(np.maximum(np.diag(covariance), _LEAST * np.max(y**2, initial=0.0)))
-        scaled = covariance / np.outer(*(np.where(size > 0, size, 1.0),) * 2)
-        off = (y - self.mean) / np.where(size > 0, size, 1.0)
-        return float(off @ np.linalg.solve(scaled + _LEAST * np.eye(len(y)), off))
+        """Squared Mahalanobis distance of a job (n,) of a further group, with own errors (n / 2, 2, 2)."""
+        covariance = self.new_group + self.within + _in_blocks(error)
+        least = _LEAST * np.maximum(np.diag(covariance), _LEAST * np.max(y**2))
+        off = y - self.mean
+        return float(off @ np.linalg.solve(covariance + np.diag(least), off))
 
-    def given(self, y: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean (n,) and covariance (n, n) of a group whose jobs had the mean y with this covariance."""
-        G = np.linalg.lstsq((self.new_group + error).T, self.new_group, rcond=None)[0].T
-        return self.mean + G @ (y - self.mean), _without(self.new_group, G @ self.new_group)
+    def known(self, m: int) -> tuple[FloatArray, FloatArray]:
+        """Best linear prediction of group m from its own jobs and all groups, and its covariance (n, n)."""
+        error = _in_blocks(self.error[m]) + self.within / self.jobs[m]
+        G = solution(self.between + error, self.between).T
+        rest = np.eye(len(G)) - G
+        covariance = rest @ self.new_group @ rest.T + G @ error @ G.T
+        return self.mean + G @ (self.groups[m] - self.mean), covariance
 
 
-def grouped(y: FloatArray, error: FloatArray, group: IntArray) -> Groups:
-    """Groups of jobs.
+def random_effects(y: FloatArray, error: FloatArray, group: IntArray) -> RandomEffects:
+    """Mean and covariances by moments, of two groups or more.
 
-    Parameters
-    ----------
-    y
-        One row a job, (J, n).
-    error
-        Covariance of each by its own errors, pairs of numbers together, (J, n / 2, 2, 2).
-    group
-        Number of each job's group, (J,), from 0 without gaps.
+    y (J, n) has one row a job, `error` (J, n / 2, 2, 2) the covariances by its own errors, pairs of numbers
+    together, `group` (J,) the number of its group, from 0 without gaps.
     """
-    jobs = np.bincount(group)
-    mean, own = np.zeros((len(jobs), y.shape[1])), np.zeros((len(jobs), *error.shape[1:]))
-    np.add.at(mean, group, y / jobs[group, None])
+    jobs, n = np.bincount(group), y.shape[1]
+    groups, own = np.zeros((len(jobs), n)), np.zeros((len(jobs), *error.shape[1:]))
+    np.add.at(groups, group, y / jobs[group, None])
     np.add.at(own, group, error / jobs[group, None, None, None] ** 2)
-    within = np.zeros((y.shape[1],) * 2)
-    several = jobs[group] > 1
+    within, several = np.zeros((n, n)), jobs[group] > 1
     if several.any():
-        off = (y - mean[group]) * np.sqrt(jobs / np.maximum(jobs - 1, 1))[group, None]
-        within = _without(shrunk(off[several], int(several.sum())), _in_blocks(error[several].mean(axis=0)))
-    return Groups(mean, own, jobs, within)
-
-
-def random_effects(groups: Groups) -> RandomEffects:
-    """Mean and covariances by moments, of two groups or more."""
-    mean, M = groups.mean.mean(axis=0), len(groups.mean)
-    error = _in_blocks(groups.error.mean(axis=0)) + groups.within * np.mean(1 / groups.jobs)
-    between = _without(shrunk(groups.mean - mean, M - 1), error)
-    return RandomEffects(mean, between, groups.within, error, M)
+        dof = int(several.sum() - (jobs > 1).sum())
+        left = np.tensordot(1 - 1 / jobs[group], error, 1) / dof
+        within = _without(shrunk((y - groups[group])[several], dof), _in_blocks(left))
+    mean = groups.mean(axis=0)
+    left = _in_blocks(own.mean(axis=0)) + within * np.mean(1 / jobs)
+    between = _without(shrunk(groups - mean, len(jobs) - 1), left)
+    return RandomEffects(mean, between, within, groups, own, jobs)
 
 
 def shrunk(off: FloatArray, dof: int) -> FloatArray:
@@ -145,10 +106,8 @@ def _without(scatter: FloatArray, error: FloatArray) -> FloatArray:
     Numbers are taken in units of their scatter: in those of what is left, a number of which hardly anything
     is left would make what it has in common with others, and with it their variance, as large as one likes.
     """
-    size = np.sqrt(np.diag(scatter))
-    scale = np.outer(*(np.where(size > 0, size, 1.0),) * 2)
-    values, vectors = np.linalg.eigh((scatter - error) / scale)
-    return np.asarray((vectors * values.clip(0.0)) @ vectors.T * scale)
+    root = covariance_root(scatter - error, np.diag(scatter))
+    return np.asarray(root @ root.T)
 
 
 def oddness(y: FloatArray, error: FloatArray, group: IntArray) -> tuple[FloatArray, float]:
@@ -158,7 +117,7 @@ def oddness(y: FloatArray, error: FloatArray, group: IntArray) -> tuple[FloatArr
     that fit it; each group of these is then left out and compared with the rest (of many, in `_FOLDS` parts),
     so that none hides itself. A group counts once, however many jobs it has. The scale is the median of these
     distances: that of an estimated, shrunk covariance has no closed form. Infinite without `LEAST_GROUPS`
-    groups. Parameters as `grouped`.
+    groups. Parameters as `random_effects`.
     """
     n, M = y.shape[1], len(np.bincount(group))
     if M < LEAST_GROUPS:
@@ -207,15 +166,13 @@ def _distances(
     for k in np.unique(fold).tolist():
         rest = inside & (fold != k) if folds > 1 else inside
         number = np.unique(group[rest], return_inverse=True)[1]
-        effects = random_effects(grouped(y[rest], error[rest], number))
+        effects = random_effects(y[rest], error[rest], number)
         for j in np.flatnonzero(fold == k).tolist():
-            found[j] = effects.distance(y[j], _in_blocks(error[j]) + effects.within)
+            found[j] = effects.distance(y[j], error[j])
     return found
 
 
 def _in_blocks(pairs: FloatArray) -> FloatArray:
     """Covariance (2N, 2N) of pairs of numbers, (N, 2, 2), independent of each other."""
     N = len(pairs)
-    out = np.zeros((N, 2, N, 2))
-    out[np.arange(N), :, np.arange(N)] = pairs
-    return out.reshape(2 * N, 2 * N)
+    return np.asarray(np.einsum("nij,nm->nimj", pairs, np.eye(N)).reshape(2 * N, 2 * N))

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from balancing.data.conventions import Labels
     from rotorid.base.arrays import FloatArray
     from rotorid.workflows.fleet.type_records import KnownType
 
@@ -38,36 +37,25 @@ class FleetFitOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TypeFound(Outcome):
-    """Coefficients of a type.
-
-    Attributes
-    ----------
-    known
-        As the store knows it.
-    labels
-        Units to print in, those of most of its jobs; phases lead.
-    """
+    """Coefficients of a type, and of each odd record what would make it fit ("": not found)."""
 
     known: KnownType
-    labels: Labels
+    reasons: tuple[str, ...]
 
     @property
     def _columns(self) -> tuple[Column, ...]:
         import numpy as np
 
-        kind, found = self.known.kind, self.known.kind.influence(self.labels).to_frame()
+        kind = self.known.kind
+        influence = kind.influence(self.known.labels)
+        found = influence.to_frame()
         (along, across), (run, turn) = map(kind.scatter, (kind.effects.between, kind.effects.within))
         angle = "{:.1f}".format
         return (
             Column("speed_rpm", found["speed_rpm"].tolist(), "{:.6g}".format, "rpm"),
             Column("sensor", found["sensor"].tolist(), str),
             Column("plane", found["plane"].tolist(), str),
-            Column(
-                "influence",
-                found["influence"].tolist(),
-                partial(figures, digits=3),
-                kind.influence(self.labels).unit,
-            ),
+            Column("influence", found["influence"].tolist(), partial(figures, digits=3), influence.unit),
             Column("phase_deg", found["phase_deg"].tolist(), angle, "°"),
             Column("between_percent", 100 * along.ravel(), angle, "± % between"),
             Column("between_deg", np.degrees(across.ravel()), angle, "± °"),
@@ -85,7 +73,7 @@ class TypeFound(Outcome):
                 "times_the_limit": float(far) ** 0.5,
                 "reason": reason or None,
             }
-            for (record, far), reason in zip(self.known.kind.odd, self.known.reasons, strict=True)
+            for (record, far), reason in zip(self.known.kind.odd, self.reasons, strict=True)
         ]
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,8 +82,8 @@ class TypeFound(Outcome):
         return {
             "machine_type": self.known.name,
             "machines": list(kind.machines),
-            "jobs": len(self.known.jobs) - len(kind.odd),
-            "unit": kind.influence(self.labels).unit,
+            "jobs": int(kind.effects.jobs.sum()),
+            "unit": kind.influence(self.known.labels).unit,
             "phase": "lead",
             "angles": "with rotation",
             "rows": rows(self._columns),
@@ -110,26 +98,22 @@ class TypeFound(Outcome):
     @property
     def answer(self) -> Answer:
         """How machines differ, and which are odd; the coefficients."""
-        kind, jobs = self.known.kind, len(self.known.jobs) - len(self.known.kind.odd)
-        between, within = (
-            _typical(*kind.scatter(part)) for part in (kind.effects.between, kind.effects.within)
-        )
-        again = f"; from run to run of one {within}" if jobs > len(kind.machines) else ""
+        kind, notes, jobs = self.known.kind, self.known.notes, int(self.known.kind.effects.jobs.sum())
+        between, within = (kind.scatter(part) for part in (kind.effects.between, kind.effects.within))
         head = f"{self.known.name}: {counted(len(kind.machines), 'machine')}, {counted(jobs, 'job')}."
-        once = "" if again else "each machine was balanced once: nothing tells how one changes by itself"
-        odd = tuple(map(_odd_words, self._odd))
-        return Answer(
-            f"{head} Coefficients differ between machines {between}{again}.",
-            text(self._columns, left=3, width=COLUMNS),
-            warnings=odd,
-            notes=((once,) if once else ()) + self.known.notes,
-        )
+        head += f" Coefficients differ between machines {_typical(*between)}"
+        if jobs > len(kind.machines):
+            head += f"; from run to run of one {_typical(*within)}"
+        else:
+            notes = ("each machine was balanced once: nothing tells how one changes by itself", *notes)
+        found = text(self._columns, left=3, width=COLUMNS)
+        return Answer(f"{head}.", found, warnings=tuple(map(_odd_words, self._odd)), notes=notes)
 
     def figure(self) -> Figure:
         """Coefficients of all machines over their mean, each plane and sensor for itself."""
         from rotorid.workflows.fleet.type_picture import type_picture
 
-        return type_picture(self.known)
+        return type_picture(self.known.kind)
 
 
 def _odd_words(one: Mapping[str, Any]) -> str:
@@ -153,27 +137,16 @@ def _typical(along: FloatArray, across: FloatArray) -> str:
 def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
     """Coefficients of a type: their mean, how machines and runs differ, and the machines that are odd.
 
-    Parameters
-    ----------
-    fleet
-        Folder of the store.
-    options
-        The type.
-
-    Raises
-    ------
-    ValueError
-        For a fleet or a type that are not there; UndeterminedError with fewer than three machines.
+    ValueError for a fleet or a type that are not there; UndeterminedError with fewer than three machines.
     """
-    from balancing.data.conventions import Labels
-    from rotorid.tables.fleet.fleet_store import FleetStore
-    from rotorid.tables.reader.units import vibration, weight
+    from balancing.coefficients.machine_type import why_odd
+    from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
     from rotorid.workflows.fleet.type_records import known_type
 
     store = FleetStore(Path(fleet))
     known = known_type(store, options.machine_type)
-    read, mounted = (str(known.jobs[name].mode()[0]) for name in ("vibration_unit", "weight_unit"))
-    labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
     return TypeFound(
-        known=known, labels=labels, provenance=provenance(store.files("jobs", "coefficients"), options)
+        known=known,
+        reasons=tuple(why_odd(known.kind, odd, trials_of(store, odd.job)) for odd, _ in known.kind.odd),
+        provenance=provenance(store.files("jobs", "coefficients"), options),
     )

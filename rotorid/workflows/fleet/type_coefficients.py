@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.coefficients.identifiability import UndeterminedError
-from balancing.coefficients.influence import Influence, estimate_influence
-from balancing.coefficients.machine_type import on_grid, record_of, why_odd
+from balancing.coefficients.influence import Influence
+from balancing.coefficients.machine_type import record_of, why_odd
 from balancing.correction.refine_coefficients import together
 from balancing.correction.update_coefficients import update
 from balancing.data.trials import Trials
@@ -21,6 +20,7 @@ from rotorid.workflows.fleet.type_records import Grid, KnownType, known_type
 from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
+    from balancing.coefficients.machine_type import MachineType
     from balancing.correction.correction_result import Correction
     from rotorid.tables import Job
     from rotorid.tables.fleet.fleet_store import FleetStore
@@ -41,20 +41,9 @@ _RARE = 1e-12
 class TypeKnowledge:
     """What a type says of a machine.
 
-    Attributes
-    ----------
-    known
-        The type.
-    influence
-        Coefficients and baseline, with what the job's own runs have added.
-    files
-        Those that the type was read from.
-    earlier
-        How many earlier jobs of the machine count.
-    probability
-        Of runs farther from the type than those of the job; 1: nothing tells.
-    reason
-        Where it is below `LEVEL`: what would make the machine one of the type; "": not found.
+    `influence` has what the job's own runs have added, `files` are those that the type was read from, and so
+    many `earlier` jobs of the machine count. `probability` is that of runs farther from the type, 1 where
+    nothing tells; if it is below `LEVEL`, `reason` would make the machine one of the type ("": not found).
     """
 
     known: KnownType
@@ -88,37 +77,26 @@ class TypeKnowledge:
 
 
 def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeKnowledge:
-    """Coefficients of a job's machine from its type and the runs of the job; check runs if `refined`.
+    """Coefficients of a job's machine from a type, FLEET:TYPE, and the job's runs; check runs if `refined`.
 
-    Parameters
-    ----------
-    job
-        With one run at least.
-    address
-        FLEET:TYPE.
-
-    Raises
-    ------
-    ValueError
-        For an address, a fleet or a type that are not there, and check runs that are not.
+    ValueError for an address, a fleet or a type that are not there, and check runs that are not.
     """
     from rotorid.tables.fleet.fleet_store import FleetStore
     from rotorid.tables.fleet.job_records import kind_of
     from rotorid.tables.fleet.job_search import machine_of
-    from rotorid.tables.reader.units import weight
 
     folder, _, name = address.rpartition(":")
     if not folder or not name:
         raise ValueError(f"--type {address!r}: expected the folder of a fleet and a type, FLEET:TYPE")
     store, trials = FleetStore(Path(folder)), job.trials
     machine = job.machine or machine_of(job.files[0])
-    radii = tuple(job.radii.get(plane, np.nan) for plane in job.used)
-    grid = Grid(trials.speeds, trials.sensors, job.used, *kind_of(trials.labels), radii)
+    planes = tuple(plane for plane in job.planes if plane in (*job.used, *trials.planes))
+    radii = tuple(job.radii.get(plane, np.nan) for plane in planes)
+    grid = Grid(trials.speeds, trials.sensors, planes, *kind_of(trials.labels), radii)
     known = known_type(store, name, grid, _of_itself(store, job, machine))
     if not job.planes:  # nothing but a baseline: in the unit of the others' weights
-        unit = weight(str(known.jobs["weight_unit"].mode()[0]))
-        labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
-        trials = replace(trials, labels=labels)
+        unit, scale = known.labels.weight_unit, known.labels.weight_scale
+        trials = replace(trials, labels=replace(trials.labels, weight_unit=unit, weight_scale=scale))
     prior = known.kind.influence(trials.labels, machine)
     found, chance = update(prior, trials)
     if refined:
@@ -127,14 +105,21 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
         mounted = None if job.check_mounted else proposed(job, found, refuse=False)
         trials = together(trials, job.check, corrections=mounted)
         found, chance = update(prior, trials)
-    odd = f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count"
-    warnings = (odd,) * any(record.machine == machine for record, _ in known.kind.odd)
-    warnings += (_FEW,) * (len(known.kind.machines) < ENOUGH and not trials.weights.any())
-    earlier = int((known.jobs["machine"] == machine).sum()) if machine in known.kind.machines else 0
-    words = f"coefficients of the type {name!r}, {counted(len(known.kind.machines), 'machine')}"
-    words += f", and of {counted(earlier, 'earlier job')} of {machine!r}" if earlier else ""
-    found = replace(found, notes=(*found.notes, words, *known.notes), warnings=(*found.warnings, *warnings))
-    reason = _reason(known, trials) if chance < LEVEL else ""
+    kind, warnings = known.kind, list(found.warnings)
+    if any(record.machine == machine for record, _ in kind.odd):
+        warnings.append(f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count")
+    if len(kind.machines) < ENOUGH and not trials.weights.any():
+        warnings.append(_FEW)
+    words = f"coefficients of the type {name!r}, {counted(len(kind.machines), 'machine')}"
+    earlier = int(kind.effects.jobs[kind.machines.index(machine)]) if machine in kind.machines else 0
+    if earlier:
+        words += f", and of {counted(earlier, 'earlier job')} of {machine!r}"
+        if kind.effects.jobs.max() == 1:
+            warnings.append(
+                f"no machine of the type was balanced twice: the errors lack how {machine!r} changed"
+            )
+    found = replace(found, notes=(*found.notes, words, *known.notes), warnings=tuple(warnings))
+    reason = _reason(kind, trials) if chance < LEVEL else ""
     return TypeKnowledge(known, found, tuple(store.files("jobs", "coefficients")), earlier, chance, reason)
 
 
@@ -147,11 +132,9 @@ def _of_itself(store: FleetStore, job: Job, machine: str) -> list[str]:
     return jobs["job"][own | (jobs["machine"] == machine) & there].tolist()
 
 
-def _reason(known: KnownType, trials: Trials) -> str:
+def _reason(kind: MachineType, trials: Trials) -> str:
     """What would make a machine one of the type."""
-    kind = known.kind
-    if np.isfinite(kind.limit):
-        with suppress(UndeterminedError, ValueError):
-            measured = on_grid(estimate_influence(trials), kind.speeds, kind.sensors, kind.planes)
-            return why_odd(kind, record_of("", "", measured), trials)
+    with suppress(ValueError):
+        if np.isfinite(kind.limit):
+            return why_odd(kind, record_of("", "", kind.measured(trials)), trials)
     return ""

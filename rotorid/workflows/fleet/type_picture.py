@@ -13,39 +13,40 @@ from rotorid.base.rpm import rpm_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.workflows.fleet.type_records import KnownType
+    from balancing.coefficients.machine_type import MachineType
+    from rotorid.base.arrays import ComplexArray
 
 MOST = 4
 """Sensors and planes that are shown."""
 
 
-def type_picture(known: KnownType) -> Figure:
+def type_picture(kind: MachineType) -> Figure:
     """Coefficients of all machines over their mean, a field for each plane and sensor, with 95 % regions."""
-    kind = known.kind
-    W = kind.coefficients(kind.groups.mean) / kind.mean
-    odd = [(record.machine, record.W / kind.mean) for record, _ in kind.odd]
-    whole = (kind.effects.new_group + kind.effects.within) * kind.widening
-    n = np.arange(kind.mean.size)
-    pairs = whole.reshape(len(n), 2, len(n), 2)[n, :, n].reshape(*kind.mean.shape, 2, 2)
-    edges = region_edge(np.ones_like(kind.mean), pairs / (np.abs(kind.mean) ** 2)[..., None, None], None, 90)
+    mean, effects = kind.mean, kind.effects
+
+    def off(W: ComplexArray) -> ComplexArray:
+        """From the mean, % of it."""
+        return 100 * (W / mean - 1)
+
+    machines, odd = off(kind.coefficients(effects.groups)), [(r.machine, off(r.W)) for r, _ in kind.odd]
+    n = mean.size
+    pairs = np.einsum("ninj->nij", (effects.new_group + effects.within).reshape(n, 2, n, 2))
+    relative = pairs.reshape(*mean.shape, 2, 2) / (np.abs(mean) ** 2)[..., None, None]
+    edges = 100 * region_edge(np.zeros_like(mean), relative, len(kind.machines) - 1, 90)
     sensors, planes = kind.sensors[:MOST], kind.planes[:MOST]
     figure = new_figure(2.6 * len(planes) + 0.8)
     axes = figure.subplots(len(planes), len(sensors), sharex=True, sharey=True, squeeze=False)
     for (p, c), ax in np.ndenumerate(axes):
         plain(ax)
-        for s, speed in enumerate(kind.speeds):
-            style = look(s)
-            dots = 100 * (W[:, s, c, p] - 1)
-            ax.plot(dots.real, dots.imag, ".", color=style["color"], label=f"machines, {rpm_text(speed)}")
-            edge = 100 * (edges[s, c, p] - 1)
-            ax.plot(
-                edge.real, edge.imag, **style, linewidth=1.2, label=f"95 % of machines, {rpm_text(speed)}"
-            )
+        for s, speed in enumerate(map(rpm_text, kind.speeds)):
+            style, dots, edge = look(s), machines[:, s, c, p], edges[s, c, p]
+            ax.plot(dots.real, dots.imag, ".", color=style["color"], label=f"machines, {speed}")
+            ax.plot(edge.real, edge.imag, **style, linewidth=1.2, label=f"95 % of machines, {speed}")
             for name, other in odd:
-                far = 100 * (other[s, c, p] - 1)
-                ax.plot(far.real, far.imag, "x", color=style["color"], label="odd, left out")
+                at = float(other[s, c, p].real), float(other[s, c, p].imag)
+                ax.plot(*at, "x", color=style["color"], label="odd, left out")
                 if s == 0:
-                    note(ax, name, (far.real, far.imag), (4, 4))
+                    note(ax, name, at, (4, 4))
         ax.set_title(f"{planes[p]} on {sensors[c]}", fontsize="medium")
         ax.set_aspect("equal", adjustable="box")
     for ax in axes[-1]:

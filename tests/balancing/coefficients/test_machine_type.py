@@ -2,13 +2,14 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from balancing import ReadingErrors, Trials, UndeterminedError, estimate_influence
-from balancing.coefficients.machine_type import MachineRecord, fit_type, on_grid, record_of, why_odd
+from balancing.coefficients.machine_type import MachineRecord, fit_type, record_of, why_odd
 from balancing.data.conventions import Labels
 
 PATH = Path(__file__).parents[3] / "examples" / "coverage_fleet.py"
@@ -94,6 +95,12 @@ def test_lag_is_told_where_trial_weights_stood_at_other_angles():
     assert [record.machine for record, _ in kind.odd] == ["m4"]
     assert "lag for lead" in why_odd(kind, every[4], lag)
     assert "lag for lead" not in why_odd(kind, every[4])  # conj(W) is another thing
+    far = replace(
+        lag, weights=lag.weights * [0.5, 2.0]
+    )  # masses as they were, at other radii than the type's
+    assert "lag for lead" in why_odd(kind, every[4], far)
+    bare = replace(lag, runs=lag.runs[:1], readings=lag.readings[:, :1], weights=lag.weights[:1])
+    assert why_odd(kind, every[4], bare) == why_odd(kind, every[4])  # stored coefficients: no trial runs
 
 
 @pytest.mark.parametrize(("degrees", "words"), [(84, "lagged 84° more"), (-120, "led 120° more")])
@@ -139,11 +146,10 @@ def test_few_machines_are_refused_and_widen_what_is_said():
     every = records(runs)
     with pytest.raises(UndeterminedError, match=r"2 machines with these speeds.*3 or more"):
         fit_type(every[:2], *grid)
-    with pytest.raises(UndeterminedError, match="0 machines"):
-        fit_type([], *grid)
-    assert fit_type(every, *grid).widening == pytest.approx(2 * 4.7374 / 5.9915, rel=1e-3)  # F(2, 7)
-    with pytest.raises(ValueError, match="no coefficients of q; there are some of x and y"):
-        on_grid(estimate_influence(runs[0]), runs[0].speeds, ("x", "q"), ("L",))
+    kind = fit_type(every, *grid)
+    assert kind.widening == pytest.approx(2 * 4.7374 / 5.9915, rel=1e-3)  # F(2, 7)
+    with pytest.raises(ValueError, match="not in"):
+        replace(kind, sensors=("x", "q")).measured(runs[0])
 
 
 def test_a_record_has_its_own_variances():

@@ -176,8 +176,21 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
         np.trace(first.influence.covariance, axis1=2, axis2=3).sum()
         < 0.3 * np.trace(other.influence.covariance, axis1=2, axis2=3).sum()
     )
+    assert "balanced twice" not in " ".join(first.influence.warnings)
     W = machines[2].W * 1e-6 / 2 / 1e-3
     assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
+
+
+def test_that_nothing_tells_how_a_machine_changes_is_told(tmp_path):
+    rng = np.random.default_rng(32)
+    machines = [Machine(rng) for _ in range(6)]
+    for k, machine in enumerate(machines):
+        machine.job(tmp_path / "tree" / "fan" / f"F{k}")
+    fleet_add(tmp_path / "F", [tmp_path / "tree"])
+    new = machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1)
+    found = type_coefficients(read_job(new), f"{tmp_path / 'F'}:fan")
+    assert found.earlier == 1
+    assert "no machine of the type was balanced twice" in " ".join(found.influence.warnings)
 
 
 def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(fleet, tmp_path):
@@ -235,15 +248,33 @@ def test_limits_and_planes_of_a_job_without_weights_hold(fleet, tmp_path):
     assert abs(found.weights[0]) == pytest.approx(1e-3, rel=1e-4)
     single = machine.job(tmp_path / "single", runs=1, more="[planes.R]\n")
     assert balance(single, BalanceOptions(machine_type=address(fleet))).result.planes == ("R",)
+    tried = machine.job(
+        tmp_path / "tried", more="[planes.L]\nuse = false\n"
+    )  # a trial run had a weight there
+    assert balance(tried, BalanceOptions(machine_type=address(fleet))).result.planes == ("R",)
+
+
+def test_unbalances_at_other_radii_are_the_same(tmp_path):
+    rng = np.random.default_rng(31)
+    for k in range(8):
+        more = f"[planes.L]\nradius_mm = {100 + 50 * (k % 2)}\n"
+        job = Machine(rng, 0.02, 2.0).job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
+        weights = job.parent / "weights.csv"
+        weights.write_text(weights.read_text().replace("mass_g", "unbalance_g_mm"))
+    fleet_add(tmp_path / "F", [tmp_path / "tree"])
+    found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
+    assert found.known.labels.weight_unit == "g_mm"
+    assert found.to_frame()["between_percent"].max() < 5
 
 
 def test_masses_at_other_radii_are_converted(tmp_path):
+    """And those of jobs that do not say it are taken to be at the usual one, 100 mm."""
     rng = np.random.default_rng(31)
     for k in range(8):
-        machine, radius = Machine(rng, 0.02, 2.0), 150 if k % 2 else 100
+        machine, radius = Machine(rng, 0.02, 2.0), 150 if k in (0, 3) else 100
         machine.W, machine.D = machine.W * radius / 100, machine.D * 100 / radius
         more = f"[planes.L]\nradius_mm = {radius}\n[planes.R]\nradius_mm = {radius}\n"
-        machine.job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
+        machine.job(tmp_path / "tree" / "fan" / f"F{k}", more=more if k < 6 else "")
     fleet_add(tmp_path / "F", [tmp_path / "tree"])
     found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
     assert np.sqrt((found.to_frame()["between_percent"] ** 2).mean()) < 5
@@ -251,7 +282,9 @@ def test_masses_at_other_radii_are_converted(tmp_path):
     new.W = 2 * new.W
     more = "[planes.L]\nradius_mm = 200\n[planes.R]\nradius_mm = 200\n"
     job = read_job(new.job(tmp_path / "new", runs=1, more=more))
-    W = type_coefficients(job, f"{tmp_path / 'F'}:fan").influence.W[0] * 1e3  # µm pp per g
+    found = type_coefficients(job, f"{tmp_path / 'F'}:fan")
+    assert len(found.known.kind.machines) == 8
+    W = found.influence.W[0] * 1e3  # µm pp per g
     assert np.abs(W / (2 * Machine.MEAN * 0.5) - 1).max() < 0.1
 
 
@@ -274,6 +307,8 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
     refused("no job of fan has .* of all these speeds", UndeterminedError, other, machine_type=address(fleet))
     table.assign(sensor=["S1", "S9"]).to_csv(other.parent / "runs.csv", index=False)
     refused("it has no sensor S9, but S1 and S2", UndeterminedError, other, machine_type=address(fleet))
+    table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}).to_csv(other.parent / "runs.csv", index=False)
+    refused("no quantity velocity, but displacement", UndeterminedError, other, machine_type=address(fleet))
     refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
     job.write_text(job.read_text().replace("machine_type", "machine"))
     refused("or machine_type, whose coefficients come with balance --type", machine_type=address(fleet))

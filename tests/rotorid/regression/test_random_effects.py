@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.regression.random_effects import (
-    RandomEffects,
-    grouped,
-    oddness,
-    random_effects,
-    shrunk,
-)
+from rotorid.regression.random_effects import oddness, random_effects, shrunk
 
 RNG = np.random.default_rng(5)
 
@@ -31,7 +25,7 @@ def test_variances_are_those_of_the_analysis_of_variance():
     means = y.reshape(M, k, 2).mean(axis=1)
     inside = np.sum((y.reshape(M, k, 2) - means[:, None]) ** 2, axis=(0, 1)) / (M * (k - 1))
     outside = k * np.sum((means - means.mean(axis=0)) ** 2, axis=0) / (M - 1)
-    found = random_effects(grouped(y, error, group))
+    found = random_effects(y, error, group)
     assert found.mean == pytest.approx(means.mean(axis=0))
     assert np.diag(found.within) == pytest.approx(inside - 0.1**2, rel=1e-9)
     assert np.diag(found.between) == pytest.approx((outside - inside) / k, rel=1e-9)
@@ -39,16 +33,28 @@ def test_variances_are_those_of_the_analysis_of_variance():
 
 def test_one_job_a_group_has_no_scatter_within():
     y, error, _ = several(k=1)
-    groups = grouped(y, error, np.arange(len(y)))
-    assert not groups.within.any()
-    assert groups.covariance(3) == pytest.approx(0.1**2 * np.eye(2))
+    assert not random_effects(y, error, np.arange(len(y))).within.any()
+
+
+def test_pairs_of_jobs_shrink_the_covariance_within_as_that_of_their_differences():
+    rng = np.random.default_rng(8)
+    y = rng.standard_normal((12, 6)) @ (np.eye(6) + 0.5)
+    half = (y[::2] - y[1::2]) / np.sqrt(2)
+    keep = ~np.eye(6, dtype=bool)
+    z = half / np.sqrt(np.mean(half**2, axis=0))
+    R, w = z.T @ z / 6, z[:, :, None] * z[:, None, :]
+    share = np.sum(w.var(axis=0)[keep]) / 6 / np.sum(R[keep] ** 2)
+    found = random_effects(y, np.zeros((12, 3, 2, 2)), np.repeat(np.arange(6), 2)).within
+    std = np.sqrt(np.diag(found))
+    assert std**2 == pytest.approx(np.mean(half**2, axis=0))
+    assert (found / np.outer(std, std))[keep] == pytest.approx((1 - share) * R[keep])
 
 
 def test_many_groups_give_back_what_was_drawn():
     C = np.array([[4.0, 1.5, 0, 0], [1.5, 1.0, 0, 0], [0, 0, 2.0, -1.0], [0, 0, -1.0, 1.0]])
     y = np.random.default_rng(1).multivariate_normal(np.arange(4.0), C, 20000)
     error = np.zeros((len(y), 2, 2, 2))
-    found = random_effects(grouped(y, error, np.arange(len(y))))
+    found = random_effects(y, error, np.arange(len(y)))
     assert found.between == pytest.approx(C, abs=0.1)
     assert found.new_group == pytest.approx(found.between * (1 + 1 / 20000))
 
@@ -73,7 +79,7 @@ def test_shrinkage_is_that_of_schaefer_and_strimmer():
 
 def test_negative_variances_are_none():
     y, error, group = several(M=20, k=1, n=4, between=0.3, error=1.0)
-    found = random_effects(grouped(y, 2 * error / 0.1**2 * 0.3**2, group))
+    found = random_effects(y, 2 * error / 0.1**2 * 0.3**2, group)
     assert np.linalg.eigvalsh(found.between).min() > -1e-12
 
 
@@ -83,7 +89,7 @@ def test_errors_as_large_as_the_scatter_leave_no_more_than_the_scatter():
     scatter = np.diag(shrunk(x - x.mean(axis=0), 39))
     for left in (1e-2, 1e-4, 1e-8):
         error = np.diag([0.0, (1 - left) * scatter[1]])
-        found = random_effects(grouped(x, np.tile(error, (40, 1, 1, 1)), np.arange(40)))
+        found = random_effects(x, np.tile(error, (40, 1, 1, 1)), np.arange(40))
         assert np.all(np.diag(found.between) < 1.3 * scatter)
 
 
@@ -91,16 +97,22 @@ def test_the_mean_of_groups_alike_is_as_good_as_the_measurements():
     off = []
     for seed in range(400):
         y = np.random.default_rng(seed).standard_normal((4, 2))
-        found = random_effects(grouped(y, np.tile(np.eye(2), (4, 1, 1, 1)), np.arange(4)))
+        found = random_effects(y, np.tile(np.eye(2), (4, 1, 1, 1)), np.arange(4))
         off += (found.mean**2 / np.diag(found.new_group)).tolist()
     assert np.mean(np.array(off) > 4) < 0.05  # two deviations
 
 
-def test_a_known_group_is_shrunk_to_the_mean():
-    effects = RandomEffects(np.array([10.0, 0.0]), np.diag([4.0, 1.0]), *np.zeros((2, 2, 2)), 10**9)
-    mean, covariance = effects.given(np.array([16.0, 2.0]), np.diag([2.0, 0.0]))
-    assert mean == pytest.approx([10 + 6 * 4 / 6, 2.0], rel=1e-6)
-    assert covariance == pytest.approx(np.diag([4 * 2 / 6, 0.0]), abs=1e-6)
+def test_what_is_known_of_a_group_is_what_the_others_and_its_jobs_say():
+    """Each group counts once: the others alone, with the same covariances, then the group's own mean."""
+    y, error, group = several(M=5, k=2, between=0.5)
+    found = random_effects(y, error, group)
+    own = 0.1**2 / 2 * np.eye(2) + found.within / 2
+    rest = np.delete(found.groups, 3, axis=0).mean(axis=0)
+    prior = found.between + (found.between + own) / 4
+    G = prior @ np.linalg.inv(prior + own)
+    mean, covariance = found.known(3)
+    assert mean == pytest.approx(rest + G @ (found.groups[3] - rest))
+    assert covariance == pytest.approx(prior - G @ prior)
 
 
 def test_groups_that_do_not_belong_are_found_and_few_others():
