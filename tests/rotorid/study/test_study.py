@@ -18,7 +18,7 @@ from rotorid.tables.reader.problems import InputError
 from rotorid.tables.study_file import read_study
 from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.workflows.studies import drawn_machine
-from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED, UNSTABLE
+from rotorid.workflows.studies.drawn_machine import EDGES, UNDETERMINED, UNSTABLE
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
@@ -180,11 +180,11 @@ def test_ends_of_searches_are_told_apart_by_their_numbers():
     from rotorid.workflows.studies.calibration_starts import count_minima
 
     columns = {
-        "converged": np.array([True, True, True, False, True]),
-        "chi_square": np.array([5.0, 2.0, 2.0001, 1.0, 2.0]),
-        "k": np.array([1e7, 2e7, 2.0001e7, 0.0, 3e7]),
+        "converged": [True, True, True, False, True],
+        "chi_square": [5.0, 2.0, 2.0001, 1.0, 2.0],
+        "k": [1e7, 2e7, 2.0001e7, 0.0, 3e7],
     }
-    found = count_minima([columns, columns], ("k",))
+    found = count_minima([pd.DataFrame(columns)] * 2, ("k",))
     assert found["lost"] == 2
     assert found["found"].tolist() == [4, 2, 2]
     assert found["chi_square"].tolist() == [2.0, 2.0, 5.0]
