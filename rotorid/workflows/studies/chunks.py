@@ -56,6 +56,7 @@ class Chunk(NamedTuple):
 
 
 Done = tuple[Chunk, list[Row]]
+"""A chunk with its rows."""
 
 
 def chunks(task: Task, samples: int, folder: Path) -> Iterator[Chunk]:
@@ -108,8 +109,8 @@ def rows_in(file: Path) -> int:
 
     try:
         with file.open("rb") as there:
-            return int(pq.read_metadata(there).num_rows)
-    except (OSError, pa.ArrowInvalid):
+            return int(pq.read_table(there).num_rows)
+    except (OSError, pa.ArrowException):
         return 0
 
 
@@ -127,12 +128,13 @@ class _Workers:
 
     def __init__(self, task: Task, workers: int, given: Executor | None) -> None:
         self.task, self.workers, self.given = task, workers, given
-        self.pool = given or worker_pool(workers)
+        self.pool = worker_pool(workers) if given is None else given
 
     def finished(self, chunks: Iterator[Chunk]) -> Generator[Done, None, None]:
         """Chunks with their rows as they are done, a bounded number of them under way."""
         try:
-            yield from self._finished(chunks, AHEAD_ELSEWHERE if self.given else AHEAD * self.workers)
+            width = AHEAD * self.workers if self.given is None else AHEAD_ELSEWHERE
+            yield from self._finished(chunks, width)
         finally:
             if self.given is None:
                 self.pool.shutdown(cancel_futures=True)
