@@ -111,10 +111,8 @@ class MachineStudy:
         Standard deviation of x and y by node, kg·m.
     scatter
         Numbers of the rotor by path, and standard deviations of their logarithms.
-    errors, run_error
-        Of readings, None where they have none, and from run to run, relative.
-    corrections
-        At most.
+    errors, run_error, corrections
+        Of readings, None where they have none; from run to run, relative; at most so many.
     """
 
     rotor: Rotor

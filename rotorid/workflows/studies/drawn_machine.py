@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,26 +32,15 @@ EDGES = np.geomspace(1e-3, 1e3, 601)
 """Of the counted ratios, about 2.3 % wide; 1 is one of them."""
 
 
-@dataclass(frozen=True, eq=False)
-class DrawnMachines:
-    """A study, coefficients of the rotor as its file has it, what moves one reading by its limit, (P,)."""
-
-    study: MachineStudy
-    coefficients: ComplexArray
-    unit: FloatArray
-    warnings: tuple[str, ...]
-
-
-def ready(study: MachineStudy) -> DrawnMachines:
-    """A study with what all its samples need; refuses a rotor that is unstable at its speeds."""
+def nominal(study: MachineStudy) -> tuple[ComplexArray, tuple[str, ...]]:
+    """Coefficients (S, C, P + U) of the rotor as its file has it, and warnings; refuses an unstable one."""
     found = _influence(study, study.rotor)
     if found.windows:
         raise ValueError("the rotor itself is unstable at the speeds of the study: it has no steady response")
     W = found.W * study.gains[..., None]
-    largest = np.abs(W[..., : len(study.planes)]).max(axis=(0, 1))
-    if not largest.all():
+    if not W[..., : len(study.planes)].any(axis=(0, 1)).all():
         raise ValueError("no sensor sees one of the planes: there is no trial unbalance for it")
-    return DrawnMachines(study, W, 1 / largest, found.warnings)
+    return W, found.warnings
 
 
 def _influence(study: MachineStudy, rotor: Rotor) -> InfluenceCoefficients:
@@ -60,13 +49,15 @@ def _influence(study: MachineStudy, rotor: Rotor) -> InfluenceCoefficients:
     return influence(rotor, places, list(study.sensors.values()), study.speeds)
 
 
-def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str, Any]:
+def draw_machine(given: tuple[MachineStudy, ComplexArray], rng: np.random.Generator) -> dict[str, Any]:
     """Draw one, read it as built and after each correction; `runs_needed` counts all runs of the machine.
 
     The first runs are the bare rotor and a trial in each plane. Each check run joins them in the next fit, as
     in `balancing.refine`. As long as what is read does not meet the limit, there is a next correction.
     """
-    study, W = machines.study, machines.coefficients
+    study, W = given
+    P = len(study.planes)
+    unit = 1 / np.abs(W[..., :P]).max(axis=(0, 1))  # moves one reading by its limit
     normal = rng.standard_normal(len(study.scatter))
     u = [*study.unbalance.values()] * _normal(rng, len(study.unbalance))
     if study.scatter:
@@ -76,7 +67,6 @@ def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str,
         if drawn.windows:
             return {"why": UNSTABLE}
         W = drawn.W * study.gains[..., None]
-    P = len(study.planes)
     W, bare = W[..., :P], W[..., P:] @ u
     weights: list[ComplexArray] = []
     readings: list[ComplexArray] = []
@@ -92,7 +82,7 @@ def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str,
         return row | {"runs_needed": 1}
     if not study.corrections:
         return row
-    for trial in np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * machines.unit)):
+    for trial in np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * unit)):
         largest(trial)
     try:
         for k in range(1, study.corrections + 1):

@@ -106,12 +106,13 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
     from rotorid.workflows.studies.chunks import Task
 
     if read.machine is not None:
-        from rotorid.workflows.studies.drawn_machine import draw_machine, ready
+        from rotorid.workflows.studies.drawn_machine import draw_machine, nominal
 
         ratios = {f"ratio_{k}": "double" for k in range(read.machine.corrections + 1)}
         columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
-        machines = ready(read.machine)
-        return Task(draw_machine, machines, seed, columns, MACHINES), [*read.files], machines.warnings
+        coefficients, words = nominal(read.machine)
+        machine = read.machine, coefficients
+        return Task(draw_machine, machine, seed, columns, MACHINES), [*read.files], words
     from rotorid.workflows.calibration.calibrate import CalibrateOptions, prepared
     from rotorid.workflows.studies.calibration_starts import draw_start
 

@@ -108,13 +108,13 @@ def test_small_errors_within_the_model_are_covered(tmp_path):
 def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
     """A sample again, its runs given to `balancing.refine` one by one."""
     text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 0.02") + SCATTER
-    machines = drawn_machine.ready(read_study(write(tmp_path, text)).machine)
+    job = read_study(write(tmp_path, text)).machine
     seen = []
     real = drawn_machine.estimate_influence
     monkeypatch.setattr(
         drawn_machine, "estimate_influence", lambda trials: seen.append(trials) or real(trials)
     )
-    row = drawn_machine.draw_machine(machines, np.random.default_rng([1, 4]))
+    row = drawn_machine.draw_machine((job, drawn_machine.nominal(job)[0]), np.random.default_rng([1, 4]))
     assert row["ratio_3"] is not None
     first, last = seen[0], seen[-1]
 
