@@ -134,11 +134,11 @@ def real_columns(common: ComplexArray) -> FloatArray:
     return stretch(np.transpose(common, (1, 2, 0)))
 
 
-def region_radius(dof: float | None) -> float:
-    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
+def region_radius(dof: float | None, n: int = 2) -> float:
+    """Radius of the joint 95 % region of n numbers, in standard deviations (n = 2, stated errors: 2.448)."""
     from scipy.special import chdtri, fdtri
 
-    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+    return float(np.sqrt(chdtri(n, 0.05) if dof is None else n * fdtri(n, dof, 0.95)))
 
 
 def region_edge(values: ComplexArray, covariance: FloatArray, dof: float | None, points: int) -> ComplexArray:

@@ -16,7 +16,7 @@ from rotorid.tables.reader import units, value_kinds
 from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number
+from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, named, number, whole
 from rotorid.tables.rotor.bearing import NODE
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
@@ -25,9 +25,13 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
 
 MOST_SAMPLES, MOST_CORRECTIONS = 10**9, 20
+_KIND = value_kinds.choice(("balance", "calibrate"))
+_CORRECTIONS = whole("corrections", 0, MOST_CORRECTIONS)
 _PERCENT = number(0.0, 100.0)
-_SPEEDS = "speeds, such as speeds_rpm = [1500, 3000]"
+_SPEEDS = value_kinds.numbers("speeds, such as speeds_rpm = [1500, 3000]", "1500; 3000", above_zero=True)
 _SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale" = 20'
+_TRIAL = "trial unbalance; default: what moves a reading by half of the largest"
+_SIZE = "size, drawn by Rayleigh: x and y are normal, any angle is as likely"
 _NODE = Key("node", NODE, "the node, a number from 1, or a station", required="a node of the rotor")
 
 
@@ -41,12 +45,7 @@ def _texts(section: Section, key: str) -> tuple[str, ...] | None:
 
 PLANE = (
     _NODE,
-    Key(
-        "trial_g_mm",
-        ABOVE_ZERO,
-        "trial unbalance; default: what moves a reading by half of the largest",
-        units.UNBALANCE,
-    ),
+    Key("trial_g_mm", ABOVE_ZERO, _TRIAL, units.UNBALANCE),
 )
 SENSOR = (
     _NODE,
@@ -60,13 +59,7 @@ SENSOR = (
     ),
 )
 UNBALANCE = (
-    Key(
-        "rms_g_mm median_g_mm",
-        ABOVE_ZERO,
-        "size, drawn by Rayleigh: x and y are normal, any angle is as likely",
-        units.UNBALANCE,
-        required="how large the unbalance is",
-    ),
+    Key("rms_g_mm median_g_mm", ABOVE_ZERO, _SIZE, units.UNBALANCE, required="how large the unbalance is"),
 )
 READINGS = (
     Key("amplitude_percent", _PERCENT, "standard deviation of a reading's amplitude", default=0.0),
@@ -81,37 +74,23 @@ CALIBRATE = (
     Key("bounds", TEXT, "as `--bounds`", default=""),
     Key("exact", FLAG, "as `--exact`", default=False),
     Key("unbalance_at", TEXT, "as `--unbalance-at`"),
-    Key("bow", value_kinds.whole("shapes of a bow", 0, 20), "as `--bow`", default=0),
+    Key("bow", whole("shapes of a bow", 0, 20), "as `--bow`", default=0),
 )
 STUDY = (
-    Key(
-        "kind",
-        value_kinds.choice(("balance", "calibrate")),
-        "what a sample is",
-        required="balance or calibrate",
-    ),
+    Key("kind", _KIND, "what a sample is", required="balance or calibrate"),
     Key("rotor", TEXT, "rotor table or file, relative to this file", required="the rotor's file"),
-    Key("samples", value_kinds.whole("samples", 1, MOST_SAMPLES), "how many, default 1000", default=1000),
-    Key("seed", value_kinds.whole("the seed", 0, 2**31), "of all that is drawn, default 1", default=1),
-    Key(
-        "speeds_rpm",
-        value_kinds.numbers(_SPEEDS, "1500; 3000", above_zero=True),
-        "speeds at which limits hold and runs are made",
-        units.SPEED,
-    ),
-    Key(
-        "corrections",
-        value_kinds.whole("corrections", 0, MOST_CORRECTIONS),
-        "most corrections, default none",
-        default=0,
-    ),
-    Key("planes", value_kinds.named(PLANE), "correction planes", default={}),
-    Key("sensors", value_kinds.named(SENSOR), "sensors with their limits", default={}),
-    Key("unbalance", value_kinds.named(UNBALANCE), "drawn unbalance, by node or station", default={}),
+    Key("samples", whole("samples", 1, MOST_SAMPLES), "how many, default 1000", default=1000),
+    Key("seed", whole("the seed", 0, 2**31), "of all that is drawn, default 1", default=1),
+    Key("speeds_rpm", _SPEEDS, "speeds at which limits hold and runs are made", units.SPEED),
+    Key("corrections", _CORRECTIONS, "most corrections, default none", default=0),
+    Key("planes", named(PLANE), "correction planes", default={}),
+    Key("sensors", named(SENSOR), "sensors with their limits", default={}),
+    Key("unbalance", named(UNBALANCE), "drawn unbalance, by node or station", default={}),
     Key("scatter", value_kinds.by_name(_SCATTER, "disc.scale: 2"), f"log-normal, {_SCATTER}", default={}),
     Key("readings", value_kinds.table(READINGS), "errors of readings, which are stated, too"),
-    Key("calibrate", value_kinds.table(CALIBRATE), "the calibration whose starts are drawn"),
+    Key("calibrate", value_kinds.table(CALIBRATE), "the calibration whose starts are drawn", default={}),
 )
+_OF_MACHINES = ("speeds_rpm", "corrections", "planes", "sensors", "unbalance", "scatter", "readings")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,10 +111,8 @@ class MachineStudy:
         Standard deviation of x and y by node, kg·m.
     scatter
         Numbers of the rotor by path, and standard deviations of their logarithms.
-    errors, run_error
-        Of readings, None where they have none, and from run to run, relative.
-    corrections
-        At most.
+    errors, run_error, corrections
+        Of readings, None where they have none; from run to run, relative; at most so many.
     """
 
     rotor: Rotor
@@ -157,11 +134,10 @@ class StudyFile:
 
     samples: int
     seed: int
-    rotor: Rotor
     rotor_file: Path
     files: tuple[Path, ...]
     machine: MachineStudy | None
-    calibrate: Mapping[str, Any] | None
+    calibrate: Mapping[str, Any]
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -175,25 +151,25 @@ def read_study(path: str | Path) -> StudyFile:
     path, problems = Path(path), Problems()
     said = take(Section(str(path), problems.need(read_toml(path, problems)), problems), STUDY)
     problems.stop()
-    machine = said["kind"] == "balance"
-    for key in ("speeds_rpm", "sensors", "unbalance") if machine else ("calibrate",):
+    balance = said["kind"] == "balance"
+    for key in ("speeds_rpm", "sensors", "unbalance") if balance else ("calibrate",):
         if not said[key]:
             said.section.missing(key, f"what is needed where kind is {said['kind']}")
-    if said["corrections"] and not said["planes"]:
-        said.section.missing("planes", "the planes of the corrections; corrections = 0: as built only")
-    for key in ("calibrate",) if machine else ("planes", "sensors", "unbalance", "scatter", "readings"):
+    for key in ("calibrate",) if balance else _OF_MACHINES:
         if said[key]:
             said.section.complain(key, f"nothing, where kind is {said['kind']}", value=False)
+    if balance and said["corrections"] and not said["planes"]:
+        said.section.missing("planes", "the planes of the corrections; corrections = 0: as built only")
     file = path.parent / said["rotor"]
     try:
         rotor = read_rotor(file)
     except InputError as error:
         problems.extend(error.problems)
     problems.stop()
-    found = _machine(said, rotor) if machine else None
+    machine = _machine(said, rotor) if balance else None
     problems.stop()
     files = (path, *rotor_files(file))
-    return StudyFile(said["samples"], said["seed"], rotor, file, files, found, said["calibrate"])
+    return StudyFile(said["samples"], said["seed"], file, files, machine, said["calibrate"])
 
 
 def _machine(said: Said, rotor: Rotor) -> MachineStudy:
@@ -207,11 +183,14 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
             section.complain(key, f"a node or station of the rotor: {error}", value=False)
             return 0
 
+    if len({*speeds.tolist()}) < speeds.size:
+        top.complain(said["speeds_rpm"].key, "each speed once")
     planes = {name: node(plane.section, "node", plane["node"]) for name, plane in said["planes"].items()}
     sensors = {
         name: Sensor(node(sensor.section, "node", sensor["node"]), sensor["angle_deg"])
         for name, sensor in said["sensors"].items()
     }
+    trials = [plane["trial_g_mm"] for plane in said["planes"].values()]
     limits = [sensor["limit_um_pp"] for sensor in said["sensors"].values()]
     velocity = [limit.unit.kind == "velocity" for limit in limits]
     gains = np.where(velocity, 1j * speeds[:, None], 1.0) / np.array([limit.si for limit in limits])
@@ -239,9 +218,7 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
         speeds=speeds,
         planes=planes,
         sensors=sensors,
-        trials=np.array(
-            [plane["trial_g_mm"].si if plane["trial_g_mm"] else 0.0 for plane in said["planes"].values()]
-        ),
+        trials=np.array([trial.si if trial else 0.0 for trial in trials]),
         gains=gains,
         unbalance=unbalance,
         scatter=scatter,

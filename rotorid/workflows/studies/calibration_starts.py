@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,9 @@ import numpy as np
 from rotorid.calibration.calibrate import SPREAD, calibrate
 
 if TYPE_CHECKING:
-    from rotorid.base.arrays import AnyArray, FloatArray
+    import pandas as pd
+
+    from rotorid.base.arrays import FloatArray
     from rotorid.workflows.calibration.calibrate import Prepared
 
 SAME = 1e-3
@@ -30,24 +32,22 @@ def draw_start(given: Prepared, rng: np.random.Generator) -> dict[str, Any]:
     return {"converged": end.found.converged, "chi_square": end.chi_square, **numbers}
 
 
-def count_minima(parts: Iterable[Mapping[str, AnyArray]], names: tuple[str, ...]) -> dict[str, Any]:
+def count_minima(parts: Iterable[pd.DataFrame], names: tuple[str, ...]) -> dict[str, Any]:
     """Distinct ends of all starts, the lowest χ² first, as fields of `StudiedStarts`."""
     minima: list[tuple[float, FloatArray]] = []
     found: list[int] = []
     lost = 0
-    for columns in parts:
-        ends = np.column_stack([columns[name] for name in names])
-        for chi_square, end, converged in zip(columns["chi_square"], ends, columns["converged"], strict=True):
-            if not (converged and np.isfinite(chi_square)):
-                lost += 1
-                continue
+    for part in parts:
+        good = part[part["converged"] & np.isfinite(part["chi_square"])]
+        lost += len(part) - len(good)
+        for chi_square, end in zip(good["chi_square"], good[list(names)].to_numpy(), strict=True):
             for k, (known, place) in enumerate(minima):
                 near = abs(known - chi_square) <= SAME * known + 0.01
                 if near and np.allclose(end, place, rtol=SAME, atol=0.0):
                     found[k] += 1
                     break
             else:
-                minima.append((float(chi_square), end))
+                minima.append((chi_square, end))
                 found.append(1)
     order = sorted(range(len(minima)), key=lambda k: minima[k][0])
     return {

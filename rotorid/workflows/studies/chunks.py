@@ -7,12 +7,13 @@ sample raises is told with its number; any other failure of a future is the exec
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,12 +21,13 @@ from rotorid.base.logs import progress
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.base.worker_processes import single_threads, worker_pool
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 ATTEMPTS = 3
 AHEAD, AHEAD_ELSEWHERE = 4, 256
 """Chunks at an executor, for each worker or at a given one; so much and no more is in memory."""
 Row = dict[str, Any]
-Chunk = tuple[int, int]
-"""First sample, and the one after the last."""
 
 
 class SampleError(ValueError):
@@ -34,23 +36,33 @@ class SampleError(ValueError):
 
 @dataclass(frozen=True)
 class Task:
-    """What every worker gets: a function of data and a random generator, at the top of a module.
-
-    Attributes
-    ----------
-    sample, data, seed
-        `sample(data, default_rng([seed, k]))` is the row of sample k.
-    columns
-        Types of Arrow by the names of the row, without the sample's number.
-    chunk
-        Samples in a file.
-    """
+    """What every worker gets: `sample(data, default_rng([seed, k]))` is the row of sample k."""
 
     sample: Callable[[Any, np.random.Generator], Row]
     data: Any
     seed: int
     columns: Mapping[str, str]
+    """Types of Arrow by the names of the row, without the sample's number; a row may lack some."""
     chunk: int
+    """Samples in a file."""
+
+
+class Chunk(NamedTuple):
+    """First sample, the one after the last, and their file."""
+
+    first: int
+    last: int
+    file: Path
+
+
+Done = tuple[Chunk, list[Row]]
+"""A chunk with its rows."""
+
+
+def chunks(task: Task, samples: int, folder: Path) -> Iterator[Chunk]:
+    """All of a study."""
+    for number, first in enumerate(range(0, samples, task.chunk)):
+        yield Chunk(first, min(first + task.chunk, samples), folder / f"part-{number:06d}.parquet")
 
 
 def run_chunk(task: Task, first: int, last: int) -> list[Row]:
@@ -65,15 +77,7 @@ def run_chunk(task: Task, first: int, last: int) -> list[Row]:
 
 
 def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Executor | None) -> None:
-    """Write the parts that are missing in the folder.
-
-    Raises
-    ------
-    SampleError
-        Of the first sample that fails.
-    ValueError
-        For samples on which workers die again and again.
-    """
+    """Write the parts that are missing in the folder; refuse samples on which workers die again and again."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -82,27 +86,20 @@ def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Ex
 
     def missing() -> Iterator[Chunk]:
         nonlocal seen
-        for first in range(0, samples, task.chunk):
-            chunk = first, min(first + task.chunk, samples)
-            if rows_in(part(folder, task, chunk)) < chunk[1] - first:
+        for chunk in chunks(task, samples, folder):
+            if rows_in(chunk.file) < chunk.last - chunk.first:
                 yield chunk
             else:
-                seen += chunk[1] - first
+                seen += chunk.last - chunk.first
 
-    with single_threads(), closing(_Underway(task, missing(), workers, executor)) as work:
-        for chunk, rows in work.finished():
-            file = part(folder, task, chunk)
+    with single_threads(), closing(_Workers(task, workers, executor).finished(missing())) as finished:
+        for (*_, file), rows in finished:
             with file.with_suffix(".tmp").open("wb") as new:  # by name, a colon would make it an address
                 pq.write_table(pa.Table.from_pylist(rows, schema), new)
             file.with_suffix(".tmp").replace(file)
             done, seen = done + len(rows), seen + len(rows)
             left = (time.perf_counter() - begun) * (samples - seen) / done
             progress.info("%d of %d samples, about %.0f s left", seen, samples, left)
-
-
-def part(folder: Path, task: Task, chunk: Chunk) -> Path:
-    """The file of a chunk."""
-    return folder / f"part-{chunk[0] // task.chunk:06d}.parquet"
 
 
 def rows_in(file: Path) -> int:
@@ -112,85 +109,77 @@ def rows_in(file: Path) -> int:
 
     try:
         with file.open("rb") as there:
-            return int(pq.read_metadata(there).num_rows)
-    except (OSError, pa.ArrowInvalid):
+            return int(pq.read_table(there).num_rows)
+    except (OSError, pa.ArrowException):
         return 0
 
 
-@dataclass
-class _Underway:
-    """Chunks at an executor, a bounded number of them; those of workers that died are done again.
+def read_parts(task: Task, samples: int, folder: Path) -> Iterator[pd.DataFrame]:
+    """The rows of one part after the other."""
+    import pyarrow.parquet as pq
 
-    After a death the chunks that were under way run one by one, so that the guilty one is found.
-    """
+    for first, last, part in chunks(task, samples, folder):
+        with part.open("rb") as file:
+            yield pq.read_table(file).slice(0, last - first).to_pandas()
 
-    task: Task
-    chunks: Iterator[Chunk]
-    workers: int
-    given: Executor | None
 
-    def __post_init__(self) -> None:
-        self.pool = self.given or worker_pool(self.workers)
-        self.running: dict[Future[list[Row]], tuple[Chunk, int]] = {}
-        self.waiting: list[tuple[Chunk, int]] = []
+class _Workers:
+    """A given executor, or own processes, which are replaced where one has died."""
 
-    def finished(self) -> Iterator[tuple[Chunk, list[Row]]]:
-        """Chunks with their rows, as they are done."""
-        while self._submit():
-            lost = []
-            for future in wait(self.running, return_when=FIRST_COMPLETED).done:
-                chunk, tries = self.running.pop(future)
-                error = future.exception()
-                if error is None:
-                    yield chunk, future.result()
-                elif isinstance(error, SampleError):
-                    raise error
-                else:
-                    lost.append((chunk, tries + 1, error))
-            if any(isinstance(error, BrokenExecutor) for *_, error in lost) and self.given is None:
-                lost += [(chunk, tries + 1, lost[0][2]) for chunk, tries in self.running.values()]
-                self._renew()
-            for one in lost:
-                self._again(*one)
+    def __init__(self, task: Task, workers: int, given: Executor | None) -> None:
+        self.task, self.workers, self.given = task, workers, given
+        self.pool = worker_pool(workers) if given is None else given
 
-    def _submit(self) -> bool:
-        """Hand over as much as there may be; whether anything is under way."""
-        width = AHEAD * self.workers if self.given is None else AHEAD_ELSEWHERE
-        if self.waiting or any(tries for _, tries in self.running.values()):
-            width = 1
-        while len(self.running) < width:
-            if not self.waiting and (new := next(self.chunks, None)) is not None:
-                self.waiting.append((new, 0))
-            if not self.waiting:
-                break
-            try:
-                future = self.pool.submit(run_chunk, self.task, *self.waiting[0][0])
-            except BrokenExecutor as error:
-                if self.given is not None:
-                    raise ValueError(f"the executor takes no more work: {error}") from error
-                if self.running:  # their futures tell it
-                    break
-                self._renew()
-            else:
-                self.running[future] = self.waiting.pop(0)
-        return bool(self.running)
+    def finished(self, chunks: Iterator[Chunk]) -> Generator[Done, None, None]:
+        """Chunks with their rows as they are done, a bounded number of them under way."""
+        try:
+            width = AHEAD * self.workers if self.given is None else AHEAD_ELSEWHERE
+            yield from self._finished(chunks, width)
+        finally:
+            if self.given is None:
+                self.pool.shutdown(cancel_futures=True)
 
-    def _again(self, chunk: Chunk, tries: int, error: BaseException) -> None:
-        if tries >= ATTEMPTS:
-            raise ValueError(
-                f"a worker died {tries} times on the samples {chunk[0]} to {chunk[1] - 1}: "
-                f"{type(error).__name__}; the memory may be too small for so many workers"
-            )
-        self.waiting.append((chunk, tries))
+    def _finished(self, chunks: Iterator[Chunk], width: int, tries: int = 1) -> Iterator[Done]:
+        """A death ends all that is under way in a pool: each runs again alone; the guilty one is found."""
+        running: dict[Future[list[Row]], Chunk] = {}
+        try:
+            while True:
+                for chunk in islice(chunks, width - len(running)):
+                    running[self._submit(chunk)] = chunk
+                if not running:
+                    return
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    chunk = running.pop(future)
+                    rows = _rows(future, chunk, tries)
+                    if rows is None:
+                        yield from self._finished(iter([chunk]), 1, tries + 1)
+                    else:
+                        yield chunk, rows
+        finally:
+            for future in running:
+                future.cancel()
 
-    def _renew(self) -> None:
-        self.running.clear()
+    def _submit(self, chunk: Chunk) -> Future[list[Row]]:
+        try:
+            return self.pool.submit(run_chunk, self.task, chunk.first, chunk.last)
+        except BrokenExecutor as error:
+            if self.given is not None:
+                raise ValueError(f"the executor takes no more work: {error}") from error
         self.pool.shutdown()
         self.pool = worker_pool(self.workers)
+        return self._submit(chunk)
 
-    def close(self) -> None:
-        """Leave nothing at the executor."""
-        for future in self.running:
-            future.cancel()
-        if self.given is None:
-            self.pool.shutdown(cancel_futures=True)
+
+def _rows(future: Future[list[Row]], chunk: Chunk, tries: int) -> list[Row] | None:
+    """Rows of a chunk, None where its worker died; what a sample raised is raised."""
+    try:
+        return future.result()
+    except SampleError:
+        raise
+    except Exception as error:
+        if tries < ATTEMPTS:
+            return None
+        raise ValueError(
+            f"a worker died {tries} times on the samples {chunk.first} to {chunk.last - 1}: "
+            f"{type(error).__name__}; the memory may be too small for so many workers"
+        ) from error

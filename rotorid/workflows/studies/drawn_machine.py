@@ -1,53 +1,46 @@
-"""One sample of a study of machines: a drawn rotor, read, and balanced until its limit is met."""
+"""A study of machines: a drawn rotor, read, and balanced until its limit is met; counts of many."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import chdtri, fdtri
 
 from balancing import Correction, Trials, UndeterminedError, correct, estimate_influence
 from balancing.data.trials import RunScatter
+from balancing.solvers.error_propagation import region_radius
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import with_parameters
 from fem.response import InfluenceCoefficients, influence
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.plot_style import look, plain
 from rotorid.regression import stretch
 from rotorid.tables.study_file import MachineStudy
-from rotorid.workflows.studies.machine_counts import UNSTABLE
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 TRIAL = 0.5
 """By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
+UNSTABLE = "the drawn rotor is unstable, and has no steady response"
+UNDETERMINED = "the readings do not determine a correction"
+EDGES = np.geomspace(1e-3, 1e3, 601)
+"""Of the counted ratios, about 2.3 % wide; 1 is one of them."""
 
 
-@dataclass(frozen=True, eq=False)
-class DrawnMachines:
-    """A study, coefficients of the rotor as its file has it, what moves one reading by its limit, (P,)."""
-
-    study: MachineStudy
-    coefficients: ComplexArray
-    unit: FloatArray
-    warnings: tuple[str, ...]
-
-
-def ready(study: MachineStudy) -> DrawnMachines:
-    """A study with what all its samples need.
-
-    Raises
-    ------
-    ValueError
-        For a rotor that is unstable at these speeds.
-    """
+def nominal(study: MachineStudy) -> tuple[ComplexArray, tuple[str, ...]]:
+    """Coefficients (S, C, P + U) of the rotor as its file has it, and warnings; refuses an unstable one."""
     found = _influence(study, study.rotor)
     if found.windows:
         raise ValueError("the rotor itself is unstable at the speeds of the study: it has no steady response")
     W = found.W * study.gains[..., None]
-    largest = np.abs(W[..., : len(study.planes)]).max(axis=(0, 1))
-    if not largest.all():
+    if not W[..., : len(study.planes)].any(axis=(0, 1)).all():
         raise ValueError("no sensor sees one of the planes: there is no trial unbalance for it")
-    return DrawnMachines(study, W, 1 / largest, found.warnings)
+    return W, found.warnings
 
 
 def _influence(study: MachineStudy, rotor: Rotor) -> InfluenceCoefficients:
@@ -56,49 +49,53 @@ def _influence(study: MachineStudy, rotor: Rotor) -> InfluenceCoefficients:
     return influence(rotor, places, list(study.sensors.values()), study.speeds)
 
 
-def draw_machine(machines: DrawnMachines, rng: np.random.Generator) -> dict[str, Any]:
+def draw_machine(given: tuple[MachineStudy, ComplexArray], rng: np.random.Generator) -> dict[str, Any]:
     """Draw one, read it as built and after each correction; `runs_needed` counts all runs of the machine.
 
     The first runs are the bare rotor and a trial in each plane. Each check run joins them in the next fit, as
     in `balancing.refine`. As long as what is read does not meet the limit, there is a next correction.
     """
-    study, W = machines.study, machines.coefficients
+    study, W = given
+    P = len(study.planes)
+    unit = 1 / np.abs(W[..., :P]).max(axis=(0, 1))  # moves one reading by its limit
     normal = rng.standard_normal(len(study.scatter))
     u = [*study.unbalance.values()] * _normal(rng, len(study.unbalance))
-    row: dict[str, Any] = {"ratio_0": None, "runs_needed": None, "held": None, "warned": None, "why": None}
     if study.scatter:
         scattered = zip(study.scatter.items(), normal, strict=True)
         values = {path: value * float(np.exp(spread * x)) for (path, (value, spread)), x in scattered}
         drawn = _influence(study, with_parameters(study.rotor, values))
         if drawn.windows:
-            return row | {"why": UNSTABLE}
+            return {"why": UNSTABLE}
         W = drawn.W * study.gains[..., None]
-    P = len(study.planes)
     W, bare = W[..., :P], W[..., P:] @ u
-    readings, weights = [_read(study, bare, rng)], [np.zeros(P, complex)]
-    row["ratio_0"] = float(np.abs(readings[0]).max())
+    weights: list[ComplexArray] = []
+    readings: list[ComplexArray] = []
+
+    def largest(mounted: ComplexArray) -> float:
+        """Of the readings of a run with these weights."""
+        weights.append(mounted)
+        readings.append(_read(study, bare + W @ mounted, rng))
+        return float(np.abs(readings[-1]).max())
+
+    row: dict[str, Any] = {"ratio_0": largest(np.zeros(P, complex))}
     if row["ratio_0"] <= 1:
-        row["runs_needed"] = 1
-    if row["ratio_0"] <= 1 or not study.corrections:
+        return row | {"runs_needed": 1}
+    if not study.corrections:
         return row
-    weights += [*np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * machines.unit))]
-    readings += [_read(study, bare + W @ trial, rng) for trial in weights[1:]]
+    for trial in np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * unit)):
+        largest(trial)
     try:
         for k in range(1, study.corrections + 1):
             estimate = estimate_influence(_trials(study, readings, weights))
             correction = correct(estimate)
             if k == 1 and (study.errors or study.run_error):
-                true = correct(
-                    replace(estimate, W=W, baseline=bare)
-                ).weights  # by the same weighing of readings
-                row |= {"held": _holds(correction, true), "warned": bool(correction.warnings)}
-            weights.append(correction.weights)
-            readings.append(_read(study, bare + W @ correction.weights, rng))
-            row[f"ratio_{k}"] = float(np.abs(readings[-1]).max())
+                true = correct(replace(estimate, W=W, baseline=bare))  # by the same weighing of readings
+                row |= {"held": _holds(correction, true.weights), "warned": bool(correction.warnings)}
+            row[f"ratio_{k}"] = largest(correction.weights)
             if row[f"ratio_{k}"] <= 1:
                 return row | {"runs_needed": len(readings)}
     except UndeterminedError as error:
-        return row | {"why": str(error).partition("\n")[0]}
+        row["why"] = str(error).partition("\n")[0]
     return row
 
 
@@ -137,6 +134,35 @@ def _holds(found: Correction, D: ComplexArray) -> bool | None:
     """Whether the joint 95 % region of the weights holds D; None where there is none."""
     if found.covariance is None:
         return None
-    d, n = stretch(found.weights - D), 2 * len(D)
-    bound = chdtri(n, 0.05) if found.dof is None else n * fdtri(n, found.dof, 0.95)
-    return bool(d @ np.linalg.solve(found.covariance, d) < bound)
+    d = stretch(found.weights - D)
+    return bool(d @ np.linalg.solve(found.covariance, d) < region_radius(found.dof, d.size) ** 2)
+
+
+def count_machines(parts: Iterable[pd.DataFrame], planes: int, most: int) -> dict[str, Any]:
+    """Fields of `StudiedMachines` for so many planes and corrections; one part after the other is read."""
+    runs = np.array([1, *range(planes + 2, planes + 2 + most)])
+    met, held = np.zeros(most + 1, dtype=np.int64), np.zeros((2, 2), dtype=np.int64)
+    ratios, reasons = np.zeros((2, EDGES.size - 1), dtype=np.int64), Counter[str]()
+    for part in parts:
+        met += (part["runs_needed"].to_numpy()[:, None] <= runs).sum(axis=0)
+        for k, warned in enumerate((False, True)):
+            own = part["held"][part["warned"] == warned]
+            held[k] += (own == True).sum(), own.size  # noqa: E712 - None where there is no region
+        reasons.update(why if why == UNSTABLE else UNDETERMINED for why in part["why"].dropna())
+        read = part.filter(like="ratio_").ffill(axis=1).dropna().clip(EDGES[0], EDGES[-1]).to_numpy()
+        ratios += [np.histogram(read[:, k], EDGES)[0] for k in (0, -1)]
+    return {"met": met, "runs": runs, "held": held, "reasons": dict(reasons), "ratios": ratios}
+
+
+def draw_machines(ax: Axes, shares: FloatArray) -> None:
+    """Machines below a ratio to the limit, from shares between `EDGES`, as built and at last, (2, 600)."""
+    plain(ax)
+    curves = shares if (shares[0] != shares[1]).any() else shares[:1]
+    for k, (share, name) in enumerate(zip(curves, ("as built", "after the last correction"), strict=False)):
+        ax.stairs(100 * np.cumsum(share), EDGES, baseline=None, label=name, **look(k))
+    seen = EDGES[1:][curves.any(axis=0)]
+    ax.axvline(1.0, color="black", linewidth=0.8, label="limit")
+    ax.set(xscale="log", xlim=(min(0.9, *seen) / 1.2, max(1.1, *seen) * 1.2), ylim=(0, 101))
+    ax.set(xlabel="largest reading over its limit", ylabel="machines below, %")
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.legend(frameon=False)

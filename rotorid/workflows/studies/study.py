@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +16,6 @@ from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStart
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from rotorid.base.arrays import AnyArray
     from rotorid.tables.study_file import StudyFile
     from rotorid.workflows.studies.chunks import Task
 
@@ -75,7 +72,7 @@ def study(
     except ImportError as error:
         raise ValueError(f'a study needs {error.name}: pip install "rotorid[fleet]"') from error
     from rotorid.tables.study_file import read_study
-    from rotorid.workflows.studies.chunks import run_study
+    from rotorid.workflows.studies.chunks import read_parts, run_study
 
     options = options or StudyOptions()
     path = file_of(file, "a study")
@@ -86,19 +83,19 @@ def study(
         raise ValueError("--samples and --workers take a number from 1, --seed one from 0")
     task, files, words = _task(read, path.parent, seed)
     told = provenance(files, options)
-    with ExitStack() as stack:
-        folder = Path(options.results or stack.enter_context(tempfile.TemporaryDirectory()))
-        kept = {"schema_version": SCHEMA_VERSION, "version": told["version"], "seed": seed}
+    kept = {"schema_version": SCHEMA_VERSION, "version": told["version"], "seed": seed}
+    with tempfile.TemporaryDirectory() as own:
+        folder = Path(options.results or own)
         _claim(folder, {**kept, "inputs": [*map(hash_of, files)]})
         with phase("samples"):
             run_study(task, samples, folder, options.workers, executor)
-        parts = _parts(task, samples, folder)
+        parts = read_parts(task, samples, folder)
         common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words, "provenance": told}
         if read.machine is not None:
-            from rotorid.workflows.studies.machine_counts import count_machines
+            from rotorid.workflows.studies.drawn_machine import count_machines
 
-            found = count_machines(parts, len(read.machine.planes), read.machine.corrections)
-            return StudiedMachines(**common, **found)
+            planes, most = len(read.machine.planes), read.machine.corrections
+            return StudiedMachines(**common, **count_machines(parts, planes, most))
         from rotorid.workflows.studies.calibration_starts import count_minima
 
         return StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
@@ -109,56 +106,40 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
     from rotorid.workflows.studies.chunks import Task
 
     if read.machine is not None:
-        from rotorid.workflows.studies.drawn_machine import draw_machine, ready
+        from rotorid.workflows.studies.drawn_machine import draw_machine, nominal
 
         ratios = {f"ratio_{k}": "double" for k in range(read.machine.corrections + 1)}
         columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
-        machines = ready(read.machine)
-        return Task(draw_machine, machines, seed, columns, MACHINES), [*read.files], machines.warnings
+        coefficients, words = nominal(read.machine)
+        machine = read.machine, coefficients
+        return Task(draw_machine, machine, seed, columns, MACHINES), [*read.files], words
     from rotorid.workflows.calibration.calibrate import CalibrateOptions, prepared
     from rotorid.workflows.studies.calibration_starts import draw_start
 
-    assert read.calibrate is not None
     said = dict(read.calibrate)
     data = [folder / name for name in said.pop("data")]
     given = prepared(read.rotor_file, data, CalibrateOptions(**said))
-    columns = {"converged": "bool", "chi_square": "double"}
-    columns |= dict.fromkeys((number.label for number in given.numbers), "double")
+    labels = [number.label for number in given.numbers]
+    if taken := {"sample", "converged", "chi_square"}.intersection(labels):
+        raise ValueError(f"calibrate.estimate: {taken.pop()!r} is another column of the samples: rename it")
+    columns = {"converged": "bool", "chi_square": "double", **dict.fromkeys(labels, "double")}
     files = [*read.files, *given.data_files]
     return Task(draw_start, given, seed, columns, STARTS), files, tuple(given.assumed)
 
 
-def _claim(folder: Path, told: dict[str, Any]) -> None:
-    """Say in the folder which study it holds.
-
-    Raises
-    ------
-    ValueError
-        For a folder that holds another one, or something else.
-    """
+def _claim(folder: Path, study: dict[str, Any]) -> None:
+    """Say in the folder which study it holds; refuse one that holds another, or something else."""
     manifest, new = folder / MANIFEST, (folder / MANIFEST).with_suffix(".tmp")
+    told = json.dumps(study, indent=1).encode()
     folder.mkdir(parents=True, exist_ok=True)
     if manifest.exists():
-        if json.loads(manifest.read_text(encoding="utf-8")) != told:
+        if manifest.read_bytes() != told:
             raise ValueError(
                 f"{folder}: another study is kept here (its file, its rotor, the seed or the version of "
                 "rotorid differs): name another folder"
             )
-        return
-    if any(file != new for file in folder.iterdir()):
+    elif any(file != new for file in folder.iterdir()):
         raise ValueError(f"{folder}: no study is kept here, but other files: name another folder")
-    new.write_text(json.dumps(told, indent=1), encoding="utf-8")
-    new.replace(manifest)
-
-
-def _parts(task: Task, samples: int, folder: Path) -> Iterator[dict[str, AnyArray]]:
-    """Columns of one part after the other; NaN or None where there is nothing."""
-    import pyarrow.parquet as pq
-
-    from rotorid.workflows.studies.chunks import part
-
-    for first in range(0, samples, task.chunk):
-        last = min(first + task.chunk, samples)
-        with part(folder, task, (first, last)).open("rb") as file:
-            table = pq.read_table(file).slice(0, last - first)
-        yield {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+    else:
+        new.write_bytes(told)
+        new.replace(manifest)

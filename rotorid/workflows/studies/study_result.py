@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import COLUMNS, Answer
-from rotorid.base.result import Column, frame, numbered, rows, text
-from rotorid.base.text import counted, figures, listing
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import counted, figures
 from rotorid.workflows.result_provenance import Outcome
 
 if TYPE_CHECKING:
@@ -70,11 +70,9 @@ class StudiedMachines(Outcome):
     @property
     def answer(self) -> Answer:
         """The probabilities, and whether the regions of the weights are honest."""
-        shares = [f"{100 * met / self.samples:.4g} % as built" for met in self.met[:1]]
-        if len(self.met) > 1:
-            last = counted(len(self.met) - 1, "correction")
-            shares.append(f"{100 * self.met[-1] / self.samples:.4g} % after at most {last}")
-        drawn = counted(self.samples, "drawn machine")
+        first, last = (f"{100 * self.met[k] / self.samples:.4g} %" for k in (0, -1))
+        most = counted(len(self.met) - 1, "correction")
+        after = f" and {last} after at most {most}" if len(self.met) > 1 else ""
         notes = [f"{n} of {self.samples} were not balanced: {why}" for why, n in self.reasons.items()]
         for (good, n), said in zip(self.held.tolist(), ("no warning", "a warning"), strict=True):
             if n:
@@ -83,7 +81,8 @@ class StudiedMachines(Outcome):
                     f"first corrections with {said}: {good} of {n} of the 95 % regions hold the true one "
                     f"({low} to {high} %)"
                 )
-        head = f"The limit is met by {listing(shares, 'and')}, of {drawn}."
+        drawn = counted(self.samples, "drawn machine")
+        head = f"The limit is met by {first} as built{after}, of {drawn}."
         return Answer(head, text(self._columns()), self.warnings, tuple(notes))
 
     def to_dict(self) -> dict[str, Any]:
@@ -110,7 +109,7 @@ class StudiedMachines(Outcome):
     def figure(self) -> Figure:
         """Which share of the machines lies below a ratio to the limit, as built and at last."""
         from rotorid.base.plot_style import on_figure
-        from rotorid.workflows.studies.study_pictures import draw_machines
+        from rotorid.workflows.studies.drawn_machine import draw_machines
 
         return on_figure(lambda ax: draw_machines(ax, self.ratios / self.samples))
 
@@ -130,18 +129,17 @@ class StudiedStarts(Outcome):
     warnings: tuple[str, ...]
     lost: int
     chi_square: FloatArray
-    found: FloatArray
+    found: IntArray
     names: tuple[str, ...]
     ends: FloatArray
 
     def _columns(self) -> tuple[Column, ...]:
-        ends = numbered("{}", self.ends)
         return (
             Column("minimum", range(1, len(self.found) + 1), str),
-            Column("starts", self.found, "{:.0f}".format),
+            Column("starts", self.found, str),
             Column("share", self.found / self.samples, "{:.3f}".format),
             Column("chi_square", self.chi_square, figures, "χ²"),
-            *(Column(n, one.values, figures) for n, one in zip(self.names, ends, strict=True)),
+            *(Column(name, ends, figures) for name, ends in zip(self.names, self.ends.T, strict=True)),
         )
 
     @property
@@ -149,10 +147,10 @@ class StudiedStarts(Outcome):
         """Whether more than one search found the best."""
         if not self.found.size:
             return Answer(f"None of {counted(self.samples, 'start')} converged.")
-        times = counted(int(self.found[0]), "start")
         alone = self.found[0] == 1
         words = ("a single start found the best minimum: there may be a better one",) if alone else ()
-        head = f"{times} of {self.samples} end at the best of {counted(len(self.found), 'minimum', 'minima')}"
+        times = f"{counted(int(self.found[0]), 'start')} of {self.samples} {'ends' if alone else 'end'}"
+        head = f"{times} at the best of {counted(len(self.found), 'minimum', 'minima')}"
         notes = (f"{counted(self.lost, 'start')} did not converge",) if self.lost else ()
         return Answer(f"{head}.", text(self._columns(), width=COLUMNS), words, (*notes, *self.warnings))
 

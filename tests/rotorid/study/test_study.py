@@ -18,7 +18,7 @@ from rotorid.tables.reader.problems import InputError
 from rotorid.tables.study_file import read_study
 from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.workflows.studies import drawn_machine
-from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED, UNSTABLE
+from rotorid.workflows.studies.drawn_machine import EDGES, UNDETERMINED, UNSTABLE
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
@@ -108,13 +108,13 @@ def test_small_errors_within_the_model_are_covered(tmp_path):
 def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
     """A sample again, its runs given to `balancing.refine` one by one."""
     text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 0.02") + SCATTER
-    machines = drawn_machine.ready(read_study(write(tmp_path, text)).machine)
+    job = read_study(write(tmp_path, text)).machine
     seen = []
     real = drawn_machine.estimate_influence
     monkeypatch.setattr(
         drawn_machine, "estimate_influence", lambda trials: seen.append(trials) or real(trials)
     )
-    row = drawn_machine.draw_machine(machines, np.random.default_rng([1, 4]))
+    row = drawn_machine.draw_machine((job, drawn_machine.nominal(job)[0]), np.random.default_rng([1, 4]))
     assert row["ratio_3"] is not None
     first, last = seen[0], seen[-1]
 
@@ -180,11 +180,11 @@ def test_ends_of_searches_are_told_apart_by_their_numbers():
     from rotorid.workflows.studies.calibration_starts import count_minima
 
     columns = {
-        "converged": np.array([True, True, True, False, True]),
-        "chi_square": np.array([5.0, 2.0, 2.0001, 1.0, 2.0]),
-        "k": np.array([1e7, 2e7, 2.0001e7, 0.0, 3e7]),
+        "converged": [True, True, True, False, True],
+        "chi_square": [5.0, 2.0, 2.0001, 1.0, 2.0],
+        "k": [1e7, 2e7, 2.0001e7, 0.0, 3e7],
     }
-    found = count_minima([columns, columns], ("k",))
+    found = count_minima([pd.DataFrame(columns)] * 2, ("k",))
     assert found["lost"] == 2
     assert found["found"].tolist() == [4, 2, 2]
     assert found["chi_square"].tolist() == [2.0, 2.0, 5.0]
@@ -197,6 +197,7 @@ def test_ends_of_searches_are_told_apart_by_their_numbers():
         ('kind = "balance"', 'kind = "balanse"', "'balance' or 'calibrate'"),
         ('kind = "balance"\n', "", "key kind"),
         ("speeds_rpm = [3000]\n", "", "key speeds_rpm"),
+        ("[3000]", "[3000, 2000, 3000.0]", "expected each speed once"),
         ("node = 3\nlimit", "node = 9\nlimit", "key sensors.probe.node"),
         ("limit_um_pp = 20\n", "", "the limit of the sensor"),
         ("[unbalance.3]", "[unbalance.middle]", "key unbalance"),
@@ -224,7 +225,33 @@ def test_what_is_wrong_with_a_file_is_told_with_its_key(tmp_path, old, new, word
     with pytest.raises(InputError) as told:
         read_study(write(tmp_path, STUDY.replace(old, new)))
     assert words in str(told.value)
-    assert len(told.value.problems) <= 4
+    assert len(told.value.problems) <= 5
+
+
+def starts(folder, *changes):
+    """The file of the sample study of starts with something else in it."""
+    text = (SAMPLE / "starts.toml").read_text().replace('"../', f'"{SAMPLE.parent.as_posix()}/')
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "starts.toml").write_text(text)
+    return folder / "starts.toml"
+
+
+def test_what_means_nothing_for_starts_is_told(tmp_path):
+    with pytest.raises(InputError) as told:
+        read_study(starts(tmp_path, ("samples", "corrections = 2\nspeeds_rpm = [3000]\nsamples")))
+    assert [problem.column for problem in told.value.problems] == ["speeds_rpm", "corrections"]
+
+
+@pytest.mark.parametrize("name", ["sample", "chi_square", "converged"])
+def test_a_number_that_is_called_as_another_column_is_refused(tmp_path, name):
+    file = starts(tmp_path, ("bearing[*].stiffness", f"{name} = bearing.stiffness"))
+    with pytest.raises(ValueError, match=f"{name!r} is another column"):
+        run(file, samples=1)
+    found = run(starts(tmp_path, ("bearing[*].stiffness", "k = bearing.stiffness")), samples=2)
+    assert found.names == ("k",)
+    assert found.summary().startswith("2 starts of 2 end at")
 
 
 def test_the_command(cli, tmp_path, monkeypatch):

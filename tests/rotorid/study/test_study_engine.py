@@ -95,23 +95,26 @@ def test_samples_that_kill_every_worker_are_named(tmp_path):
 
 
 class Losing(Executor):
-    """Runs what it is given at once; of some submissions the worker is lost."""
+    """Runs what it is given at once; of some submissions the worker is lost, or they are cancelled."""
 
-    def __init__(self, lost):
-        self.lost, self.submitted = lost, []
+    def __init__(self, lost, cancelled=()):
+        self.lost, self.cancelled, self.submitted = lost, cancelled, []
 
     def submit(self, function, *args):
         future = Future()
         self.submitted.append(args[1])
         if len(self.submitted) in self.lost:
             future.set_exception(ConnectionError("worker lost"))
+        elif len(self.submitted) in self.cancelled:
+            future.cancel()
+            future.set_running_or_notify_cancel()
         else:
             future.set_result(function(*args))
         return future
 
 
 def test_a_given_executor_that_loses_workers_gets_their_samples_again(tmp_path):
-    pool = Losing({1, 4, 7})
+    pool = Losing({1, 7}, cancelled={4})
     run_study(task(), 12, tmp_path, 1, pool)
     assert numbers(tmp_path) == NUMBERS
     assert sorted(pool.submitted) == sorted([*range(0, 12, 2), *(pool.submitted[k - 1] for k in (1, 4, 7))])
@@ -138,7 +141,10 @@ def test_more_samples_continue_a_study_and_a_damaged_part_is_made_anew(tmp_path,
     assert fewer.to_dict() == study(file, StudyOptions(samples=50), executor=threads).to_dict()
     part = tmp_path / "grown" / "part-000001.parquet"
     part.write_bytes(part.read_bytes()[:-100])
-    assert rows_in(part) == 0
+    other = part.with_name("part-000002.parquet")
+    whole = other.read_bytes()
+    other.write_bytes(whole[:30] + bytes(byte ^ 0x5A for byte in whole[30:300]) + whole[300:])
+    assert rows_in(part) == rows_in(other) == 0
     study(file, StudyOptions(samples=90, results=tmp_path / "grown"), executor=threads)
     assert kept(tmp_path / "grown") == kept(tmp_path / "at once")
 
@@ -153,6 +159,9 @@ def test_a_folder_of_another_study_is_refused_as_it_is(tmp_path, threads):
     with pytest.raises(ValueError, match="another study is kept here"):
         study(file, StudyOptions(results=tmp_path / "kept"), executor=threads)
     assert kept(tmp_path / "kept") == before
+    (tmp_path / "kept" / "_study.json").write_text("of another program")
+    with pytest.raises(ValueError, match="another study is kept here"):
+        study(file, StudyOptions(results=tmp_path / "kept"), executor=threads)
     with pytest.raises(ValueError, match="no study is kept here, but other files"):
         study(file, StudyOptions(results=tmp_path), executor=threads)
 
