@@ -95,7 +95,7 @@ def run_study(task: Task, samples: int, folder: Path, workers: int, executor: Ex
     with single_threads(), closing(_Workers(task, workers, executor).finished(missing())) as finished:
         for (*_, file), rows in finished:
             with file.with_suffix(".tmp").open("wb") as new:  # by name, a colon would make it an address
-                pq.write_table(pa.Table.from_pylist(rows, schema), new)
+                pq.write_table(pa.Table.from_pylist(rows, schema), new, write_page_checksum=True)
             file.with_suffix(".tmp").replace(file)
             done, seen = done + len(rows), seen + len(rows)
             left = (time.perf_counter() - begun) * (samples - seen) / done
@@ -109,7 +109,7 @@ def rows_in(file: Path) -> int:
 
     try:
         with file.open("rb") as there:
-            return int(pq.read_table(there).num_rows)
+            return int(pq.read_table(there, page_checksum_verification=True).num_rows)
     except (OSError, pa.ArrowException):
         return 0
 
