@@ -203,12 +203,15 @@ def _machine(said: Said, rotor: Rotor) -> MachineStudy:
     taken: set[object] = set()
     for pattern, share in said["scatter"].items():
         try:
-            for path in expand(rotor, pattern):
+            paths = expand(rotor, pattern)
+            for path in paths:
                 own = numbers_of(rotor, path)
                 if not own or own & taken:
                     raise ValueError(f"{pattern}: each number of the rotor once")
                 scatter[path] = parameter_value(rotor, path), float(np.sqrt(np.log1p((share / 100) ** 2)))
                 taken |= own
+            if not any(scatter[path][0] for path in paths):
+                raise ValueError(f"{pattern} is 0, and so is any share of it")
         except ValueError as error:
             top.complain("scatter", f"numbers of the rotor: {error}", value=False)
     errors = said["readings"] or {key.name: 0.0 for key in READINGS}
