@@ -12,19 +12,17 @@ from rotorid.base.answer import Answer
 from rotorid.base.logs import progress
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
-from rotorid.workflows.fleet.job_batches import apart, read_jobs, reason_of
+from rotorid.workflows.fleet.job_batches import apart, read_jobs
 from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from rotorid.tables.fleet.fleet_store import FleetStore
-    from rotorid.tables.fleet.fleet_tables import JobRows
-    from rotorid.tables.fleet.job_search import FoundJob
+    from rotorid.tables.fleet.fleet_tables import Columns, JobRows
 
 BATCH = 200_000
 """Readings that are written together."""
-Damaged = dict[Path, str]
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ class FleetAdded(Outcome):
     vectors: int
     known: int
     untyped: int
-    damaged: Damaged
+    damaged: dict[Path, str]
 
     def _columns(self) -> tuple[Column, ...]:
         files = [str(file) for file in self.damaged]
@@ -111,91 +109,44 @@ def fleet_add(
         Where nothing can be read, and for a folder that is something else.
     """
     from rotorid.tables.fleet.fleet_store import FleetStore
+    from rotorid.tables.fleet.job_search import find_jobs
 
     options = options or FleetAddOptions()
     store = FleetStore(Path(fleet))
     store.check(new=True)
-    found, damaged = _found([Path(tree) for tree in trees], options.machine_type or "")
+    found, damaged = apart(find_jobs, [Path(tree) for tree in trees], options.machine_type or "")
     seen = store.known()
-    new = [job for job in found if not seen or not _is_known(job, seen)]
+    new = [job for job in found if not seen or apart(job.quick_id) not in seen]
     batch: list[JobRows] = []
-    jobs = vectors = waiting = untyped = 0
-    unread: Damaged = {}
+    added: list[Columns] = []
+    waiting = 0
     begun = time.monotonic()
-    for count, read in enumerate(read_jobs(new, options.workers), 1):
-        if read.rows is None:
-            unread[read.found.file] = read.reason
-        elif (own := read.rows["jobs"][0])["job"][0] not in seen:
+    for count, (job, read) in enumerate(zip(new, read_jobs(new, options.workers), strict=True), 1):
+        if isinstance(read, str):
+            damaged[job.file] = read
+        elif (own := read["jobs"][0])["job"][0] not in seen:
             seen.add(own["job"][0])
-            batch.append(read.rows)
+            batch.append(read)
             waiting += own["vectors"][0]
-            untyped += not own["machine_type"][0]
         left = (time.monotonic() - begun) / count * (len(new) - count)
         progress.info("%d of %d, %.0f s left", count, len(new), left)
         if batch and (waiting >= BATCH or count == len(new)):
-            jobs += store.append(batch)
-            batch, vectors, waiting = [], vectors + waiting, 0
-    known = len(found) - len(unread) - jobs
-    if not jobs + known:
-        raise ValueError(_nothing(trees, damaged | unread))
+            added += store.append(batch)
+            batch, waiting = [], 0
+    known = len(found) - sum(job.file in damaged for job in found) - len(added)
+    if not added and not known:
+        what = ", ".join(map(str, trees))
+        raise ValueError(
+            "nothing could be read:\n" + "\n".join(damaged.values())
+            if damaged
+            else f"{what}: there is no balancing job in it (.toml with runs, or .xlsx with a sheet runs)"
+        )
     return FleetAdded(
         store=store,
-        jobs=jobs,
-        vectors=vectors,
+        jobs=len(added),
+        vectors=sum(own["vectors"][0] for own in added),
         known=known,
-        untyped=untyped,
-        damaged=damaged | unread,
+        untyped=sum(not own["machine_type"][0] for own in added),
+        damaged=damaged,
         provenance=provenance((), options, fleet=str(fleet), trees=[str(tree) for tree in trees]),
     )
-
-
-def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Damaged]:
-    """Jobs of trees, and files of which nobody can say what they are; workbooks that jobs name are none."""
-    from rotorid.tables.fleet.job_search import found_job, job_files
-    from rotorid.tables.reader.excel_workbook import is_workbook
-
-    found: dict[Path, FoundJob] = {}
-    damaged: Damaged = {}
-    closed: list[OSError] = []
-    for tree in trees:
-        for file in job_files(tree, closed.append):
-            try:
-                job = apart(found_job, file, tree, machine_type)
-            except (OSError, ValueError) as error:
-                damaged[file] = reason_of(error)
-                continue
-            if job is not None:
-                found.setdefault(file.resolve(), job)
-    places: dict[tuple[str, str], FoundJob] = {}
-    for file, job in list(found.items()):
-        other = places.setdefault((job.machine, job.path), job)
-        if other is not job and not _same(job, other):
-            damaged[found.pop(file).file] = (
-                f"{other.file} is another job at the same place below its tree, of the same machine: "
-                "add the folder above both, or say `machine` in them"
-            )
-    damaged |= {Path(error.filename): reason_of(error) for error in closed}
-    tables = (table for job in found.values() for table in job.tables.values())
-    named = {table.resolve() for table in tables if is_workbook(table)}
-    return [job for file, job in found.items() if file not in named], damaged
-
-
-def _is_known(job: FoundJob, seen: set[str]) -> bool:
-    try:
-        return apart(job.quick_id) in seen
-    except (OSError, ValueError):  # reading says it better
-        return False
-
-
-def _same(job: FoundJob, other: FoundJob) -> bool:
-    try:
-        return bool(apart(job.quick_id) == apart(other.quick_id))
-    except (OSError, ValueError):  # reading says it better
-        return True
-
-
-def _nothing(trees: Sequence[Path | str], damaged: Damaged) -> str:
-    if damaged:
-        return "nothing could be read:\n" + "\n".join(damaged.values())
-    what = ", ".join(map(str, trees))
-    return f"{what}: there is no balancing job in it (.toml with runs, or .xlsx with a sheet runs)"

@@ -4,52 +4,28 @@ from __future__ import annotations
 
 import contextvars
 import warnings
-from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from rotorid.base.worker_processes import single_threads, worker_pool
 
 if TYPE_CHECKING:
-    from balancing import Influence
-    from rotorid.base.arrays import ComplexArray
     from rotorid.tables import Job
     from rotorid.tables.fleet.fleet_tables import JobRows
     from rotorid.tables.fleet.job_search import FoundJob
 
-CHUNK = 16
-"""Jobs that a process reads before it gives them back."""
-_SHOWN = 3
-"""Lines of a reason."""
+CHUNK, UNDER_WAY = 8, 512
+"""Jobs that a process reads before it gives them back, and that all are given at once."""
 
 
-class ReadJob(NamedTuple):
-    """A job, and its rows by table, or why there are none."""
-
-    found: FoundJob
-    rows: JobRows | None
-    reason: str = ""
-
-
-def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[ReadJob]:
-    """Jobs in their order; what was read of them is not kept."""
-    chunks = [found[i : i + CHUNK] for i in range(0, len(found), CHUNK)]
+def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[JobRows | str]:
+    """Of each job its rows by table, or why there are none; what was read of it is not kept."""
     if workers == 1:
-        yield from (read for chunk in chunks for read in _read_chunk(chunk))
+        yield from (apart(_read, job) for job in found)
         return
     with single_threads(), worker_pool(workers) as pool:
-        under_way: deque[Future[list[ReadJob]]] = deque()
-        for chunk in chunks:
-            under_way.append(pool.submit(_read_chunk, chunk))
-            if len(under_way) > 3 * workers:
-                yield from under_way.popleft().result()
-        while under_way:
-            yield from under_way.popleft().result()
-
-
-def _read_chunk(chunk: Sequence[FoundJob]) -> list[ReadJob]:
-    return [apart(_read, found) for found in chunk]
+        for k in range(0, len(found), UNDER_WAY):
+            yield from pool.map(_read, found[k : k + UNDER_WAY], chunksize=CHUNK)
 
 
 def apart(function: Any, *given: Any) -> Any:  # noqa: ANN401 - any function
@@ -57,71 +33,65 @@ def apart(function: Any, *given: Any) -> Any:  # noqa: ANN401 - any function
     return contextvars.Context().run(function, *given)
 
 
-def reason_of(error: Exception) -> str:
-    """The first lines of what is wrong with a file."""
-    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    lines = text.splitlines() or [type(error).__name__]
-    more = f"\nand {len(lines) - _SHOWN} more lines" if len(lines) > _SHOWN else ""
-    return "\n".join(lines[:_SHOWN]) + more
-
-
-def _read(found: FoundJob) -> ReadJob:
+def _read(found: FoundJob) -> JobRows | str:
     from rotorid.tables import read_job
+    from rotorid.tables.fleet.job_search import reason_of
     from rotorid.tables.reader.input_file import each_file_once
 
     try:
         with each_file_once(), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            rows = _rows(found, read_job(found.file), caught)
+            return _rows(found, read_job(found.file), caught)
     except (ValueError, OSError, ArithmeticError, MemoryError) as error:
-        return ReadJob(found, None, reason_of(error))
-    return ReadJob(found, rows)
+        return reason_of(error)
 
 
 def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> JobRows:
     """Rows of a job with its coefficients, and what `correct` proposes where that was mounted."""
     from balancing import estimate_influence
-    from rotorid.tables.fleet.job_records import job_id, job_rows
+    from balancing.coefficients.baseline import starting_point
+    from rotorid.tables.fleet.job_records import job_rows, kind_of
+    from rotorid.tables.fleet.job_search import job_id
     from rotorid.tables.reader.input_file import sha256
+    from rotorid.workflows.coefficients import proposed
 
-    influence, undetermined = job.influence, ""
+    influence, trials, check, labels = job.influence, job.trials, job.check, job.trials.labels
+    before = mounted = None
+    undetermined = refused = ""
     try:
-        influence = influence or estimate_influence(job.trials)
+        influence = influence or estimate_influence(trials)
     except ValueError as error:
         undetermined = str(error)
-    before, proposed, refused = (None, None, "") if influence is None else _checked(job, influence)
-    said = [*(job.trials if influence is None else influence).warnings, *(str(one.message) for one in caught)]
-    said += [job.trials.labels.assumed_in_words(), refused]
+    if influence is not None and check is not None:
+        before, runs = influence.baseline, None if job.influence is None else trials
+        try:
+            before = starting_point(influence, runs).readings
+            if not job.check_mounted:
+                correction = proposed(job, influence, runs)
+                mounted = correction.planes, correction.weights
+        except ValueError as error:
+            refused = f"no corrections are proposed: {error}"
+    told = [str(one.message).encode(errors="replace").decode() for one in caught]  # of any names of files
+    said = [*(trials if influence is None else influence).warnings, *told]
+    said += [labels.assumed_in_words(), refused]
     files = [sha256(file) for file in job.files]
+    quantity, weight_kind = kind_of(labels)
     own = {
         "job": job_id(files),
         "path": found.path,
-        "machine": found.machine,
-        "machine_type": found.machine_type,
-        "date": found.date,
+        "machine": job.machine or found.machine,
+        "machine_type": job.machine_type or found.machine_type,
+        "date": job.date or found.date,
+        "quantity": quantity,
+        "weight_kind": weight_kind,
+        "vibration_unit": labels.vibration_unit,
+        "weight_unit": labels.weight_unit,
         "files": files,
-        "runs_file": sha256(found.runs_file),
+        "runs_file": sha256(found.tables.get("runs", found.file)),
         "warnings": list(dict.fromkeys(filter(None, said))),
+        "trial_runs": len(trials.runs),
+        "check_runs": 0 if check is None else len(check.runs),
+        "vectors": sum(int(runs.repeats.sum()) for runs in (trials, check) if runs is not None),
         "undetermined": undetermined,
     }
-    return job_rows(job, own, influence, proposed, before)
-
-
-def _checked(
-    job: Job, influence: Influence
-) -> tuple[ComplexArray | None, tuple[Sequence[str], ComplexArray] | None, str]:
-    """Of a job with check runs: vibration of the bare rotor, proposed corrections, or why there are none."""
-    from balancing.coefficients.baseline import starting_point
-    from rotorid.workflows.coefficients import proposed
-
-    if job.check is None:
-        return None, None, ""
-    runs = None if job.influence is None else job.trials
-    try:
-        before = starting_point(influence, runs).readings
-        if job.check_mounted:
-            return before, None, ""
-        made = proposed(job, influence, runs)
-    except ValueError as error:
-        return influence.baseline, None, f"no corrections are proposed: {error}"
-    return before, (made.planes, made.weights), ""
+    return job_rows(job, own, influence, mounted, before)
