@@ -160,7 +160,8 @@ def trials_of(store: FleetStore, job: str) -> Trials:
         re, im, both = full["std_re"] ** 2, full["std_im"] ** 2, full["cov_re_im"]
         covariance = np.array([[re, both], [both, im]]).reshape(2, 2, *shape)
     mounted = polar(weights["weight"], np.radians(weights["angle_deg"]))
-    unbalances = jobs["weight_kind"][0] == "unbalance"
+    vibration = _SI.get(jobs["quantity"][0], jobs["vibration_unit"][0])
+    weight = "kg_m" if jobs["weight_kind"][0] == "unbalance" else "kg"
     return Trials(
         runs=tuple(runs),
         speeds=speeds,
@@ -169,8 +170,5 @@ def trials_of(store: FleetStore, job: str) -> Trials:
         readings=polar(full["amplitude"], np.radians(full["phase_deg"])).reshape(shape),
         weights=mounted.reshape(len(runs), -1),
         covariance=covariance,
-        labels=Labels(
-            vibration_unit=_SI.get(jobs["quantity"][0], jobs["vibration_unit"][0]),
-            weight_unit="kg_m" if unbalances else "kg",
-        ),
+        labels=Labels(vibration_unit=vibration, weight_unit=weight),
     )

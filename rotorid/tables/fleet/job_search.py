@@ -59,7 +59,7 @@ def job_id(hashes: Iterable[str]) -> str:
     return hashlib.sha256("".join(hashes).encode()).hexdigest()[:16]
 
 
-def find_jobs(trees: Sequence[Path], machine_type: str = "") -> tuple[list[FoundJob], dict[Path, str]]:
+def find_jobs(trees: Sequence[Path], machine_type: str | None) -> tuple[list[FoundJob], dict[Path, str]]:
     """Jobs in trees of folders, or of single files, and why of other files nobody can say what they are.
 
     `machine_type` counts instead of the one that a place says; workbooks that jobs name are no jobs of their
@@ -115,7 +115,7 @@ def _files(tree: Path, closed: Callable[[OSError], None]) -> Iterator[Path]:
                 yield path
 
 
-def _job_in(file: Path, tree: Path, machine_type: str) -> FoundJob | None:
+def _job_in(file: Path, tree: Path, machine_type: str | None) -> FoundJob | None:
     """The job in a file; None where it is clearly something else."""
     if file.suffix.lower() == ".xlsx":
         sheets = _sheets(file)
@@ -128,14 +128,13 @@ def _job_in(file: Path, tree: Path, machine_type: str) -> FoundJob | None:
         if not _OF_A_JOB & said.keys():
             return None
     parts = _readable(file.relative_to(tree) if file != tree else Path(file.name)).parts
-    dates = map(_date, (file.name, file.parent.resolve().name, *reversed(parts[:-1])))
     named = {key: str(said[key]) for key in TABLES if isinstance(said.get(key), str)}
     return FoundJob(
         file=file,
         path="/".join(parts),
         machine=str(said.get("machine") or machine_of(file)),
         machine_type=machine_type or (parts[0] if len(parts) > 2 else ""),
-        date=next((date for date in dates if date is not None), None),
+        date=_date([file.name, file.parent.resolve().name, *reversed(parts[:-1])]),
         tables={key: file.parent / name for key, name in named.items() if name.isprintable()},
     )
 
@@ -161,8 +160,9 @@ def _sheets(file: Path) -> set[str]:
     return {name.decode("utf-8", "replace").strip().casefold() for name in names}
 
 
-def _date(name: str) -> datetime.date | None:
-    for text in _DATE.findall(name):
+def _date(names: Sequence[str]) -> datetime.date | None:
+    """The first date in names of files and folders."""
+    for text in _DATE.findall("/".join(names)):
         with suppress(ValueError):
             return datetime.date.fromisoformat(text)
     return None

@@ -64,8 +64,7 @@ class FleetShown(Outcome):
             .fillna({"first_date": "", "last_date": ""})
             .reset_index()
         )
-        columns = {str(name): found[name].tolist() for name in found}
-        return tuple(Column(name, cells, str, _TITLES.get(name)) for name, cells in columns.items())
+        return tuple(Column(str(k), found[k].tolist(), str, _TITLES.get(str(k))) for k in found)
 
     def _text(self, *by: str) -> str:
         """The same, vibration in the unit of its quantity."""

@@ -5,6 +5,8 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +16,8 @@ import pytest
 from rotorid.samples import sample_data
 from rotorid.tables.fleet.fleet_store import FleetStore
 from rotorid.tables.fleet.fleet_tables import TABLES
-from rotorid.workflows.fleet.fleet_add import fleet_add
+from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add, read_jobs
 from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show
-from rotorid.workflows.fleet.job_batches import read_jobs
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 FANS = sample_data() / "fleet" / "fan-132"
@@ -201,6 +202,20 @@ def test_two_writers_at_once_one_with_two_processes(tmp_path):
     for name in TABLES:
         one, other = store.table(name), FleetStore(tmp_path / "G").table(name)
         pd.testing.assert_frame_equal(one, other)
+
+
+class Dying(ThreadPoolExecutor):
+    """Workers that the system ends."""
+
+    def map(self, *given, chunksize):
+        yield from super().map(*given, chunksize=chunksize)
+        raise BrokenProcessPool
+
+
+def test_a_worker_that_dies_is_told(tree, monkeypatch):
+    monkeypatch.setattr("rotorid.workflows.fleet.fleet_add.worker_pool", Dying)
+    with pytest.raises(ValueError, match="has died; the memory may be too small for so many workers"):
+        fleet_add("F", [tree], FleetAddOptions(workers=2))
 
 
 def test_show_tells_types_and_machines(tmp_path, cli):
