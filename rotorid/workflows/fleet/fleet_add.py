@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 BATCH = 200_000
 """Readings that are written together."""
-CHUNK, UNDER_WAY = 8, 512
+CHUNK, UNDER_WAY = 4, 512
 """Jobs that a process reads before it gives them back, and that all are given at once."""
 
 
