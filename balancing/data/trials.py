@@ -184,6 +184,8 @@ class Trials:
     @property
     def mean(self) -> ComplexArray:
         """Mean of the repeated readings, shape (R, S, C)."""
+        if len(self.readings) == 1:
+            return np.asarray(self.readings[0])
         return np.asarray(np.nansum(self.readings, axis=0) / self.repeats)
 
 
@@ -223,7 +225,7 @@ def check_speeds(speeds: FloatArray) -> FloatArray:
         raise ValueError(f"speeds must have shape (S,), at least one; got {out.shape}")
     if not (np.isfinite(out) & (out > 0)).all():
         raise ValueError(f"speeds must be finite and greater than zero; got {out.tolist()} rad/s")
-    if len(np.unique(out)) < len(out):
+    if len(set(out.tolist())) < len(out):
         raise ValueError(f"every speed may stand only once; got {out.tolist()} rad/s")
     out.flags.writeable = False
     return out

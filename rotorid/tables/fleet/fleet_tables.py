@@ -17,15 +17,14 @@ _COLUMNS = {
     "jobs": "job path machine machine_type date quantity weight_kind vibration_unit weight_unit files "
     "runs_file warnings trial_runs check_runs vectors undetermined",
 }
-_KINDS = {
-    "number": "speed_rad_s amplitude phase_deg std_re std_im cov_re_im weight angle_deg radius re im "
+_TYPES = {
+    "float64": "speed_rad_s amplitude phase_deg std_re std_im cov_re_im weight angle_deg radius re im "
     "var_re var_im before after limit",
-    "count": "repeat trial_runs check_runs vectors",
-    "flag": "mounted",
-    "date": "date",
-    "texts": "files warnings",
+    "int64": "repeat trial_runs check_runs vectors",
+    "bool": "mounted",
+    "date32": "date",
 }
-"""Columns that are no texts."""
+"""Columns that are no texts, by the types of Arrow."""
 TABLES = {name: tuple(columns.split()) for name, columns in _COLUMNS.items()}
 """Columns of each table, in the order in which they are written: `jobs` last."""
 Columns = dict[str, Sequence[Any]]
@@ -35,13 +34,7 @@ JobRows = dict[str, list[Columns]]
 
 
 def arrow() -> Any:  # noqa: ANN401 - the module
-    """The module pyarrow.
-
-    Raises
-    ------
-    ValueError
-        Where the extra is not installed.
-    """
+    """The module pyarrow; ValueError where the extra is not installed."""
     try:
         import pyarrow.parquet
     except ImportError as error:
@@ -49,26 +42,15 @@ def arrow() -> Any:  # noqa: ANN401 - the module
     return pyarrow
 
 
-def schema(name: str) -> Any:  # noqa: ANN401 - of pyarrow
-    """The schema of a table, with the version of the tables."""
-    pa = arrow()
-    kinds = {
-        "number": pa.float64(),
-        "count": pa.int64(),
-        "flag": pa.bool_(),
-        "date": pa.date32(),
-        "texts": pa.list_(pa.string()),
-    }
-    kind_of = {column: kinds[kind] for kind, columns in _KINDS.items() for column in columns.split()}
-    columns = [(column, kind_of.get(column, pa.string())) for column in TABLES[name]]
-    return pa.schema(columns, metadata={"schema_version": VERSION})
-
-
 def arrow_table(name: str, parts: Sequence[Columns]) -> Any:  # noqa: ANN401 - of pyarrow
-    """A table of rows in parts; NaN is null."""
-    own = schema(name)
-    cells = ([cell for part in parts for cell in part[field.name]] for field in own)
-    arrays = [
-        arrow().array(each, field.type, from_pandas=True) for each, field in zip(cells, own, strict=True)
-    ]
-    return arrow().Table.from_arrays(arrays, schema=own)
+    """A table of rows in parts, with the version of the tables; NaN is null."""
+    pa = arrow()
+    types = {column: kind for kind, columns in _TYPES.items() for column in columns.split()}
+    types |= dict.fromkeys(("files", "warnings"), pa.list_(pa.string()))
+    fields = [(column, types.get(column, "string")) for column in TABLES[name]]
+    schema = pa.schema(fields, metadata={"schema_version": VERSION})
+    arrays = []
+    for field in schema:
+        cells = [cell for part in parts for cell in part[field.name]]
+        arrays.append(pa.array(cells, field.type, from_pandas=True))
+    return pa.Table.from_arrays(arrays, schema=schema)

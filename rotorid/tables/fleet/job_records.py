@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,7 @@ from rotorid.tables.reader.units import vibration
 
 QUANTITIES = {"length": "displacement", "velocity": "velocity", "acceleration": "acceleration"}
 """Of a reading, by the kind of its unit."""
-
-
-def job_id(hashes: Iterable[str]) -> str:
-    """The id of a job, 16 hex digits of the SHA-256 over those of its files in their order."""
-    return hashlib.sha256("".join(hashes).encode()).hexdigest()[:16]
+_SI = Labels()
 
 
 def kind_of(labels: Labels) -> tuple[str, str]:
@@ -39,25 +34,16 @@ def job_rows(
     proposed: tuple[Sequence[str], ComplexArray] | None,
     before: ComplexArray | None,
 ) -> JobRows:
-    """Rows of all tables.
+    """Rows of a job in all tables.
 
-    Parameters
-    ----------
-    job
-        As it was read.
-    own
-        What the table `jobs` has of it besides what follows from the job; `job` is its id.
-    influence
-        Its coefficients, or None where nothing determines them.
-    proposed
-        Planes, and the corrections (P,) that were proposed and mounted, where its check runs do not say them.
-    before
-        Vibration of the bare rotor, shape (S, C), or None.
+    `own` is what the table `jobs` has of it, `influence` its coefficients, where something determines them,
+    `proposed` the planes and corrections (P,) that were mounted where its check runs do not say them, and
+    `before` the vibration of the bare rotor, (S, C).
     """
-    trials, check, labels = job.trials, job.check, job.trials.labels
-    rows: JobRows = {"readings": [_readings(trials, "trial")], "weights": [_weights(trials, "trial")]}
+    trials, check = job.trials, job.check
+    rows = {"readings": [_readings(trials, "trial")], "weights": [_weights(trials, "trial")]}
     if influence is not None:
-        rows["coefficients"] = [_coefficients(influence, job.radii, stored=job.influence is not None)]
+        rows["coefficients"] = [_coefficients(job, influence)]
     if check is not None:
         rows["readings"].append(_readings(check, "check"))
         rows["outcomes"] = [_outcomes(job, check, before)]
@@ -65,58 +51,53 @@ def job_rows(
             rows["weights"].append(_weights(check, "check"))
             proposed = check.planes, check.weights[-1]
     if proposed is not None:
-        rows["corrections"] = [_corrections(*proposed, mounted=job.check_mounted)]
-    for part in (part for parts in rows.values() for part in parts):
-        part["job"] = [own["job"]] * len(next(iter(part.values())))
-    more = {
-        "date": job.date or own["date"],
-        "machine": job.machine or own["machine"],
-        "machine_type": job.machine_type or own["machine_type"],
-        **dict(zip(("quantity", "weight_kind"), kind_of(labels), strict=True)),
-        "vibration_unit": labels.vibration_unit,
-        "weight_unit": labels.weight_unit,
-        "trial_runs": len(trials.runs),
-        "check_runs": 0 if check is None else len(check.runs),
-        "vectors": sum(len(part["run"]) for part in rows["readings"]),
+        weight, angle = _SI.weight(proposed[1])
+        corrections = {"plane": np.array(proposed[0]), "weight": weight, "angle_deg": angle}
+        rows["corrections"] = [{**corrections, "mounted": job.check_mounted}]
+    cells = {table: [_cells(own["job"], part) for part in parts] for table, parts in rows.items()}
+    return {**cells, "jobs": [{column: [value] for column, value in own.items()}]}
+
+
+def _cells(job: str, columns: dict[str, Any]) -> Columns:
+    """Columns as lists, with the id of the job; what is no array is the same in all rows."""
+    rows = next(len(cells) for cells in columns.values() if isinstance(cells, np.ndarray))
+    return {
+        name: cells.tolist() if isinstance(cells, np.ndarray) else [cells] * rows
+        for name, cells in {"job": job, **columns}.items()
     }
-    return {**rows, "jobs": [{column: [value] for column, value in (own | more).items()}]}
 
 
-def _readings(trials: Trials, kind: str) -> Columns:
+def _readings(trials: Trials, kind: str) -> dict[str, Any]:
     """One row a run, speed, sensor and repeat."""
     readings = np.moveaxis(trials.readings, 0, -1)
     r, s, c, k = np.nonzero(~np.isnan(readings))
-    values = readings[r, s, c, k]
+    amplitude, phase = _SI.vibration(readings[r, s, c, k])
     spread = np.full((2, 2, len(r)), np.nan)
     if trials.covariance is not None:
         spread = trials.covariance[:, :, k, r, s, c]
     return {
-        "kind": [kind] * len(r),
+        "kind": kind,
         "run": _named(trials.runs, r),
-        "repeat": (k + 1).tolist(),
-        "speed_rad_s": trials.speeds[s].tolist(),
+        "repeat": k + 1,
+        "speed_rad_s": trials.speeds[s],
         "sensor": _named(trials.sensors, c),
-        "amplitude": np.abs(values).tolist(),
-        "phase_deg": _degrees(values),
-        "std_re": np.sqrt(spread[0, 0]).tolist(),
-        "std_im": np.sqrt(spread[1, 1]).tolist(),
-        "cov_re_im": spread[0, 1].tolist(),
+        "amplitude": amplitude,
+        "phase_deg": phase,
+        "std_re": np.sqrt(spread[0, 0]),
+        "std_im": np.sqrt(spread[1, 1]),
+        "cov_re_im": spread[0, 1],
     }
 
 
-def _weights(trials: Trials, kind: str) -> Columns:
+def _weights(trials: Trials, kind: str) -> dict[str, Any]:
     """One row a run and plane, also where nothing is mounted."""
     r, p = np.indices(trials.weights.shape).reshape(2, -1)
-    return {
-        "kind": [kind] * len(r),
-        "run": _named(trials.runs, r),
-        "plane": _named(trials.planes, p),
-        "weight": np.abs(trials.weights).ravel().tolist(),
-        "angle_deg": _degrees(trials.weights.ravel()),
-    }
+    weight, angle = _SI.weight(trials.weights.ravel())
+    runs, planes = _named(trials.runs, r), _named(trials.planes, p)
+    return {"kind": kind, "run": runs, "plane": planes, "weight": weight, "angle_deg": angle}
 
 
-def _coefficients(influence: Influence, radii: Mapping[str, float], *, stored: bool) -> Columns:
+def _coefficients(job: Job, influence: Influence) -> dict[str, Any]:
     """One row a speed, sensor and plane."""
     s, c, p = np.indices(influence.W.shape).reshape(3, -1)
     W = influence.W.ravel()
@@ -124,50 +105,35 @@ def _coefficients(influence: Influence, radii: Mapping[str, float], *, stored: b
     if influence.covariance is not None:
         own = record_of("", "", influence).covariance.reshape(own.shape)
     return {
-        "speed_rad_s": influence.speeds[s].tolist(),
+        "speed_rad_s": influence.speeds[s],
         "sensor": _named(influence.sensors, c),
         "plane": _named(influence.planes, p),
-        "radius": [radii.get(influence.planes[k]) for k in p],
-        "re": W.real.tolist(),
-        "im": W.imag.tolist(),
-        "var_re": own[:, 0, 0].tolist(),
-        "cov_re_im": own[:, 0, 1].tolist(),
-        "var_im": own[:, 1, 1].tolist(),
-        "source": ["stored" if stored else "measured"] * len(W),
+        "radius": _named([job.radii.get(plane) for plane in influence.planes], p),
+        "re": W.real,
+        "im": W.imag,
+        "var_re": own[:, 0, 0],
+        "cov_re_im": own[:, 0, 1],
+        "var_im": own[:, 1, 1],
+        "source": "measured" if job.influence is None else "stored",
     }
 
 
-def _corrections(planes: Sequence[str], weights: ComplexArray, *, mounted: bool) -> Columns:
-    return {
-        "plane": list(planes),
-        "weight": np.abs(weights).tolist(),
-        "angle_deg": _degrees(weights),
-        "mounted": [mounted] * len(planes),
-    }
-
-
-def _outcomes(job: Job, check: Trials, before: ComplexArray | None) -> Columns:
+def _outcomes(job: Job, check: Trials, before: ComplexArray | None) -> dict[str, Any]:
     """One row a check run, speed and sensor."""
     r, s, c = np.indices(check.mean.shape).reshape(3, -1)
-    trials = job.trials
-    at = np.array([trials.speeds.tolist().index(speed) for speed in check.speeds])[s]
-    by = np.array([trials.sensors.index(sensor) for sensor in check.sensors])[c]
-    limit = np.full(len(r), np.nan) if job.limits is None else job.limits.residual[at, by]
+    speeds, sensors = job.trials.speeds.tolist(), job.trials.sensors
+    at = np.array([speeds.index(speed) for speed in check.speeds])[s]
+    by = np.array([sensors.index(sensor) for sensor in check.sensors])[c]
+    limit = np.full(len(r), np.inf) if job.limits is None else job.limits.residual[at, by]
     return {
         "run": _named(check.runs, r),
-        "speed_rad_s": check.speeds[s].tolist(),
+        "speed_rad_s": check.speeds[s],
         "sensor": _named(check.sensors, c),
-        "before": (np.full(len(r), np.nan) if before is None else np.abs(before[at, by])).tolist(),
-        "after": np.abs(check.mean).ravel().tolist(),
-        "limit": np.where(np.isinf(limit), np.nan, limit).tolist(),
+        "before": np.nan if before is None else np.abs(before[at, by]),
+        "after": np.abs(check.mean).ravel(),
+        "limit": np.where(np.isinf(limit), np.nan, limit),
     }
 
 
-def _named(names: Sequence[str], places: Any) -> list[str]:  # noqa: ANN401 - indices
-    return [names[place] for place in places.tolist()]
-
-
-def _degrees(values: ComplexArray) -> list[float]:
-    """Angles, 0 ≤ angle < 360."""
-    degrees = np.mod(np.degrees(np.angle(values)), 360.0)
-    return list(np.where(degrees >= 360.0, 0.0, degrees).tolist())
+def _named(names: Sequence[Any], places: Any) -> Any:  # noqa: ANN401 - arrays of objects and of indices
+    return np.array(names, dtype=object)[places]

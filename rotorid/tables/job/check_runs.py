@@ -57,12 +57,12 @@ def read_check(
     speeds = _speeds(check, trials, readings.conventions.speed_tolerance_percent, source_name(runs), problems)
     if len(problems) > before:
         return None
-    check = replace(check, speeds=speeds, labels=trials.labels)
+    shown, mounted = check.planes, check.weights
     if weights is not None:
         # All planes of the job: a weights table without rows says that nothing was mounted.
-        mounted = np.zeros((len(check.runs), len(names)), dtype=complex)
+        shown, mounted = names, np.zeros((len(check.runs), len(names)), dtype=complex)
         mounted[:, [names.index(name) for name in check.planes]] = check.weights
-        check = replace(check, planes=names, weights=mounted)
+    check = replace(check, speeds=speeds, labels=trials.labels, planes=shown, weights=mounted)
     if readings.slow_roll is None:
         return check
     check = subtract_slow_roll(check, readings.slow_roll)

@@ -103,11 +103,11 @@ def clean(text: str) -> str:
 
 def show(cell: Cell) -> str:
     """A cell as text: 1.0 of a workbook is 1."""
-    if isinstance(cell, BadCell):
-        return cell.value
+    if isinstance(cell, str):
+        return cell
     if isinstance(cell, float) and cell.is_integer() and abs(cell) < 1e15:
         return str(int(cell))
-    return cell if isinstance(cell, str) else repr(cell)
+    return cell.value if isinstance(cell, BadCell) else repr(cell)
 
 
 def is_comment(cells: tuple[Cell, ...], *, in_sheet: bool, below_header: bool) -> bool:

@@ -172,8 +172,8 @@ def text_from_header(text: str, is_header: Callable[[tuple[str, ...]], bool]) ->
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:
     if '"' not in line:  # a line at a time: an open quote must not swallow the rest of the file
-        return tuple(clean(cell) for cell in line.split(separator)) if line else ()
-    return tuple(clean(cell) for cell in next(csv.reader([line], delimiter=separator, strict=True), []))
+        return tuple(map(clean, line.split(separator))) if line else ()
+    return tuple(map(clean, next(csv.reader([line], delimiter=separator, strict=True), [])))
 
 
 def _separator(lines: list[str]) -> str:

@@ -108,7 +108,7 @@ def _as_runs_table(grid: Grid, named: Mapping[str, str], phase: str) -> Grid:
     rows = grid.rows[1:] if below else grid.rows
     plain = not below and all(h in own or h.stem in ("", "note") for h in headings)
     measured = [h.index for h in own if h.stem in MEASURED]
-    if plain and all(_PLAIN.fullmatch(show(cells[k])) for _, cells in rows for k in measured):
+    if plain and all(map(_PLAIN.fullmatch, {show(cells[k]) for _, cells in rows for k in measured})):
         return grid
     columns = [_Column(h, h.stem, h.unit, [cells[h.index] for _, cells in rows]) for h in headings]
     found = [

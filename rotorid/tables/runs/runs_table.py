@@ -87,14 +87,11 @@ def read_runs(
     most = max((len(rows) for rows in cells.values()), default=1)
     written = np.array([table.steps("amplitude"), table.steps("phase")])
     readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
-    steps, covariance = np.full((2, *readings.shape), np.nan), np.full((2, 2, *readings.shape), np.nan)
-    across = np.where(amplitude > 0, amplitude * table.numbers("phase_std"), table.numbers("amplitude_std"))
-    measured = np.moveaxis(turned(values, table.numbers("amplitude_std") ** 2, across**2), 0, -1)
+    steps = np.full((2, *readings.shape), np.nan)
     rows = [row for own in cells.values() for row in sorted(own, key=lambda i: order[i])]
     at = np.array([(k, *place) for place, own in cells.items() for k in range(len(own))], dtype=int).T
     readings[*at] = values[rows]
     steps[:, *at] = written[:, rows]
-    covariance[:, :, *at] = measured[..., rows]
     labels = replace(
         conventions.labels,
         vibration_unit=table.unit("amplitude").name,
@@ -105,7 +102,13 @@ def read_runs(
     )
     nothing = np.zeros((len(runs), 0), dtype=complex)
     trials = Trials(runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=merged, steps=steps)
-    return runs, replace(trials, covariance=covariance) if "phase_std" in table else trials
+    if "phase_std" not in table:
+        return runs, trials
+    along = table.numbers("amplitude_std")
+    across = np.where(amplitude > 0, amplitude * table.numbers("phase_std"), along)
+    covariance = np.full((2, 2, *readings.shape), np.nan)
+    covariance[:, :, *at] = np.moveaxis(turned(values, along**2, across**2), 0, -1)[..., rows]
+    return runs, replace(trials, covariance=covariance)
 
 
 def _complain_about_deviations(table: Table) -> None:

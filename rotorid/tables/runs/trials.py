@@ -75,10 +75,12 @@ def make_trials(
     mounted = None if weights is None else read_weights(weights, names, conventions, problems)
     if read is None or (mounted is None and weights is not None) or len(problems):
         return None
+    between, labels = None, read.labels
+    if isinstance(errors, StatedErrors):
+        between = errors.between_runs(labels)
+        errors = errors.in_si(labels)
+    planes, placed = read.planes, read.weights
     if mounted is not None:
-        unit = mounted.unit
-        labels = replace(read.labels, weight_unit=unit.name, weight_scale=unit.scale)
-        read = replace(read, planes=mounted.planes, weights=mounted.weights, labels=labels)
-    if not isinstance(errors, StatedErrors):
-        return replace(read, errors=errors)
-    return replace(read, errors=errors.in_si(read.labels), run_errors=errors.between_runs(read.labels))
+        planes, placed = mounted.planes, mounted.weights
+        labels = replace(labels, weight_unit=mounted.unit.name, weight_scale=mounted.unit.scale)
+    return replace(read, planes=planes, weights=placed, labels=labels, errors=errors, run_errors=between)

@@ -1,9 +1,12 @@
-"""`fleet add`: jobs of folder trees into the store of a fleet."""
+"""`fleet add`: jobs of folder trees into the store of a fleet, read in this process or in several."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextvars import Context
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,19 +15,21 @@ from rotorid.base.answer import Answer
 from rotorid.base.logs import progress
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
-from rotorid.workflows.fleet.job_batches import apart, read_jobs, reason_of
+from rotorid.base.worker_processes import single_threads, worker_pool
 from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from rotorid.tables import Job
     from rotorid.tables.fleet.fleet_store import FleetStore
-    from rotorid.tables.fleet.fleet_tables import JobRows
+    from rotorid.tables.fleet.fleet_tables import Columns, JobRows
     from rotorid.tables.fleet.job_search import FoundJob
 
 BATCH = 200_000
 """Readings that are written together."""
-Damaged = dict[Path, str]
+CHUNK, UNDER_WAY = 4, 512
+"""Jobs that a process reads before it gives them back, and that all are given at once."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,7 @@ class FleetAdded(Outcome):
     vectors: int
     known: int
     untyped: int
-    damaged: Damaged
+    damaged: dict[Path, str]
 
     def _columns(self) -> tuple[Column, ...]:
         files = [str(file) for file in self.damaged]
@@ -111,91 +116,125 @@ def fleet_add(
         Where nothing can be read, and for a folder that is something else.
     """
     from rotorid.tables.fleet.fleet_store import FleetStore
+    from rotorid.tables.fleet.job_search import find_jobs
 
     options = options or FleetAddOptions()
     store = FleetStore(Path(fleet))
     store.check(new=True)
-    found, damaged = _found([Path(tree) for tree in trees], options.machine_type or "")
+    # apart from what the command keeps of files that it reads: those of a whole tree would fill the memory
+    found, damaged = Context().run(find_jobs, [Path(tree) for tree in trees], options.machine_type)
     seen = store.known()
-    new = [job for job in found if not seen or not _is_known(job, seen)]
+    new = [job for job in found if not seen or Context().run(job.quick_id) not in seen]
     batch: list[JobRows] = []
-    jobs = vectors = waiting = untyped = 0
-    unread: Damaged = {}
+    added: list[Columns] = []
+    waiting = 0
     begun = time.monotonic()
-    for count, read in enumerate(read_jobs(new, options.workers), 1):
-        if read.rows is None:
-            unread[read.found.file] = read.reason
-        elif (own := read.rows["jobs"][0])["job"][0] not in seen:
+    for count, (job, read) in enumerate(zip(new, read_jobs(new, options.workers), strict=True), 1):
+        if isinstance(read, str):
+            damaged[job.file] = read
+        elif (own := read["jobs"][0])["job"][0] not in seen:
             seen.add(own["job"][0])
-            batch.append(read.rows)
+            batch.append(read)
             waiting += own["vectors"][0]
-            untyped += not own["machine_type"][0]
         left = (time.monotonic() - begun) / count * (len(new) - count)
         progress.info("%d of %d, %.0f s left", count, len(new), left)
         if batch and (waiting >= BATCH or count == len(new)):
-            jobs += store.append(batch)
-            batch, vectors, waiting = [], vectors + waiting, 0
-    known = len(found) - len(unread) - jobs
-    if not jobs + known:
-        raise ValueError(_nothing(trees, damaged | unread))
+            added += store.append(batch)
+            batch, waiting = [], 0
+    known = len(found) - sum(job.file in damaged for job in found) - len(added)
+    if not added and not known:
+        what = ", ".join(map(str, trees))
+        raise ValueError(
+            "nothing could be read:\n" + "\n".join(damaged.values())
+            if damaged
+            else f"{what}: there is no balancing job in it (.toml with runs, or .xlsx with a sheet runs)"
+        )
     return FleetAdded(
         store=store,
-        jobs=jobs,
-        vectors=vectors,
+        jobs=len(added),
+        vectors=sum(own["vectors"][0] for own in added),
         known=known,
-        untyped=untyped,
-        damaged=damaged | unread,
+        untyped=sum(not own["machine_type"][0] for own in added),
+        damaged=damaged,
         provenance=provenance((), options, fleet=str(fleet), trees=[str(tree) for tree in trees]),
     )
 
 
-def _found(trees: Sequence[Path], machine_type: str) -> tuple[list[FoundJob], Damaged]:
-    """Jobs of trees, and files of which nobody can say what they are; workbooks that jobs name are none."""
-    from rotorid.tables.fleet.job_search import found_job, job_files
-    from rotorid.tables.reader.excel_workbook import is_workbook
-
-    found: dict[Path, FoundJob] = {}
-    damaged: Damaged = {}
-    closed: list[OSError] = []
-    for tree in trees:
-        for file in job_files(tree, closed.append):
-            try:
-                job = apart(found_job, file, tree, machine_type)
-            except (OSError, ValueError) as error:
-                damaged[file] = reason_of(error)
-                continue
-            if job is not None:
-                found.setdefault(file.resolve(), job)
-    places: dict[tuple[str, str], FoundJob] = {}
-    for file, job in list(found.items()):
-        other = places.setdefault((job.machine, job.path), job)
-        if other is not job and not _same(job, other):
-            damaged[found.pop(file).file] = (
-                f"{other.file} is another job at the same place below its tree, of the same machine: "
-                "add the folder above both, or say `machine` in them"
-            )
-    damaged |= {Path(error.filename): reason_of(error) for error in closed}
-    tables = (table for job in found.values() for table in job.tables.values())
-    named = {table.resolve() for table in tables if is_workbook(table)}
-    return [job for file, job in found.items() if file not in named], damaged
-
-
-def _is_known(job: FoundJob, seen: set[str]) -> bool:
+def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[JobRows | str]:
+    """Of each job its rows by table, or why there are none; what was read of it is not kept."""
+    if workers == 1:
+        yield from (Context().run(_read, job) for job in found)
+        return
     try:
-        return apart(job.quick_id) in seen
-    except (OSError, ValueError):  # reading says it better
-        return False
+        with single_threads(), worker_pool(workers) as pool:
+            for k in range(0, len(found), UNDER_WAY):
+                yield from pool.map(_read, found[k : k + UNDER_WAY], chunksize=CHUNK)
+    except BrokenExecutor as error:
+        raise ValueError(
+            "a process that reads jobs has died; the memory may be too small for so many workers: add the "
+            "rest with fewer"
+        ) from error
 
 
-def _same(job: FoundJob, other: FoundJob) -> bool:
+def _read(found: FoundJob) -> JobRows | str:
+    from rotorid.tables import read_job
+    from rotorid.tables.fleet.job_search import reason_of
+    from rotorid.tables.reader.input_file import each_file_once
+
     try:
-        return bool(apart(job.quick_id) == apart(other.quick_id))
-    except (OSError, ValueError):  # reading says it better
-        return True
+        with each_file_once(), warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            return _rows(found, read_job(found.file), caught)
+    except (ValueError, OSError, ArithmeticError, MemoryError) as error:
+        return reason_of(error)
 
 
-def _nothing(trees: Sequence[Path | str], damaged: Damaged) -> str:
-    if damaged:
-        return "nothing could be read:\n" + "\n".join(damaged.values())
-    what = ", ".join(map(str, trees))
-    return f"{what}: there is no balancing job in it (.toml with runs, or .xlsx with a sheet runs)"
+def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> JobRows:
+    """Rows of a job with its coefficients, and what `correct` proposes where that was mounted."""
+    from balancing import estimate_influence
+    from balancing.coefficients.baseline import starting_point
+    from rotorid.tables.fleet.job_records import job_rows, kind_of
+    from rotorid.tables.fleet.job_search import job_id
+    from rotorid.tables.reader.input_file import sha256
+    from rotorid.workflows.coefficients import proposed
+
+    influence, trials, check, labels = job.influence, job.trials, job.check, job.trials.labels
+    before = mounted = None
+    undetermined = refused = ""
+    try:
+        influence = influence or estimate_influence(trials)
+    except ValueError as error:
+        undetermined = str(error)
+    if influence is not None and check is not None:
+        before, runs = influence.baseline, None if job.influence is None else trials
+        try:
+            before = starting_point(influence, runs).readings
+            if not job.check_mounted:
+                correction = proposed(job, influence, runs)
+                mounted = correction.planes, correction.weights
+        except ValueError as error:
+            refused = f"no corrections are proposed: {error}"
+    told = [str(one.message).encode(errors="replace").decode() for one in caught]  # of any names of files
+    said = [*(trials if influence is None else influence).warnings, *told]
+    said += [labels.assumed_in_words(), refused]
+    files = [sha256(file) for file in job.files]
+    quantity, weight_kind = kind_of(labels)
+    own = {
+        "job": job_id(files),
+        "path": found.path,
+        "machine": job.machine or found.machine,
+        "machine_type": job.machine_type or found.machine_type,
+        "date": job.date or found.date,
+        "quantity": quantity,
+        "weight_kind": weight_kind,
+        "vibration_unit": labels.vibration_unit,
+        "weight_unit": labels.weight_unit,
+        "files": files,
+        "runs_file": sha256(found.tables.get("runs", found.file)),
+        "warnings": list(dict.fromkeys(filter(None, said))),
+        "trial_runs": len(trials.runs),
+        "check_runs": 0 if check is None else len(check.runs),
+        "vectors": sum(int(runs.repeats.sum()) for runs in (trials, check) if runs is not None),
+        "undetermined": undetermined,
+    }
+    return job_rows(job, own, influence, mounted, before)

@@ -48,23 +48,23 @@ class FleetShown(Outcome):
     def _columns(self, *by: str) -> tuple[Column, ...]:
         """A row for each of these, and each quantity."""
         found = (
-            self.jobs.assign(checked=self.jobs["after"].notna(), date=self.jobs["date"].map(_day))
+            self.jobs.assign(date=self.jobs["date"].astype("string"))
             .groupby([*by, "quantity"])
             .agg(
                 machines=("machine", "nunique"),
                 jobs=("job", "size"),
-                first_date=("date", _first),
+                first_date=("date", "min"),
                 last_date=("date", "max"),
                 vectors=("vectors", "sum"),
                 coefficients=("coefficients", "sum"),
-                outcomes=("checked", "sum"),
+                outcomes=("after", "count"),
                 rms_before=("before", "median"),
                 rms_after=("after", "median"),
             )
+            .fillna({"first_date": "", "last_date": ""})
             .reset_index()
         )
-        columns = {str(name): found[name].tolist() for name in found}
-        return tuple(Column(name, cells, str, _TITLES.get(name)) for name, cells in columns.items())
+        return tuple(Column(str(k), found[k].tolist(), str, _TITLES.get(str(k))) for k in found)
 
     def _text(self, *by: str) -> str:
         """The same, vibration in the unit of its quantity."""
@@ -134,15 +134,6 @@ def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> Fl
     coefficients = store.table("coefficients", jobs=own, columns=["job"])["job"].value_counts()
     outcomes = store.table("outcomes", jobs=own, columns=["job", "run", "before", "after"])
     last = outcomes[outcomes["run"] == outcomes.groupby("job")["run"].transform("last")]
-    squares = last.assign(before=last["before"] ** 2, after=last["after"] ** 2)
-    rms = squares.groupby("job")[["before", "after"]].mean() ** 0.5
+    rms = (last.set_index("job")[["before", "after"]] ** 2).groupby("job").mean() ** 0.5
     jobs = jobs.assign(coefficients=own.map(coefficients).fillna(0).astype(int)).join(rms, on="job")
     return FleetShown(jobs=jobs, provenance=provenance(store.files("jobs", "outcomes"), options))
-
-
-def _day(date: object) -> str:
-    return "" if date is None else str(date)
-
-
-def _first(dates: pd.Series[str]) -> str:
-    return min(filter(None, dates), default="")

@@ -1,8 +1,12 @@
 """The store: nothing twice, nothing half, one writer at a time; commands over it."""
 
+import os
 import shutil
 import subprocess
 import sys
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +16,7 @@ import pytest
 from rotorid.samples import sample_data
 from rotorid.tables.fleet.fleet_store import FleetStore
 from rotorid.tables.fleet.fleet_tables import TABLES
-from rotorid.workflows.fleet.fleet_add import fleet_add
+from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add, read_jobs
 from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
@@ -77,6 +81,25 @@ def test_a_job_that_changed_stands_in_place_of_the_older(tree):
     assert store.known() == {*old["job"], *new["job"]}
 
 
+def test_what_another_writer_has_added_meanwhile_is_known(tree, monkeypatch):
+    def slow(found, workers):
+        rows = list(read_jobs(found, workers))
+        FleetStore(tree.parent / "F").append(rows[:1])
+        return rows
+
+    monkeypatch.setattr("rotorid.workflows.fleet.fleet_add.read_jobs", slow)
+    added = fleet_add("F", [tree])
+    assert (added.jobs, added.vectors, added.known) == (1, 12, 1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems know no such names")
+def test_names_that_are_no_text_spoil_nothing(tree):
+    os.rename(tree / "fan", os.fsencode(tree) + b"/L\xfcfter")
+    assert fleet_add("F", [tree]).jobs == 2
+    assert fleet_add("F", [tree]).known == 2
+    assert set(FleetStore(tree.parent / "F").table("jobs")["machine_type"]) == {"L\ufffdfter"}
+
+
 def test_a_folder_with_a_colon_is_no_address(tree):
     fleet_add("on:2/F", [tree])
     assert len(FleetStore(tree.parent / "on:2" / "F").table("readings")) == 28
@@ -105,6 +128,11 @@ def test_damaged_files_are_named_and_spoil_nothing(tree, cli):
     (broken / "typo.toml").write_text("runs = \n", "utf-8")
     (broken / "missing.toml").write_text('runs = "none.csv"\nweights = "weights.csv"\n', "utf-8")
     (broken / "cut.xlsx").write_bytes(b"PK no workbook")
+    with zipfile.ZipFile(broken / "secret.xlsx", "w") as archive:
+        archive.writestr("xl/workbook.xml", "")
+    secret = (broken / "secret.xlsx").read_bytes()
+    at = secret.index(b"PK\1\2") + 8  # of the flags
+    (broken / "secret.xlsx").write_bytes(secret[:at] + b"\1" + secret[at + 1 :])
     for name in ("compressor/rotor.toml", "waveforms/waveforms.toml", "motion/small.toml"):  # no jobs
         shutil.copy(sample_data() / name, tree)
     (tree / ".hidden").mkdir()
@@ -117,11 +145,12 @@ def test_damaged_files_are_named_and_spoil_nothing(tree, cli):
     assert found.code == 0
     assert (found.json["jobs"], found.json["known"]) == (2, 0)
     reasons = {row["file"].rpartition("/")[2]: row["reason"] for row in found.json["damaged"]}
-    assert set(reasons) == {"job.toml", "typo.toml", "missing.toml", "cut.xlsx"}
+    assert set(reasons) == {"job.toml", "typo.toml", "missing.toml", "cut.xlsx", "secret.xlsx"}
     assert "row 6, column amplitude_um_pp: found 'x" in reasons["job.toml"]
     assert "none.csv" in reasons["missing.toml"]
     assert "intact Excel workbook" in reasons["cut.xlsx"]
-    assert "4 files cannot be read:" in cli("fleet", "add", "F", "tree").out
+    assert "intact Excel workbook" in reasons["secret.xlsx"]
+    assert "5 files cannot be read:" in cli("fleet", "add", "F", "tree").out
     alone = cli("fleet", "add", "G", "tree/fan/broken")
     assert (alone.code, alone.out) == (2, "")
     assert alone.err.startswith("rotorid: nothing could be read:")
@@ -175,6 +204,20 @@ def test_two_writers_at_once_one_with_two_processes(tmp_path):
         pd.testing.assert_frame_equal(one, other)
 
 
+class Dying(ThreadPoolExecutor):
+    """Workers that the system ends."""
+
+    def map(self, *given, chunksize):
+        yield from super().map(*given, chunksize=chunksize)
+        raise BrokenProcessPool
+
+
+def test_a_worker_that_dies_is_told(tree, monkeypatch):
+    monkeypatch.setattr("rotorid.workflows.fleet.fleet_add.worker_pool", Dying)
+    with pytest.raises(ValueError, match="has died; the memory may be too small for so many workers"):
+        fleet_add("F", [tree], FleetAddOptions(workers=2))
+
+
 def test_show_tells_types_and_machines(tmp_path, cli):
     fleet_add(tmp_path / "F", [sample_data() / "fleet"])
     fleet_add(tmp_path / "F", [sample_data() / "turbo_job" / "holes.toml"])
@@ -226,8 +269,10 @@ def test_refusals(tree, cli, monkeypatch):
     table = parquet.read_table(jobs)
     parquet.write_table(table.replace_schema_metadata({"schema_version": "2"}), jobs)
     assert "expected tables of version 1, not '2': update rotorid" in refused("show", "F")
-    jobs.write_bytes(b"PAR1")
-    assert "expected a whole Parquet table" in refused("show", "F")
+    whole = jobs.read_bytes()
+    for damaged in (b"PAR1", whole[:4] + bytes(len(whole) // 2) + whole[4 + len(whole) // 2 :]):
+        jobs.write_bytes(damaged)
+        assert "000001.parquet: expected a whole Parquet table" in refused("show", "F")
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     monkeypatch.delattr("pyarrow.parquet", raising=False)
     assert 'pip install "rotorid[fleet]"' in refused("add", "G", "tree")

@@ -184,6 +184,23 @@ def test_stored_coefficients_and_runs_that_determine_none(tmp_path, cli):
     assert of(store, "outcomes", "stored")["before"].to_numpy() == pytest.approx(found, rel=0.02)
 
 
+def test_the_bare_rotor_is_that_of_the_job_also_where_no_corrections_are_found(tmp_path, cli):
+    """Coefficients of another machine, and limits that cannot be met."""
+    other, own = FLEET / "fan-132" / "132-01", tmp_path / "tree" / "own"
+    shutil.copytree(FLEET / "fan-132" / "132-02", own)
+    assert cli("balance", other / "job.toml", "--save-influence", own / "w.csv").code == 0
+    text = 'influence = "w.csv"\n' + (own / "job.toml").read_text("utf-8")
+    text += "".join(f"\n[planes.{plane}]\nmax_mass_g = 0.01\n" for plane in ("DE", "NDE"))
+    text += "".join(f"[sensors.{sensor}]\nlimit = 0.001\n" for sensor in ("A", "B"))
+    (own / "job.toml").write_text(text, "utf-8")
+    fleet_add(tmp_path / "F", [tmp_path / "tree"])
+    store = FleetStore(tmp_path / "F")
+    assert "no corrections are proposed: the limits" in store.table("jobs")["warnings"][0][0]
+    assert store.table("corrections").empty
+    found = lines("132-02", "runs.csv").iloc[:4]["amplitude_um_pp"] * 0.5e-6
+    assert store.table("outcomes")["before"].to_numpy() == pytest.approx(found, rel=0.06)
+
+
 def test_workbooks_are_jobs_with_machine_and_date_in_their_cells(tmp_path, cli):
     book = tmp_path / "tree" / "own" / "job.xlsx"
     book.parent.mkdir(parents=True)
