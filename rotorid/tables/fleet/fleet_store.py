@@ -70,7 +70,7 @@ class FleetStore:
                 (self.folder / name).mkdir(exist_ok=True)
                 table = arrow_table(name, [part for job in new for part in job.get(name, ())])
                 with self._file(name, f".{batch}", ".tmp").open("wb") as file:
-                    arrow().parquet.write_table(table, file, compression="zstd")
+                    arrow().parquet.write_table(table, file, compression="zstd", write_page_checksum=True)
             for name in TABLES if new else ():
                 os.replace(self._file(name, f".{batch}", ".tmp"), self._file(name, batch))
         return [job["jobs"][0] for job in new]
@@ -113,7 +113,7 @@ class FleetStore:
         path = self._file(name, batch)
         with path.open("rb") as file:  # by name, a colon would make it an address
             try:
-                table = arrow().parquet.read_table(file, **how)
+                table = arrow().parquet.read_table(file, page_checksum_verification=True, **how)
             except (arrow().ArrowInvalid, OSError) as error:
                 raise ValueError(
                     f"{path}: expected a whole Parquet table; remove the batch and add it again"

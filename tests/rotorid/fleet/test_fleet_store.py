@@ -7,6 +7,7 @@ import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -254,6 +255,17 @@ def test_show_tells_types_and_machines(tmp_path, cli):
         fleet_show(tmp_path / "F", FleetShowOptions(machine_type="fan-123"))
 
 
+def changed_somewhere(file):
+    """Change one byte of a table, so that it can be read and has other numbers."""
+    whole, table = file.read_bytes(), parquet.read_table(file)
+    for k in range(len(whole)):
+        file.write_bytes(whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :])
+        with suppress(OSError, ValueError):
+            if not parquet.read_table(file).equals(table):
+                return
+    raise AssertionError("every change is seen")
+
+
 def test_refusals(tree, cli, monkeypatch):
     def refused(*words):
         found = cli("fleet", *words)
@@ -266,10 +278,14 @@ def test_refusals(tree, cli, monkeypatch):
     assert "this is no fleet" in refused("add", "tree", "tree")
     fleet_add("F", [tree])
     jobs = tree.parent / "F" / "jobs" / "000001.parquet"
+    first = jobs.read_bytes()
     table = parquet.read_table(jobs)
     parquet.write_table(table.replace_schema_metadata({"schema_version": "2"}), jobs)
     assert "expected tables of version 1, not '2': update rotorid" in refused("show", "F")
     whole = jobs.read_bytes()
+    jobs.write_bytes(first)
+    changed_somewhere(tree.parent / "F" / "coefficients" / "000001.parquet")
+    assert "000001.parquet: expected a whole Parquet table" in refused("fit", "F", "--type", "fan")
     for damaged in (b"PAR1", whole[:4] + bytes(len(whole) // 2) + whole[4 + len(whole) // 2 :]):
         jobs.write_bytes(damaged)
         assert "000001.parquet: expected a whole Parquet table" in refused("show", "F")
