@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from repetitions import FULL
 
 from balancing import (
     Labels,
@@ -111,7 +112,8 @@ def test_covariance_with_row_weights_is_that_of_repeated_jobs():
     rng = np.random.default_rng(9)
     trials, _ = job(3, outside=0.3, effect=2.0)
     exact = trials.mean
-    for _ in range(400):
+    n = 400 if FULL else 200
+    for _ in range(n):
         noise = 0.02 * (rng.standard_normal(exact.shape) + 1j * rng.standard_normal(exact.shape))
         again = Trials(
             trials.runs,
@@ -127,7 +129,7 @@ def test_covariance_with_row_weights_is_that_of_repeated_jobs():
         stated.append(found.covariance)
     seen = np.cov(np.array(weights).T)
     ratio = np.sqrt(np.diag(seen) / np.diag(np.mean(stated, axis=0)))
-    assert (np.abs(ratio - 1) < 0.09).all()  # 400 draws: 3.5 %
+    assert (np.abs(ratio - 1) < 1.8 / np.sqrt(n)).all()  # 0.09 for 400 draws: 3.5 %
 
 
 def test_limits_of_each_method_are_kept():
