@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -132,6 +133,15 @@ def test_covariance_with_row_weights_is_that_of_repeated_jobs():
     assert (np.abs(ratio - 1) < 1.8 / np.sqrt(n)).all()  # 0.09 for 400 draws: 3.5 %
 
 
+@pytest.fixture
+def few_draws(monkeypatch):
+    """Errors of weights that are drawn come from 100 draws instead of 400."""
+    draws = 400 if FULL else 100
+    few = functools.partial(correction_methods.sampled_covariance, draws=draws)
+    monkeypatch.setattr(correction_methods, "sampled_covariance", few)
+
+
+@pytest.mark.usefixtures("few_draws")
 def test_limits_of_each_method_are_kept():
     trials, _ = job()
     influence = estimate_influence(trials)

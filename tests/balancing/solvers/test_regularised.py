@@ -149,7 +149,8 @@ def test_the_covariance_against_simulated_jobs(kind):
     for _ in range(n):
         drawn = size * (1 + 0.01 * complex_normal(rng, size.shape))
         draws.append(stretch(solve(drawn[:, 1:], drawn[:, 0]).weights))
-    np.testing.assert_allclose(np.std(draws, axis=0), np.sqrt(np.diag(found.covariance)), rtol=2.2 / np.sqrt(n))
+    stated = np.sqrt(np.diag(found.covariance))
+    np.testing.assert_allclose(np.std(draws, axis=0), stated, rtol=2.2 / np.sqrt(n))
     largest = np.diag(found.covariance).max()
     np.testing.assert_allclose(np.cov(np.transpose(draws)), found.covariance, atol=3.3 / np.sqrt(n) * largest)
 
