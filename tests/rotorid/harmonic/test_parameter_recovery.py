@@ -216,7 +216,8 @@ def test_recovered_parameters_have_the_spread_that_simulation_shows():
         found.append(identify(model, experiments(model, w, {**load, "S": noisy}, errors=errors)))
     scatter = np.std([f.values for f in found], axis=0, ddof=1)
     stated = np.mean([f.std for f in found], axis=0)
-    np.testing.assert_allclose(stated, scatter, rtol=1.8 / np.sqrt(n))  # 9 % of 400 draws: 3.5 % spread of a deviation
+    # 9 % of 400 draws, whose deviation has a spread of 3.5 %
+    np.testing.assert_allclose(stated, scatter, rtol=1.8 / np.sqrt(n))
 
 
 @given(st.integers(0, 100_000), st.integers(1, 4), st.integers(0, 2))
