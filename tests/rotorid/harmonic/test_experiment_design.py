@@ -5,9 +5,9 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 import pytest
-from repetitions import FULL
 from cases import each_of
 from harmonic_cases import STATED, simulate, task51, two_masses
+from repetitions import FULL
 
 from rotorid.harmonic.experiment_design import design
 from rotorid.harmonic.experiments import AmplitudeErrors
