@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from balancing_data import complex_normal
-from repetitions import FULL, highest_share, lowest_share, repetitions
+from repetitions import FULL, highest_share, lowest_share
 from scipy.special import chdtri
 
 from balancing import UndeterminedError, estimate_influence
@@ -37,7 +37,7 @@ def example():
 @pytest.fixture(scope="module")
 def good(example):
     """Jobs whose errors are stated correctly or estimated, of every source and kind."""
-    each = -(-repetitions(2000) // 20)
+    each = 100 if FULL else 10
     return [one for s in example.SOURCES[:4] for k in example.KINDS for one in example.simulate(each, s, k)]
 
 
