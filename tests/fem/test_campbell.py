@@ -1,9 +1,11 @@
 import dataclasses
+import functools
 from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+import repetitions
 from exact_solutions import whirl_exactly
 from fem_rotors import rotor23
 from hypothesis import given, settings
@@ -32,7 +34,7 @@ def overhung():
     )
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8 if repetitions.FULL else 5, deadline=None)
 @given(whirling_rotors())
 def test_every_speed_is_as_alone(rotor):
     speeds = np.linspace(0.0, 900.0, 12)
@@ -221,10 +223,19 @@ def test_numbers_do_not_depend_on_the_grid():
         assert other.warnings == first.warnings == ()
 
 
+def growing():
+    return dataclasses.replace(symmetric(), material_damping=np.full(23, 2e-4))
+
+
+@functools.cache
+def campbell_of_a_growing_mode(last):
+    return fem.campbell(growing(), np.linspace(0.0, last, 31), 4)
+
+
 def test_a_mode_that_grows_is_said_from_its_threshold_on():
-    rotor = dataclasses.replace(symmetric(), material_damping=np.full(23, 2e-4))
+    rotor = growing()
     threshold = fem.stability_threshold(rotor, 3000.0)
-    found = fem.campbell(rotor, np.linspace(0.0, 3000.0, 31), 4)
+    found = campbell_of_a_growing_mode(3000.0)
     assert found.unstable[0].speed == pytest.approx(threshold.threshold, rel=1e-6)
     assert found.unstable[0].mode == threshold.mode
     assert found.unstable[0].frequency == pytest.approx(threshold.frequency, rel=1e-6)
@@ -243,9 +254,8 @@ def test_a_mode_that_grows_is_said_from_its_threshold_on():
 
 
 def test_a_window_is_hatched_in_the_picture():
-    rotor = dataclasses.replace(symmetric(), material_damping=np.full(23, 2e-4))
     for last, hatched in ((3000.0, True), (50.0, False)):
-        ax = plot(fem.campbell(rotor, np.linspace(0.0, last, 31), 4))
+        ax = plot(campbell_of_a_growing_mode(last))
         assert ("unstable" in {text.get_text() for text in ax.get_legend().get_texts()}) is hatched
         assert any(patch.get_hatch() for patch in ax.patches) is hatched
 

@@ -6,7 +6,7 @@ from repetitions import FULL
 
 import fem
 
-DRAWN = 200 if FULL else 30
+DRAWN = 200 if FULL else 20
 SCAN = 500 if FULL else 150
 HEAVY = 0.9  # damping ratio; beyond, modes come and go
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from repetitions import FULL
 
 import fem
 from fem.parameter_bands import band, nearest_modes, spread
@@ -12,7 +13,7 @@ NAMES = ("bearing[1].kxx", "bearing[2].stiffness.scale", "material.youngs_modulu
 VALUES = np.array([4e7, 1.0, 2.1e11, 60.0])
 RELATIVE = np.array([[0.03, 0, 0, 0], [-0.02, 0.03, 0, 0], [0.01, 0.005, 0.01, 0], [0, 0, 0.01, 0.02]])
 A = RELATIVE * VALUES[:, None]
-DRAWS = 800
+DRAWS = 800 if FULL else 300
 WITHIN = 4 / np.sqrt(2 * DRAWS)  # four standard errors of a standard deviation
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from balancing_data import complex_normal
-from repetitions import highest_share, lowest_share, repetitions
+from repetitions import FULL, highest_share, lowest_share
 from scipy.special import chdtri
 
 from balancing import UndeterminedError, estimate_influence
@@ -37,7 +37,7 @@ def example():
 @pytest.fixture(scope="module")
 def good(example):
     """Jobs whose errors are stated correctly or estimated, of every source and kind."""
-    each = -(-repetitions(2000) // 20)
+    each = 100 if FULL else 10
     return [one for s in example.SOURCES[:4] for k in example.KINDS for one in example.simulate(each, s, k)]
 
 
@@ -62,7 +62,7 @@ def test_good_jobs_are_seldom_warned(good):
 
 def test_errors_twice_as_large_as_stated(example):
     """Those that a test can see are warned of; regions of others are too small, which the bounds notice."""
-    n = repetitions(500)
+    n = 500 if FULL else 200
     found = example.simulate(n // 3, "stated, spare runs", "independent", told=2.0)
     said = [bool(one.words) for one in found if one.inside is not None and one.redundant >= 8]
     assert np.mean(said) >= lowest_share(len(said), 0.95)
@@ -71,7 +71,7 @@ def test_errors_twice_as_large_as_stated(example):
 
 
 def test_assumed_errors_that_are_not_too_small(example):
-    inside = silent(example.every_kind(repetitions(500), "assumed", lambda _: example.assumed(1.0)))
+    inside = silent(example.every_kind(500 if FULL else 150, "assumed", lambda _: example.assumed(1.0)))
     assert np.mean(inside) >= lowest_share(len(inside), 0.93)
 
 
@@ -80,14 +80,14 @@ def test_errors_in_common_taken_as_independent_are_noticed(example, monkeypatch)
     import balancing.coefficients.run_error_estimate as run_likelihood
 
     monkeypatch.setattr(run_likelihood, "SHARES", (1.0,))
-    n = repetitions(500)
+    n = 500 if FULL else 180
     found = [one for kind in example.KINDS[2:] for one in example.simulate(n // 3, "stated", kind)]
     inside = silent(found)
     assert np.mean(inside) < lowest_share(len(inside), 0.92)
 
 
 def test_the_tables_are_printed(example, capsys):
-    example.main(25)
+    example.main(8)
     text = capsys.readouterr().out
     assert [line[0] for line in text.splitlines() if line[1:3] == ". "] == ["a", "b", "c", "d"]
     assert text.count("all: ") == 10
@@ -99,8 +99,8 @@ def test_the_tables_are_printed(example, capsys):
 def test_a_residual_beyond_the_errors_keeps_the_truth_in_the_region(example):
     """Unbalance outside the planes with 20 % of the vibration, orthogonal to what the planes do."""
     rng = np.random.default_rng(21)
-    inside = []
-    while len(inside) < 200:
+    n, inside = 200 if FULL else 120, []
+    while len(inside) < n:
         job = example.draw(rng, "stated", "independent", (0.02, 0.0))
         try:
             clean = estimate_influence(job.trials)
@@ -117,15 +117,13 @@ def test_a_residual_beyond_the_errors_keeps_the_truth_in_the_region(example):
             found = estimate_influence(replace(job.trials, readings=readings))
         except UndeterminedError:
             continue
-        n = found.covariance.shape[-1]
-        fit = effective_variance(
-            found.W.reshape(W.shape), found.baseline.ravel(), found.covariance.reshape(-1, n, n)
-        )
+        channels = found.covariance.reshape(-1, *found.covariance.shape[-2:])
+        fit = effective_variance(found.W.reshape(W.shape), found.baseline.ravel(), channels)
         d = stretch(fit.weights - job.D)
         inside.append(
             d @ np.linalg.solve(fit.covariance * fit.inflation**2, d) < chdtri(2 * len(job.D), 0.05)
         )
-    assert np.mean(inside) >= lowest_share(200, 0.93), np.mean(inside)
+    assert np.mean(inside) >= lowest_share(n, 0.93), np.mean(inside)
 
 
 def name(line):

@@ -4,11 +4,12 @@ import numpy as np
 from balancing_data import GRAM, complex_normal, job, synthetic
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from repetitions import FULL
 
 from balancing import ReadingErrors, correct, estimate_influence
 
 seeds = st.integers(0, 2**32 - 1)
-unhurried = settings(deadline=None)  # a busy machine is no failure
+unhurried = settings(deadline=None, max_examples=100 if FULL else 40)  # a busy machine is no failure
 
 
 @unhurried

@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 from balancing_data import complex_normal, synthetic
+from repetitions import highest_share, lowest_share, repetitions
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
 from balancing.correction.limit_check import judge, judge_unbalance
@@ -137,7 +138,7 @@ def test_region_holds_the_true_residual_in_95_of_100_jobs():
     rng = np.random.default_rng(11)
     made, W, _ = synthetic(rng, errors=ReadingErrors(floor=1.0), sensors=3, speeds=1)
     residual = np.array([1e-3, -2e-3j])
-    inside, jobs = 0, 400
+    inside, jobs = 0, repetitions(400)
     exact = check_run(made, W, residual)
     for _ in range(jobs):
         trials = replace(made, readings=made.readings + 1e-2 * complex_normal(rng, made.readings.shape))
@@ -153,8 +154,7 @@ def test_region_holds_the_true_residual_in_95_of_100_jobs():
         edge = row.region - row.value
         nearest = edge[np.argmin(np.abs(np.angle(edge / away)))]
         inside += abs(nearest) >= abs(away)
-    # binomial, 400 × 0.95: 380 ± 4.4
-    assert 363 <= inside <= 395
+    assert lowest_share(jobs, 0.95) <= inside / jobs <= highest_share(jobs, 0.95)
 
 
 def test_readings_against_limits(job):

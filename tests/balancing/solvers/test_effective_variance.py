@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from repetitions import FULL
 from scipy.optimize import least_squares as optimise
 from scipy.optimize import minimize
 
@@ -226,21 +227,21 @@ def test_the_further_error_explains_what_is_left(outside, of_reading):
 
 
 def test_the_covariance_against_the_scatter_of_simulated_jobs():
-    """Standard deviations within 6 % (statistical: 2.2 %) of 1000 jobs; the errors of W matter."""
+    """Standard deviations within 9 % (statistical: 3.5 %) of 400 jobs; the errors of W matter."""
     W, _, C, D = problem(14, N=12)
     C = C * 9
     root, z = np.linalg.cholesky(C), np.column_stack((-W @ D, W))
     rng = np.random.default_rng(15)
-    found, stated = [], []
-    for _ in range(1000):
+    n, found, stated = 1000 if FULL else 400, [], []
+    for _ in range(n):
         e = (root @ rng.standard_normal((12, 6, 1)))[..., 0]
         drawn = z + e[:, ::2] + 1j * e[:, 1::2]
         fit = effective_variance(drawn[:, 1:], drawn[:, 0], C, explained=lambda D: True)
         found.append(stretch(fit.weights))
         stated.append(np.diag(fit.covariance))
-    np.testing.assert_allclose(np.std(found, axis=0), np.sqrt(np.mean(stated, axis=0)), rtol=0.06)
+    np.testing.assert_allclose(np.std(found, axis=0), np.sqrt(np.mean(stated, axis=0)), rtol=1.9 / np.sqrt(n))
     # not attenuated: within four standard errors of the truth
-    assert (np.abs(np.mean(found, axis=0) - stretch(D)) < 4 * np.std(found, axis=0) / np.sqrt(1000)).all()
+    assert (np.abs(np.mean(found, axis=0) - stretch(D)) < 4 * np.std(found, axis=0) / np.sqrt(n)).all()
 
 
 @pytest.mark.parametrize("start", [None, [1.0]])

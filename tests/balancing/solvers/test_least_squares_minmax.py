@@ -3,8 +3,9 @@
 import minmax_problems
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from repetitions import FULL
 
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.data.limits import Limits
@@ -222,6 +223,7 @@ def test_limits_that_conflict_are_named_with_the_least_relaxation(method):
     )
 
 
+@settings(max_examples=100 if FULL else 40)
 @given(seeds, st.booleans(), st.booleans())
 def test_the_least_relaxation_works_and_less_does_not(seed, forbid, weights_limited):
     rng, W, Y = numbers(seed, 7, 2)
@@ -250,6 +252,7 @@ def test_the_least_relaxation_works_and_less_does_not(seed, forbid, weights_limi
         solve(W, Y, limits=limits(7, 2, max_weight=heavy, residual=kept))
 
 
+@settings(max_examples=100 if FULL else 40)
 @given(seeds)
 def test_the_least_factor_of_the_weights(seed):
     _, W, Y = numbers(seed, 7, 2)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from repetitions import FULL
 
 from balancing import ReadingErrors, UndeterminedError
 from balancing.data.reading_errors import reading_covariance
@@ -129,7 +130,7 @@ def test_the_jacobian_against_finite_differences(kind, N, P):
 
 @pytest.mark.parametrize("kind", ["ridge", "truncated"])
 def test_the_covariance_against_simulated_jobs(kind):
-    """Standard deviations within 4 % of 3000 drawn jobs (statistical: 1.3 %), in planes that act alike."""
+    """Standard deviations within 7 % of 1000 drawn jobs (statistical: 2.2 %), in planes that act alike."""
     rng = np.random.default_rng(6)
     W = alike(rng, noise=0.05)
     Y = complex_normal(rng, 12)
@@ -144,13 +145,14 @@ def test_the_covariance_against_simulated_jobs(kind):
         return ridge(W, Y, 0.1, **more) if kind == "ridge" else truncated(W, Y, 2, **more)
 
     found = solve(W, Y, channels=channels)
-    draws = []
-    for _ in range(3000):
+    n, draws = 3000 if FULL else 1000, []
+    for _ in range(n):
         drawn = size * (1 + 0.01 * complex_normal(rng, size.shape))
         draws.append(stretch(solve(drawn[:, 1:], drawn[:, 0]).weights))
-    np.testing.assert_allclose(np.std(draws, axis=0), np.sqrt(np.diag(found.covariance)), rtol=0.04)
+    stated = np.sqrt(np.diag(found.covariance))
+    np.testing.assert_allclose(np.std(draws, axis=0), stated, rtol=2.2 / np.sqrt(n))
     largest = np.diag(found.covariance).max()
-    np.testing.assert_allclose(np.cov(np.transpose(draws)), found.covariance, atol=0.06 * largest)
+    np.testing.assert_allclose(np.cov(np.transpose(draws)), found.covariance, atol=3.3 / np.sqrt(n) * largest)
 
 
 def test_unknown_errors_give_no_covariance_and_wrong_ones_are_refused():

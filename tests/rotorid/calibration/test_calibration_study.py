@@ -26,12 +26,26 @@ def example():
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
+    if not FULL:
+        module.calibrate = searched_once(module.calibrate)
     yield module
     del sys.modules[spec.name]
 
 
-def simulated(example, case, each=EACH):
-    return [one for name in example.MACHINES for one in example.simulate(each, SEED, name, case)]
+def searched_once(calibrate):
+    """Where one start does not explain the readings, more are made by `make test-full` alone."""
+    last = []
+
+    def found(*given, starts=None, **options):
+        if starts is not None:
+            last[:] = [calibrate(*given, starts=starts, **options)]
+        return last[0]
+
+    return found
+
+
+def simulated(example, case, each=EACH, names=None):
+    return [one for name in names or example.MACHINES for one in example.simulate(each, SEED, name, case)]
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +55,7 @@ def four(example):
 
 @pytest.fixture(scope="module")
 def single(example):
-    return simulated(example, "one speed")
+    return simulated(example, "one speed", EACH if FULL else 2)
 
 
 @pytest.fixture(scope="module")
@@ -87,13 +101,13 @@ def test_numbers_wrongly_taken_as_exact(exact):
 
 def test_a_third_bearing_is_recognised(example):
     found = simulated(example, "third bearing", max(EACH // 3, 1))
-    assert np.mean([one.told for one in found]) >= lowest_share(len(found), 0.95)
+    assert np.mean([one.told for one in found]) >= max(lowest_share(len(found), 0.95), 0.6)  # two of three
 
 
 def test_errors_between_runs_that_nobody_states_are_noticed(example, monkeypatch):
     whole = example.trials
     monkeypatch.setattr(example, "trials", lambda *given: replace(whole(*given), run_errors=None))
-    found = simulated(example, "four speeds")
+    found = simulated(example, "four speeds", names=None if FULL else ["compressor"])
     n = sum(len(one.numbers) for one in found)
     off = sum(one.joint for one in found) / n > 1 + DEVIATIONS * np.sqrt(2 / n)
     assert off or np.mean([one.told for one in found]) > highest_share(len(found), 0.01)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from cases import each_of
 from harmonic_cases import STATED, simulate, task51, two_masses
+from repetitions import FULL
 
 from rotorid.harmonic.experiment_design import design
 from rotorid.harmonic.experiments import AmplitudeErrors
@@ -77,13 +78,13 @@ def test_expected_deviations_are_those_of_independent_derivatives():
 def test_expected_deviations_are_those_of_repetitions():
     model, truth, w, inputs = task51()
     found = design(model, {"c": 1000.0, "b": 10.0}, w, 3, errors=STATED, inputs=inputs)
-    rng = np.random.default_rng(2)
+    rng, n = np.random.default_rng(2), 300 if FULL else 150
     values = [
         output_error(model, simulate(model, truth, w, inputs, STATED, rng, stated=STATED), truth).fit.values
-        for _ in range(300)
+        for _ in range(n)
     ]
-    # 300 repetitions know a standard deviation to 4 %
-    np.testing.assert_allclose(found.std_all, np.std(values, axis=0), rtol=0.09)
+    # 300 repetitions know a standard deviation to 4 %: 9 % of those, 12.7 % of 150
+    np.testing.assert_allclose(found.std_all, np.std(values, axis=0), rtol=1.56 / np.sqrt(n))
 
 
 def test_a_resonance_tells_the_damping():

@@ -13,7 +13,7 @@ Q = np.concatenate((OMEGA, ZETA))
 SWEEPS = [(30.0, 5.0), (230.0, -8.0)]
 
 
-def integrated(angle, speed, rate, time):
+def integrated(angle, speed, rate, time, rtol=1e-11):
     """Vectors (n, 2), from steady motion as far as the first order of the rate, by DOP853."""
 
     def slope(t, y):
@@ -27,7 +27,7 @@ def integrated(angle, speed, rate, time):
     root = s - s.conj()
     z0, v0 = (z1 - z2) / root, (s * z1 - s.conj() * z2) / root
     start = np.concatenate((OMEGA**2 * z0, OMEGA**2 * v0))
-    found = solve_ivp(slope, (0, time[-1]), start, method="DOP853", rtol=1e-12, atol=1e-10, t_eval=time)
+    found = solve_ivp(slope, (0, time[-1]), start, method="DOP853", rtol=rtol, atol=100 * rtol, t_eval=time)
     return found.y[:2].T * np.exp(-1j * angle(time))[:, None]
 
 
@@ -37,7 +37,7 @@ def off(found, exact):
 
 @pytest.mark.parametrize(("first", "rate"), SWEEPS)
 def test_constant_acceleration_as_dop853_has_it(first, rate):
-    time = np.sort(np.random.default_rng(1).uniform(0, 24, 150))
+    time = np.sort(np.random.default_rng(1).uniform(0, 24, 60))
     time[0] = 0.0
     exact = integrated(
         lambda t: first * t + rate * t**2 / 2, lambda t: first + rate * t, lambda t: rate, time
@@ -55,6 +55,7 @@ def test_an_acceleration_that_changes():
         lambda t: 250 * np.exp(-t / 20),
         lambda t: -12.5 * np.exp(-t / 20),
         time,
+        rtol=1e-8,
     )
     assert off(swept_answers(time, speed).basis(Q)[0][:, :2], exact).max() < 1e-4
 

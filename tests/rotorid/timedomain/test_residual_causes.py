@@ -129,8 +129,10 @@ def test_what_known_initial_values_fix_is_no_degree_of_freedom(method, tmp_path)
 
 @pytest.mark.parametrize("method", names(METHODS))
 def test_what_did_not_converge_has_no_intervals_and_says_nothing_of_what_is_determined(method):
+    """From 3 and −4 the states grow beyond all bounds, which takes the integration its 90,000 steps."""
+    start = {"a": 3.0, "b": -4.0} if FULL else {"a": 2.0, "b": -0.5}
     found = fit(
-        ode_model({"x": "-a*x**2 + sin(b*x)"}, initial={"x": 1.0}, estimate={"a": 3.0, "b": -4.0}),
+        ode_model({"x": "-a*x**2 + sin(b*x)"}, initial={"x": 1.0}, estimate=start),
         Record(T[::10], {"x": np.exp(-T[::10])}, sigma={"x": 0.01}),
         method=method,
         max_iterations=1,

@@ -4,6 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from repetitions import FULL
 
 from rotorid.samples import sample_data
 from rotorid.timedomain import Record, ode_model
@@ -42,17 +43,17 @@ def test_the_choice_is_the_best_of_all(n):
 
 
 def test_repeated_fits_scatter_as_expected():
-    model, rng = decay(), np.random.default_rng(2)
+    model, rng, n = decay(), np.random.default_rng(2), 400 if FULL else 200
     found = design_times(model, TRUTH, T, 5, sigma={"x": 0.02})
     t = np.append(0.0, found.where[found.where > 0])  # the initial value belongs to the first time
     x = np.where(np.isin(t, found.where), closed(t, *TRUTH), np.nan)
     start = dict(zip(model.parameters, TRUTH, strict=True))
     runs = [
         fit(model, Record(t, {"x": x + 0.02 * rng.standard_normal(len(t))}, sigma={"x": 0.02}), start=start)
-        for _ in range(400)
+        for _ in range(n)
     ]
     ratio = np.std([run.values for run in runs], axis=0) / found.std
-    assert (np.abs(ratio - 1) < 4 / np.sqrt(2 * 400)).all(), ratio
+    assert (np.abs(ratio - 1) < 4 / np.sqrt(2 * n)).all(), ratio
     assert runs[0].std == pytest.approx(found.std, rel=0.1)
 
 

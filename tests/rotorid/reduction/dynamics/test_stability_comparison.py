@@ -9,6 +9,7 @@ import pytest
 from fem_rotors import ROOT, rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from repetitions import FULL
 from whirl_rotors import machine, whirling_rotors
 
 import fem
@@ -368,7 +369,7 @@ def test_full_threshold_is_checked(monkeypatch):
         assert any(words in text for text in compare_stability(small, 900.0).warnings)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60 if FULL else 25, deadline=None)
 @given(rotor=whirling_rotors(elements=(4, 12)), seed=st.integers(0, 2**32 - 1))
 def test_thresholds_of_random_rotors(rotor, seed):
     """Gyroscopic, cross-coupled, tabulated, on pedestals: the state space's eigenvalues say the same."""
