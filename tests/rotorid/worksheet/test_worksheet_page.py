@@ -152,33 +152,34 @@ def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
 
 def test_two_windows_on_one_job_lose_nothing(shared, windows):
     one, other = windows
-    served = shared()
-    turbo = served.job.parent
+    served = shared(sample="bk_two_plane")
+    folder = served.job.parent
+    first, second = (f'[data-cell="runs|initial|3000|{k}|phase_deg"]' for k in (1, 2))
     for window in windows:
         window.open(served.address)
-    one.type(FIRST, "90")
-    other.type(SECOND, "91")
+    one.type(first, "90")
+    other.type(second, "91")
     one.leave()
-    other.wait(lambda: other.text(FIRST) == "90", "the cell of the other window", PUSHED)
-    assert other.text(SECOND) == "91"  # not finished, and kept
-    assert phases(turbo)[:2] == ["90", "92"]
+    other.wait(lambda: other.text(first) == "90", "the cell of the other window", PUSHED)
+    assert other.text(second) == "91"  # not finished, and kept
+    assert phases(folder)[:2] == ["90", "296"]
     other.press("5", TAB)
-    one.wait(lambda: one.text(SECOND) == "915", "the cell of the other window", PUSHED)
-    assert phases(turbo)[:2] == ["90", "915"]
+    one.wait(lambda: one.text(second) == "915", "the cell of the other window", PUSHED)
+    assert phases(folder)[:2] == ["90", "915"]
 
-    one.type(FIRST, "50")
-    other.type(FIRST, "60")
+    one.type(first, "50")
+    other.type(first, "60")
     other.leave()
     other.saved()
-    assert one.text(FIRST) == "50"
+    assert one.text(first) == "50"
     one.leave()
-    asked = f'[data-write="{FIRST.split(chr(34))[1]}"]'
+    asked = f'[data-write="{first.split(chr(34))[1]}"]'
     one.wait(lambda: "50" in "".join(one.texts(asked)), "the page asks")
     assert "60" in one.text(asked.replace("write", "keep"))
-    assert phases(turbo)[0] == "60"
+    assert phases(folder)[0] == "60"
     one.push(asked)
-    other.wait(lambda: other.text(FIRST) == "50", "the answer of the other window", PUSHED)
-    assert phases(turbo)[0] == "50"
+    other.wait(lambda: other.text(first) == "50", "the answer of the other window", PUSHED)
+    assert phases(folder)[0] == "50"
     assert one.texts("[data-write]") == []
 
 
