@@ -129,8 +129,9 @@ class SharedJobs:
             self._running[sample, name] = served, _shown(served.settled())
         served, fresh = self._running[sample, name]
         if _put_back(served.job.parent, sample_data() / sample):
-            state = served.state()
+            state, until = served.state(), time.monotonic() + 60
             while _shown(state) != fresh:
+                assert time.monotonic() < until, "the files are put back, and the worksheet does not notice"
                 state = served.state(state["version"])
         served.settled()
         return served
@@ -153,10 +154,12 @@ def _put_back(folder, sample):
     What the sample has not is removed first: a worksheet that has read all of the sample misses nothing then.
     """
     given = {path.name: path.read_bytes() for path in sample.iterdir() if path.is_file()}
-    others = [path for path in folder.iterdir() if path.name not in given]
+    kept = {path for path in folder.iterdir() if path.is_file() and not path.is_symlink()}
+    others = [path for path in folder.iterdir() if path not in kept or path.name not in given]
     for path in others:
-        path.unlink()
-    changed = [name for name, data in given.items() if (folder / name).read_bytes() != data]
+        path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+    kept -= {*others}
+    changed = [n for n, data in given.items() if folder / n not in kept or (folder / n).read_bytes() != data]
     for name in changed:
         (folder / name).write_bytes(given[name])
     return bool(others or changed)
