@@ -58,9 +58,10 @@ class Window:
 
     def press(self, *keys):
         """Keys, one after the other."""
+        actions = self.actions()
         for key in keys:
-            self.actions().send_keys(key).perform()
-            time.sleep(self.stroke)
+            actions.send_keys(key).pause(self.stroke)
+        actions.perform()
 
     def hold(self, modifier, key):
         """A key together with a modifier."""

@@ -6,6 +6,7 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from repetitions import FULL
 from workbook_jobs import SAMPLES
 
 from rotorid.samples import sample_data
@@ -41,6 +42,8 @@ def test_a_workbook_gives_the_same_result(cli, tmp_path, sample, options):
     first = cli("balance", job, *options, "--output", sheet, "--json")
     again = options if not options or options[0] not in ONCE else ()
     assert answer(cli("balance", sheet, *again, "--json")) == answer(first)
+    if options and not FULL:
+        return  # a workbook of a workbook: those without options
     second = tmp_path / "second.xlsx"
     assert answer(cli("balance", sheet, *again, "--output", second, "--json")) == answer(first)
     assert answer(cli("balance", second, *again, "--json")) == answer(first)

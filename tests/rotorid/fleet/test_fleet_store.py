@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from repetitions import FULL
 
 from rotorid.samples import sample_data
 from rotorid.tables.fleet.fleet_store import FleetStore
@@ -173,7 +174,7 @@ def test_other_jobs_at_the_same_place_of_two_trees_are_named(tree):
 
 
 def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
-    for renamed in (0, 3, 5):
+    for renamed in (0, 3, 5) if FULL else (3,):
         done = subprocess.run([sys.executable, "-c", PROGRAM, str(renamed), "tree"], check=False)
         assert done.returncode == 9
         assert len(list((tree.parent / "F").rglob("*.parquet"))) == renamed

@@ -140,6 +140,7 @@ def test_a_check_run_refines(fleet, tmp_path):
     assert refined.result.mounted[0] == "check 0"
 
 
+@pytest.mark.usefixtures("cli")  # with which weights are drawn 100 times, not 400
 @pytest.mark.parametrize("runs", [1, 3])
 def test_a_check_run_that_does_not_say_its_weights_has_those_within_the_limits(fleet, tmp_path, runs):
     machine = Machine(np.random.default_rng(30))
@@ -240,6 +241,7 @@ def test_machines_of_the_type_are_seldom_called_others(fleet, tmp_path):
     assert said <= 1
 
 
+@pytest.mark.usefixtures("cli")
 def test_limits_and_planes_of_a_job_without_weights_hold(fleet, tmp_path):
     machine = Machine(np.random.default_rng(26))
     job = machine.job(tmp_path / "limited", runs=1, more="[planes.L]\nmax_mass_g = 1\n[planes.R]\n")

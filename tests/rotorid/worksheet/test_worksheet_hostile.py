@@ -18,14 +18,6 @@ def copy(tmp_path, sample="turbo_job"):
     return shutil.copytree(sample_data() / sample, tmp_path / sample)
 
 
-def noticed(served, version):
-    """The state, settled, after a change from outside."""
-    state = served.state(version)
-    while not state["notice"]:
-        state = served.state(state["version"])
-    return served.settled()
-
-
 def corrections(state):
     return state["results"]["answer"]["document"]["corrections"]
 
@@ -70,37 +62,38 @@ def test_another_folder_of_the_same_name_is_computed_anew(tmp_path, serve):
 
 
 @pytest.mark.parametrize("kind", ["loop", "folder", "outside"])
-def test_a_table_that_cannot_be_read_any_more_leaves_no_old_answer(tmp_path, serve, kind):
-    folder = copy(tmp_path)
+def test_a_table_that_cannot_be_read_any_more_leaves_no_old_answer(tmp_path, shared, kind):
+    served = shared()
+    folder = served.job.parent
     runs, text = folder / "runs.csv", (folder / "runs.csv").read_text()
     (tmp_path / "outside.csv").write_text(text.replace("3.36,89", "3.36,95"))
-    served = serve(folder / "job.toml")
     state = served.settled()
     runs.unlink()
     if kind == "folder":
         runs.mkdir()
     else:
         runs.symlink_to(runs if kind == "loop" else tmp_path / "outside.csv")
-    now = noticed(served, state["version"])
+    now = served.noticed(state["version"])
     assert (now["results"]["answer"], now["results"]["runs"]) == (None, None)
     assert len(now["results"]["problems"]) == 1
     assert now["tables"]["runs"]["read_only"]
     (runs.rmdir if kind == "folder" else runs.unlink)()
     runs.write_text(text)
-    assert corrections(noticed(served, now["version"])) == corrections(state)
+    assert corrections(served.noticed(now["version"])) == corrections(state)
 
 
 @pytest.mark.parametrize("text", ['runs = "a\\u0000b"', "x = " + "[" * 3000 + "]" * 3000, "runs = "])
-def test_a_job_broken_by_hand_and_mended(tmp_path, serve, text):
-    job = copy(tmp_path) / "job.toml"
-    served, good = serve(job), job.read_text()
+def test_a_job_broken_by_hand_and_mended(shared, text):
+    served = shared()
+    job = served.job
+    good = job.read_text()
     state = served.settled()
     job.write_text(text)
-    broken = noticed(served, state["version"])
+    broken = served.noticed(state["version"])
     assert broken["results"]["answer"] is None
     assert broken["results"]["problems"]
     job.write_text(good)
-    assert corrections(noticed(served, broken["version"])) == corrections(state)
+    assert corrections(served.noticed(broken["version"])) == corrections(state)
 
 
 def test_a_rotor_file_names_nothing_outside_and_its_tables_are_watched(tmp_path, serve):
@@ -121,18 +114,18 @@ def test_a_rotor_file_names_nothing_outside_and_its_tables_are_watched(tmp_path,
     assert state["results"]["answer"] is None
     assert "outside the folder" in str(state["results"]["problems"])
     (folder / "rotor.toml").write_text(rotor)
-    state = noticed(served, state["version"])
+    state = served.noticed(state["version"])
     shaft = folder / "shaft.csv"
     lines = shaft.read_text().splitlines(keepends=True)
     shaft.write_text("".join(lines[:-1]))
-    now = noticed(served, state["version"])
+    now = served.noticed(state["version"])
     assert now["notice"] == "shaft.csv was changed by another program"
     assert now["results"] != state["results"]
 
 
 @pytest.mark.parametrize("body", ["[" * 100_000, '{"edits": null}', "{", '{"edits":[{"key":[],"new":1}]}'])
-def test_a_body_of_any_form_is_refused_with_one_sentence(tmp_path, serve, body, monkeypatch):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_a_body_of_any_form_is_refused_with_one_sentence(shared, body, monkeypatch):
+    served = shared()
     monkeypatch.setattr("worksheet.served.json.dumps", lambda sent: sent)
     status, answer = served.ask("/edit", body)
     assert status == 400

@@ -1,6 +1,5 @@
 """The worksheet over HTTP: who may use it, its numbers, two windows, edits that survive, long work."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -8,6 +7,7 @@ import threading
 import time
 
 import pytest
+from worksheet.served import command
 
 from rotorid.samples import sample_data
 
@@ -18,19 +18,8 @@ def copy(tmp_path, sample="turbo_job"):
     return folder
 
 
-def command(job, *options):
-    """The document of `rotorid balance --json`, without what each run has of its own."""
-    done = subprocess.run(
-        [sys.executable, "-m", "rotorid", "balance", job.name, "--json", *options],
-        cwd=job.parent,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return plain(json.loads(done.stdout))
-
-
 def plain(document):
+    """Without what each run has of its own."""
     document["provenance"].pop("date")
     return document
 
@@ -43,21 +32,21 @@ def plain(document):
         ("checked.toml", {"answer": (), "trim": ("--refine",)}),
     ],
 )
-def test_every_number_is_that_of_the_command(tmp_path, serve, name, kinds):
-    job = copy(tmp_path) / name
-    results = serve(job).settled()["results"]
+def test_every_number_is_that_of_the_command(shared, name, kinds):
+    served = shared(name)
+    results = served.settled()["results"]
     for kind, options in kinds.items():
-        document, expected = plain(results[kind]["document"]), command(job, *options)
+        document, expected = plain(results[kind]["document"]), plain(command(served.job, *options))
         for one in (document, expected):
             one["provenance"].pop("options")
             one.get("mounting", {}).pop("seconds", None)
         assert document == expected
 
 
-def test_an_edit_changes_one_line_and_every_number_follows(tmp_path, serve):
-    job = copy(tmp_path) / "job.toml"
+def test_an_edit_changes_one_line_and_every_number_follows(shared):
+    served = shared()
+    job = served.job
     before = (job.parent / "runs.csv").read_text()
-    served = serve(job)
     state = served.settled()
     row = state["tables"]["runs"]["rows"][0]
     edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": "89", "new": "95"}
@@ -69,7 +58,7 @@ def test_an_edit_changes_one_line_and_every_number_follows(tmp_path, serve):
     ]
     assert changed == [1]
     found = served.settled()["results"]["answer"]["document"]
-    assert plain(found)["corrections"] == command(job)["corrections"]
+    assert found["corrections"] == command(job)["corrections"]
     assert found["corrections"] != state["results"]["answer"]["document"]["corrections"]
     assert served.ask("/undo", {})[0] == 200
     assert (job.parent / "runs.csv").read_text() == before
@@ -77,8 +66,8 @@ def test_an_edit_changes_one_line_and_every_number_follows(tmp_path, serve):
     assert (job.parent / "runs.csv").read_text() == after
 
 
-def test_who_has_no_token_or_comes_from_elsewhere_is_refused(tmp_path, serve):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
+    served = shared()
     strangers = [
         {"X_Rotorid_Token": None},
         {"X_Rotorid_Token": "another"},
@@ -94,8 +83,8 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(tmp_path, serve):
         assert served.ask(path, body, Origin=f"http://127.0.0.1:{served.port}")[0] == 200
 
 
-def test_the_page_alone_needs_no_token_and_says_nothing_of_the_job(tmp_path, serve):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_the_page_alone_needs_no_token_and_says_nothing_of_the_job(shared):
+    served = shared()
     for path in ("/", "/worksheet.js", "/worksheet.css"):
         status, text = served.ask(path, X_Rotorid_Token=None)
         assert status == 200
@@ -103,8 +92,8 @@ def test_the_page_alone_needs_no_token_and_says_nothing_of_the_job(tmp_path, ser
         assert "turbo_job" not in text
 
 
-def test_what_a_page_should_not_ask_for_is_one_sentence(tmp_path, serve):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_what_a_page_should_not_ask_for_is_one_sentence(shared):
+    served = shared()
     served.settled()
     asked = [
         ("/edit", {"edits": [{"table": "runs", "row": "no such", "column": "run", "old": "", "new": "x"}]}),
@@ -135,8 +124,8 @@ def test_nothing_outside_the_folder_is_read(tmp_path, serve):
     assert "outside the folder" in problem["text"]
 
 
-def test_two_windows_see_each_other_and_lose_nothing(tmp_path, serve):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_two_windows_see_each_other_and_lose_nothing(shared):
+    served = shared()
     state = served.settled()
     first, second = (row["id"] for row in state["tables"]["runs"]["rows"][:2])
     seen = []
@@ -185,17 +174,16 @@ def test_kill_loses_no_finished_cell(tmp_path, serve):
     assert again["results"]["answer"] is not None
 
 
-def test_changes_from_outside_are_noticed(tmp_path, serve):
-    job = copy(tmp_path) / "job.toml"
-    served = serve(job)
+def test_changes_from_outside_are_noticed(shared):
+    served = shared()
+    job = served.job
     state = served.settled()
     runs = job.parent / "runs.csv"
     runs.write_text(runs.read_text().replace("3.36,89", "3.36,95"))
-    while not state["notice"]:
-        state = served.state(state["version"])
+    state = served.noticed(state["version"])
     assert "runs.csv was changed by another program" in state["notice"]
     assert state["tables"]["runs"]["rows"][0]["cells"][-1] == "95"
-    found = served.settled()["results"]["answer"]["document"]
+    found = state["results"]["answer"]["document"]
     assert found["corrections"] == command(job)["corrections"]
 
 
@@ -222,12 +210,11 @@ def test_long_work_runs_aside_and_is_given_up_when_the_input_changes(tmp_path, s
     assert found["corrections"] == command(job)["corrections"]
 
 
-def test_a_file_of_an_instrument_is_taken_over(tmp_path, serve):
+def test_a_file_of_an_instrument_is_taken_over(shared):
     import base64
 
-    folder = copy(tmp_path, "bk_two_plane")
-    served = serve(folder / "job.toml")
-    served.settled()
+    served = shared(sample="bk_two_plane")
+    folder = served.job.parent
     text = "speed_rpm;sensor;amplitude;phase_deg\n3000;1;7,1;238,5\n3000;2;13,4;296\n"
     data = base64.b64encode(text.encode()).decode()
     status, answer = served.ask("/import", {"name": "third.csv", "data": data, "run": "once more"})
@@ -239,8 +226,8 @@ def test_a_file_of_an_instrument_is_taken_over(tmp_path, serve):
     assert served.settled()["results"]["answer"] is not None
 
 
-def test_what_there_is_to_look_at_and_to_print(tmp_path, serve):
-    served = serve(copy(tmp_path) / "holes.toml")
+def test_what_there_is_to_look_at_and_to_print(shared):
+    served = shared("holes.toml")
     state = served.settled()
     assert set(state["results"]["pictures"]) == {"overview", "discs"}
     for path in ("/picture/overview", "/picture/discs", "/picture/runs?speed=1220&sensor=probe%201"):
@@ -256,8 +243,8 @@ def test_what_there_is_to_look_at_and_to_print(tmp_path, serve):
     assert {one["level"] for one in effects.values()} == {"good"}
 
 
-def test_a_trial_weight_with_and_without_the_coefficients(tmp_path, serve):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_a_trial_weight_with_and_without_the_coefficients(shared):
+    served = shared()
     load = {"rotor_mass": "50kg", "carried_by": 2, "speed": "3000rpm", "radius": "100mm"}
     status, answer = served.ask("/trial", {"options": load})
     assert status == 200, answer
@@ -270,8 +257,8 @@ def test_a_trial_weight_with_and_without_the_coefficients(tmp_path, serve):
     assert (status, answer["picture"][:4]) == (200, "<svg")
 
 
-def test_a_problem_has_its_cell_and_names_the_file_alone(tmp_path, serve):
-    served = serve(copy(tmp_path) / "job.toml")
+def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
+    served = shared()
     row = served.settled()["tables"]["runs"]["rows"][2]
     edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": row["cells"][-1], "new": "915"}
     assert served.edit(edit)[0] == 200
@@ -304,16 +291,16 @@ def test_a_folder_that_is_not_there_yet_becomes_a_job(tmp_path, serve):
 @pytest.mark.parametrize("given", ["no_such/job.toml", "runs.csv", "."])
 def test_what_is_no_job_is_refused_with_one_sentence(tmp_path, given):
     folder = copy(tmp_path)
-    command = [sys.executable, "-m", "rotorid", "worksheet", str(folder / given), "--no-browser"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    words = [sys.executable, "-m", "rotorid", "worksheet", str(folder / given), "--no-browser"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
     code = "import sys; sys.modules['uvicorn'] = None; from rotorid.cli import main; main()"
-    command = [sys.executable, "-c", code, "worksheet", str(tmp_path), "--no-browser"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    words = [sys.executable, "-c", code, "worksheet", str(tmp_path), "--no-browser"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == 'rotorid: the worksheet needs uvicorn: pip install "rotorid[worksheet]"\n'
 
@@ -323,11 +310,7 @@ def test_a_workbook_of_rotorid_is_edited_and_another_is_not(tmp_path, serve):
 
     folder = copy(tmp_path)
     book = folder / "sheet.xlsx"
-    subprocess.run(
-        [sys.executable, "-m", "rotorid", "balance", "job.toml", "--output", "sheet.xlsx"],
-        cwd=folder,
-        check=True,
-    )
+    command(folder / "job.toml", "--output", "sheet.xlsx")
     served = serve(book)
     state = served.settled()
     assert (state["kind"], state["read_only"]) == ("workbook", "")
@@ -351,8 +334,8 @@ def test_a_workbook_of_rotorid_is_edited_and_another_is_not(tmp_path, serve):
 
 
 @pytest.mark.parametrize("name", ["job.toml", "holes.toml"])
-def test_while_a_check_run_is_typed_the_answer_before_it_stays(tmp_path, serve, name):
-    served = serve(copy(tmp_path) / name)
+def test_while_a_check_run_is_typed_the_answer_before_it_stays(shared, name):
+    served = shared(name)
     before = served.settled()["results"]
     header = served.state()["tables"]["runs"]["header"]
     row = {"run": "check", "speed_rpm": "1220", "sensor": "probe 1"}
@@ -378,18 +361,18 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(tmp_path, serve, 
 @pytest.mark.parametrize(
     ("stated", "named", "status"), [("lag", "lag", 200), ("lag", "lead", 400), ("lead", "lag", 400)]
 )
-def test_a_file_whose_phases_are_others_than_the_jobs_is_not_taken_over(
-    tmp_path, serve, stated, named, status
-):
+def test_a_file_whose_phases_are_others_than_the_jobs_is_not_taken_over(shared, stated, named, status):
     import base64
 
-    folder = copy(tmp_path, "bk_two_plane")
-    job = folder / "job.toml"
-    job.write_text(job.read_text().replace('phase = "lead"', f'phase = "{stated}"'))
+    served = shared(sample="bk_two_plane")
+    folder = served.job.parent
+    if stated != "lead":
+        edit = {"key": ["phase"], "old": "lead", "new": stated}
+        assert served.edit(edit)[0] == 200
     before = (folder / "runs.csv").read_text()
     text = f"Speed (rpm);Sensor;Amplitude;Phase {named} (°)\n3000;1;7,1;238\n3000;2;13,4;296\n"
     data = base64.b64encode(text.encode()).decode()
-    found, answer = serve(job).ask("/import", {"name": "third.csv", "data": data, "run": "again"})
+    found, answer = served.ask("/import", {"name": "third.csv", "data": data, "run": "again"})
     assert found == status, answer
     after = (folder / "runs.csv").read_text()
     assert (after == before) == (status == 400)
@@ -397,16 +380,17 @@ def test_a_file_whose_phases_are_others_than_the_jobs_is_not_taken_over(
         assert f"expected phases that {stated}" in answer["error"]
 
 
-def test_a_column_without_which_rows_say_nothing_must_be_in_the_file_wherever_it_stands(tmp_path, serve):
+def test_a_column_without_which_rows_say_nothing_must_be_in_the_file_wherever_it_stands(shared):
     import base64
 
-    folder = copy(tmp_path, "bk_two_plane")
+    served = shared(sample="bk_two_plane")
+    folder, version = served.job.parent, served.state()["version"]
     lines = (folder / "runs.csv").read_text().splitlines()
     repeats = [
         line if line[0] == "#" else ("repeat," if line.startswith("run,") else "1,") + line for line in lines
     ]
     (folder / "runs.csv").write_text("\n".join(repeats) + "\n")
-    served = serve(folder / "job.toml")
+    served.noticed(version)
 
     def take(text):
         data = base64.b64encode(text.encode()).decode()

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from cases import each_of
 from exact_solutions import frequency_response
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from repetitions import FULL
 from timedomain_cases import motion_in
 
 import fem
@@ -412,6 +413,7 @@ def test_chains_and_circles_of_rates(tmp_path, rates):
         np.testing.assert_allclose(predicted(file, name, w), expected[:, i], rtol=1e-11)
 
 
+@settings(max_examples=100 if FULL else 40)
 @given(
     entries=st.lists(st.integers(-3, 3), min_size=27, max_size=27),
     light=st.sets(st.integers(0, 2), max_size=2),

@@ -9,6 +9,9 @@ import time
 import tomllib
 from contextlib import suppress
 from dataclasses import fields
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from cases import each_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
+from repetitions import FULL
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
 from rotorid.base.text import listing
@@ -452,7 +456,8 @@ def test_what_vectors_writes_beside_the_readings_stays(tmp_path, beside):
 
 @each_of("piece", ["9", "9.", "9 ", "a@", " ", "1X", "(", "9/", "9um ", "Phase "])
 def test_long_cells_and_headings_take_no_time(tmp_path, piece):
-    long = piece * (200_000 // len(piece))
+    """A step for each pair of signs would take 20 s."""
+    long = piece * (60_000 // len(piece))
     for text in (WIDE_VECTORS, UNITS_ROW, CELLS_WITH_UNITS):
         for word in ("7,2 @ 238°", "um pp", "Phase", "deg", "13.5", "RPM"):
             start = time.monotonic()
@@ -572,10 +577,11 @@ def test_columns_and_rows_in_any_order(tmp_path, name, data):
     np.testing.assert_array_equal(found.steps[:, :, runs][..., sensors], expected.steps)
 
 
+EXAMPLES = 400 if FULL else 200
 EDITS = "abdgklmprsuxXµ°@<∠/()[]# \"'|_=:;,\t"
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(sorted(READ)), st.integers(0, 10**6), st.sampled_from([*EDITS, ""]), st.booleans())
 def test_an_edit_of_a_word_or_sign_changes_no_number(tmp_path, name, place, sign, insert):
     """One sign that belongs to no number is put in, replaced or taken out: refused, or the same numbers."""
@@ -595,7 +601,13 @@ def test_an_edit_of_a_word_or_sign_changes_no_number(tmp_path, name, place, sign
     np.testing.assert_allclose(np.sort(shown, axis=0), np.sort(written, axis=0), rtol=1e-12)
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@cache
+def undamaged(name):
+    with TemporaryDirectory() as folder:
+        return read(Path(folder), tidy_text(name)).trials
+
+
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.sampled_from(sorted(READ)), st.integers(0, 10**6), st.sampled_from(["twice", "gone", "cut", "swap"])
 )
@@ -610,7 +622,7 @@ def test_a_damaged_line_is_refused_or_says_what_it_said(tmp_path, name, place, d
         lines[at] = lines[at][: place // len(lines) % (len(lines[at]) + 1)]
     else:
         lines[at], lines[at - 1] = lines[at - 1], lines[at]
-    expected = read(tmp_path, tidy_text(name)).trials
+    expected = undamaged(name)
     try:
         found = read(tmp_path, "\n".join(lines) + "\n").trials
     except InputError:
