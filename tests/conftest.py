@@ -71,11 +71,12 @@ SLOW_FIRST = (
     "rotorid/report/test_balance.py",
     "rotorid/harmonic/test_coverage.py",
     "balancing/correction/test_coverage.py",
-    "balancing/correction/test_check.py",
+    "rotorid/calibration/test_calibration_study.py",
+    "rotorid/worksheet/test_worksheet_page.py",
+    "rotorid/worksheet/test_worksheet_server.py",
     "rotorid/report/test_rotor.py",
     "fem/matrices/test_lateral_planes.py",
     "fuzz/test_mutants.py",
-    "balancing/mounting/test_discrete.py",
     "fem/test_campbell.py",
 )
 TESTS = Path(__file__).parent
