@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 import socket
 from collections.abc import Callable
@@ -54,5 +55,7 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
         listening.listen()
         own = f"{HOST}:{listening.getsockname()[1]}"
         app = application(session, token, own, lambda: told(f"http://{own}/#{token}"))
+        # a worker that Ctrl+C finds half started may be reaped by two; the program ends it anyway
+        logging.getLogger("asyncio").setLevel(logging.ERROR)
         config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=1)
         Server(config).run(sockets=[listening])
