@@ -124,7 +124,7 @@ class SharedJobs:
         """The worksheet of a job as it is in the sample, settled."""
         if (sample, name) not in self._running:
             job = self._folder / f"{sample} {name}" / sample / name
-            shutil.copytree(sample_data() / sample, job.parent)
+            shutil.copytree(sample_data() / sample, job.parent, ignore=shutil.ignore_patterns("__pycache__"))
             served = Served(job)
             self._running[sample, name] = served, _shown(served.settled())
         served, fresh = self._running[sample, name]
@@ -157,7 +157,7 @@ def _put_back(folder, sample):
     kept = {path for path in folder.iterdir() if path.is_file() and not path.is_symlink()}
     others = [path for path in folder.iterdir() if path not in kept or path.name not in given]
     for path in others:
-        path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+        shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
     kept -= {*others}
     changed = [n for n, data in given.items() if folder / n not in kept or (folder / n).read_bytes() != data]
     for name in changed:
