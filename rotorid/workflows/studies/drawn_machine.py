@@ -1,11 +1,9 @@
-"""A study of machines: a drawn rotor, read, and balanced until its limit is met; counts of many."""
+"""One sample of a study of machines: a drawn rotor, read, and balanced until its limit is met."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,21 +13,13 @@ from balancing.solvers.error_propagation import region_radius
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import with_parameters
 from fem.response import InfluenceCoefficients, influence
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.plot_style import look, plain
+from rotorid.base.arrays import ComplexArray
 from rotorid.regression import stretch
 from rotorid.tables.study_file import MachineStudy
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.axes import Axes
 
 TRIAL = 0.5
 """By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
 UNSTABLE = "the drawn rotor is unstable, and has no steady response"
-UNDETERMINED = "the readings do not determine a correction"
-EDGES = np.geomspace(1e-3, 1e3, 601)
-"""Of the counted ratios, about 2.3 % wide; 1 is one of them."""
 
 
 def nominal(study: MachineStudy) -> tuple[ComplexArray, tuple[str, ...]]:
@@ -136,33 +126,3 @@ def _holds(found: Correction, D: ComplexArray) -> bool | None:
         return None
     d = stretch(found.weights - D)
     return bool(d @ np.linalg.solve(found.covariance, d) < region_radius(found.dof, d.size) ** 2)
-
-
-def count_machines(parts: Iterable[pd.DataFrame], planes: int, most: int) -> dict[str, Any]:
-    """Fields of `StudiedMachines` for so many planes and corrections; one part after the other is read."""
-    runs = np.array([1, *range(planes + 2, planes + 2 + most)])
-    met, held = np.zeros(most + 1, dtype=np.int64), np.zeros((2, 2), dtype=np.int64)
-    ratios, reasons = np.zeros((2, EDGES.size - 1), dtype=np.int64), Counter[str]()
-    for part in parts:
-        met += (part["runs_needed"].to_numpy()[:, None] <= runs).sum(axis=0)
-        for k, warned in enumerate((False, True)):
-            own = part["held"][part["warned"] == warned]
-            held[k] += (own == True).sum(), own.size  # noqa: E712 - None where there is no region
-        reasons.update(why if why == UNSTABLE else UNDETERMINED for why in part["why"].dropna())
-        read = part.filter(like="ratio_").ffill(axis=1).dropna().clip(EDGES[0], EDGES[-1]).to_numpy()
-        ratios += [np.histogram(read[:, k], EDGES)[0] for k in (0, -1)]
-    return {"met": met, "runs": runs, "held": held, "reasons": dict(reasons), "ratios": ratios}
-
-
-def draw_machines(ax: Axes, shares: FloatArray) -> None:
-    """Machines below a ratio to the limit, from shares between `EDGES`, as built and at last, (2, 600)."""
-    plain(ax)
-    curves = shares if (shares[0] != shares[1]).any() else shares[:1]
-    for k, (share, name) in enumerate(zip(curves, ("as built", "after the last correction"), strict=False)):
-        ax.stairs(100 * np.cumsum(share), EDGES, baseline=None, label=name, **look(k))
-    seen = EDGES[1:][curves.any(axis=0)]
-    ax.axvline(1.0, color="black", linewidth=0.8, label="limit")
-    ax.set(xscale="log", xlim=(min(0.9, *seen) / 1.2, max(1.1, *seen) * 1.2), ylim=(0, 101))
-    ax.set(xlabel="largest reading over its limit", ylabel="machines below, %")
-    ax.xaxis.set_major_formatter("{x:g}")
-    ax.legend(frameon=False)

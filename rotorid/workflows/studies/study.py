@@ -92,7 +92,7 @@ def study(
         parts = read_parts(task, samples, folder)
         common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words, "provenance": told}
         if read.machine is not None:
-            from rotorid.workflows.studies.drawn_machine import count_machines
+            from rotorid.workflows.studies.machine_counts import count_machines
 
             planes, most = len(read.machine.planes), read.machine.corrections
             return StudiedMachines(**common, **count_machines(parts, planes, most))

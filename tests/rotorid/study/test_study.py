@@ -19,7 +19,8 @@ from rotorid.tables.reader.problems import InputError
 from rotorid.tables.study_file import read_study
 from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.workflows.studies import drawn_machine
-from rotorid.workflows.studies.drawn_machine import EDGES, UNDETERMINED, UNSTABLE
+from rotorid.workflows.studies.drawn_machine import UNSTABLE
+from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
