@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact book lint docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -64,6 +64,10 @@ golden: $(VENV)/.dev
 PARENT ?= HEAD~1
 golden-exact: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden exact $(PARENT)
+
+# Printed numbers of the books beside what is computed now: docs/book_numbers.md, after a change of either.
+book: $(VENV)/.dev
+	PYTHONPATH=tests:tests/helpers:. $(BIN)/python -m book
 
 # The newest versions of today: an environment from scratch, without constraints.txt.
 test-latest:

@@ -1,0 +1,5 @@
+"""`python -m book` writes `docs/book_numbers.md`."""
+
+from book.page import write
+
+write()

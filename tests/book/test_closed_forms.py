@@ -1,0 +1,121 @@
+"""Closed forms of what no printed number tells: signs of seals and of damping, several speeds."""
+
+import math
+
+import numpy as np
+import pytest
+from exact_solutions import SOLVERS
+
+import fem
+from balancing import Influence, Labels, correct
+from fem.matrices.lateral_planes import both_planes
+from fem.solvers.full_band import WholeBand
+from rotorid.reduction import equivalent_masses, natural_frequencies
+
+MASS, BETA, SPEED = 20.0, 2e-5, 300.0
+BENDING = 48 * 2.1e11 * math.pi * 0.05**4 / 64
+
+
+def disc_on_supports(stiffness, damping):
+    """A disc amid a massless shaft of 1 m with material damping, on two equal supports."""
+    return fem.Rotor(
+        np.array([0.5, 0.5]),
+        np.array([0.05]),
+        density=np.array(0.0),
+        material_damping=np.array(BETA),
+        discs=[fem.Disc(2, MASS)],
+        supports=[fem.Support(node, stiffness, damping) for node in (1, 3)],
+    )
+
+
+def shaft(s):
+    """Dynamic stiffness in x + iy: material damping turns with the shaft."""
+    return BENDING * (1 + BETA * (s - 1j * SPEED))
+
+
+# a seal on masses
+
+
+K, SEAL = 2e6, 1.5e6
+ALPHA = np.array([[3, 2, 1], [2, 4, 2], [1, 2, 3]]) / (4 * K)
+ROOTS = [(4 * K + SEAL + way * math.sqrt(SEAL**2 + 8 * K**2)) / (2 * MASS) for way in (-1, 1)]
+SQUARES = np.array([ROOTS[0], 2 * K / MASS, ROOTS[1]])
+SHAPES = np.array([[1, 2 - MASS * ROOTS[0] / K, 1], [1, 0, -1], [1, 2 - MASS * ROOTS[1] / K, 1]]).T
+"""Three masses on a string of four springs, the middle one on a seal, too."""
+
+
+def test_masses_by_50_with_a_seal():
+    found = equivalent_masses(ALPHA, np.sqrt(SQUARES[:2]), SHAPES[:, :2], seal_stiffness=[0, SEAL, 0])
+    np.testing.assert_allclose(found.values, MASS, rtol=1e-9)
+
+
+def test_natural_frequencies_and_shapes_with_a_seal():
+    omega, shapes = natural_frequencies(ALPHA, [MASS] * 3, seal_stiffness=[0, SEAL, 0])
+    np.testing.assert_allclose(omega**2, SQUARES, rtol=1e-9)
+    np.testing.assert_allclose(shapes / shapes[0], SHAPES, rtol=1e-9, atol=1e-9)
+
+
+# damping and seals under a turning shaft
+
+
+DIRECT, CROSS, DAMPING, TURNING = 1e6, 3e5, 800.0, 400.0
+
+
+@pytest.mark.parametrize(("cross", "turning"), [(0.0, 0.0), (CROSS, 0.0), (0.0, TURNING), (-CROSS, TURNING)])
+def test_whirl_on_damped_supports_and_seals(cross, turning):
+    """m s² + shaft and supports in series; in x + iy a force q y in x and −q x in y is a stiffness −i q."""
+    support = np.poly1d([2 * (DAMPING - 1j * turning), 2 * (DIRECT - 1j * cross)])
+    own = np.poly1d([BETA, 1 - 1j * BETA * SPEED]) * BENDING
+    s = (np.poly1d([MASS, 0, 0]) * (own + support) + own * support).roots
+    backward, forward = sorted(s[np.argsort(np.abs(s.real))][:2], key=lambda root: root.imag)
+    rotor = disc_on_supports(((DIRECT, cross), (-cross, DIRECT)), ((DAMPING, turning), (-turning, DAMPING)))
+    modes = fem.whirl_modes(rotor, SPEED, 2)
+    found = modes.eigenvalues[np.argsort(modes.direction)]
+    np.testing.assert_allclose(found, [backward.conjugate(), forward], rtol=1e-8)
+
+
+@pytest.mark.parametrize("method", SOLVERS)
+def test_unbalance_response_on_unequal_damped_supports(method):
+    """The backward part of the motion deforms the turning shaft at twice the speed."""
+    kx, ky, cx, cy = 1e6, 3e6, 800.0, 300.0
+    s, turn = 1j * SPEED, np.array([[0, 1], [-1, 0]])
+    own = BENDING * ((1 + BETA * s) * np.eye(2) + BETA * SPEED * turn)
+    support = 2 * np.diag([kx + s * cx, ky + s * cy])
+    total = np.linalg.inv(np.linalg.inv(own) + np.linalg.inv(support))
+    exact = np.linalg.solve(total + MASS * s * s * np.eye(2), SPEED**2 * np.array([1, -1j]))
+    rotor = disc_on_supports(((kx, 0), (0, ky)), ((cx, 0), (0, cy)))
+    response = SOLVERS[method](fem.unbalance_response, rotor, {2: 1.0}, np.array([SPEED]))
+    found = [response.readings([(2, angle)])[0, 0] for angle in (0.0, 90.0)]
+    np.testing.assert_allclose(found, exact, rtol=1e-8)
+
+
+def test_unbalance_response_on_equal_damped_supports():
+    rotor = disc_on_supports(DIRECT, DAMPING)
+    support = 2 * (DIRECT + 1j * SPEED * DAMPING)
+    exact = SPEED**2 / (1 / (1 / shaft(1j * SPEED) + 1 / support) - MASS * SPEED**2)
+    found = fem.unbalance_response(rotor, {2: 1.0}, SPEED).amplitudes[0, 1]
+    np.testing.assert_allclose(found, exact, rtol=1e-8)
+
+
+@pytest.mark.parametrize("planes", [1, 2])
+@pytest.mark.parametrize("value", [-20 + 150j, 5 - 90j])
+def test_the_banded_matrices_at_a_complex_frequency(planes, value):
+    """Material damping and its circulation in the bands: the deflection of the disc under a unit load."""
+    rotor = disc_on_supports(DIRECT, DAMPING)
+    P = both_planes(rotor, complex_coordinate=planes == 1)
+    band = WholeBand(P)
+    disc = P.A.stride
+    load = np.zeros((planes, P.A.size), dtype=complex)
+    load[:, disc] = [1, -1j][:planes]  # of x + iy
+    found = band.planes(band.factor(value, SPEED).solve(band.interleaved(load)))[:, disc]
+    support = 2 * (DIRECT + value * DAMPING)
+    exact = 1 / (MASS * value**2 + 1 / (1 / shaft(value) + 1 / support))
+    np.testing.assert_allclose(found, exact * np.array([1, -1j])[:planes], rtol=1e-8)
+
+
+def test_least_squares_over_two_speeds():
+    """One plane and one sensor: D = −Σ W̄ Y / Σ |W|²."""
+    W, Y = np.array([[[2 + 1j]], [[1 - 3j]]]), np.array([[4 - 1j], [2 + 5j]])
+    exact = -((2 - 1j) * (4 - 1j) + (1 + 3j) * (2 + 5j)) / (5 + 10)
+    influence = Influence(np.array([1.0, 2.0]), ("1",), ("A",), W, labels=Labels())
+    np.testing.assert_allclose(correct(influence, Y, method="least-squares").weights, [exact], rtol=1e-12)
