@@ -1,15 +1,14 @@
-"""`{validation}`, `{benchmarks}`, `{answers}`: tables of what the program computes, made with the pages."""
+"""`{benchmarks}`, `{answers}`: tables of what the program computes, made with the pages."""
 
 from __future__ import annotations
 
 import json
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docutils import nodes
-from pieces import paragraph, section, table
+from pieces import paragraph, table
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
@@ -50,64 +49,10 @@ ANSWERS = (
         "vectors",
         "runup-record",
         "calibrate",
-        "validate",
         "demo-main",
     ),
 )
 """Stored outputs that `{answers}` counts: those of every command on its sample."""
-
-
-class ValidationTable(SphinxDirective):
-    """Every printed number of the references beside what is computed now, as `rotorid validate` has them."""
-
-    def run(self) -> list[nodes.Node]:
-        """One table per source."""
-        from rotorid.validation import validate
-
-        return validation_nodes(validate().to_dict()["rows"])
-
-
-def validation_nodes(rows: Sequence[Mapping[str, Any]]) -> list[nodes.Node]:
-    """Counts, and a section with a table for every source, in the order of the rows."""
-    sources: dict[str, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        sources.setdefault(row["source"], []).append(row)
-    count = Counter(row["status"] for row in rows)
-    wrong = [row for row in rows if row["status"] == "differs"]
-    if wrong:
-        raise ValueError(f"validation: {wrong[0]['source']}, {wrong[0]['quantity']}: {wrong[0]['status']}")
-    head = paragraph(
-        f"{len(rows) - count['given']} numbers can fail: {count['agrees']} agree, {count['erratum']} are "
-        f"misprints, {count['consequence']} follow from these; {count['given']} more are given values."
-    )
-    return [head, *(_source(source, group) for source, group in sources.items())]
-
-
-def _status(row: Mapping[str, Any]) -> str:
-    """With the kind where the status does not tell it."""
-    kind = row.get("kind", "number")
-    return f"{row['status']}, {kind}" if kind in ("bound", "selected") else row["status"]
-
-
-def _source(source: str, rows: Sequence[Mapping[str, Any]]) -> nodes.section:
-    notes = list(dict.fromkeys(row["note"] for row in rows if row["note"]))
-    lines = [
-        (
-            str(row["quantity"]),
-            str(row.get("printed_text", row["printed"])).replace("-", "\N{MINUS SIGN}"),
-            number(row["computed"], 8),
-            number(row["difference"], 2),
-            number(row["tolerance"], 2),
-            _status(row) + (f" ({notes.index(row['note']) + 1})" if row["note"] else ""),
-        )
-        for row in rows
-    ]
-    head = ("quantity", "printed", "computed", "difference", "tolerance", "status")
-    out = section(source, f"validation {source}", table(head, lines))
-    if notes:
-        items = (nodes.list_item("", paragraph(note)) for note in notes)
-        out += nodes.enumerated_list("", *items, enumtype="arabic", prefix="(", suffix=")")
-    return out
 
 
 class BenchmarkTable(SphinxDirective):
@@ -168,7 +113,6 @@ def number(value: float | None, digits: int) -> str:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
-    app.add_directive("validation", ValidationTable)
     app.add_directive("benchmarks", BenchmarkTable)
     app.add_directive("answers", AnswerTable)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -35,7 +35,6 @@ from rotorid.cli.commands import (
     tolerance,
     trial_weight,
     unbalance,
-    validate,
     vectors,
 )
 from rotorid.cli.fleet import fleet
@@ -84,7 +83,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "runup": runup.runup,
         "calibrate": calibrate.calibrate,
     },
-    "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
+    "Samples, and checks": {"demo": demo.demo, "schema": schema.schema},
 }
 for _job, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():
@@ -115,7 +114,7 @@ def _rotorid(
     where they make sense, --table for every table, --verbose for the numbers behind a result (on
     standard error), and --help with examples. `rotorid` alone shows an example of each job.
 
-    Exit status: 0, or 2 for bad input with one message; `validate` ends with 1 where a number differs.
+    Exit status: 0, or 2 for bad input with one message.
     """
     if ctx.invoked_subcommand is None:
         typer.echo(_overview())

@@ -1,6 +1,6 @@
 """What the commands do: one module a command, files or data and options in, a result and its document out.
 
-Nothing here prints; the command line, reports, `validate`, the demo, a notebook and a worksheet call it.
+Nothing here prints; the command line, reports, the demo, a notebook and a worksheet call it.
 """
 
 from rotorid.workflows.balance import Balance, BalanceOptions, balance

@@ -1,1 +1,1 @@
-"""Printed numbers of the three books and of published balancing, beside what is computed now; once, and here."""
+"""Printed numbers of three books and of published balancing, beside what is computed now: once, here."""

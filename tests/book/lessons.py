@@ -1,7 +1,7 @@
 """Coefficients from amplitudes, frequencies and shapes, [S] section 1.8 and tasks 2.3 to 8.2.
 
-Models and data are those of `sample_data/identify`. The direct problems, whose rounded results are the data, are
-computed with the parameters that the book states.
+Models and data are those of `sample_data/identify`. The direct problems, whose rounded results are the
+data, are computed with the parameters that the book states.
 """
 
 import math

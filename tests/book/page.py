@@ -42,8 +42,9 @@ def sentence(every):
     """How many rows have each status."""
     n = Counter(status for *_, status in every)
     return (
-        f"{len(every)} numbers: {n['agrees']} agree, {n['misprint']} are misprinted or damaged, {n['consequence']} "
-        f"follow from a misprint, {n['differs']} differ; {n['given']} are given, {n['not compared']} not compared"
+        f"{len(every)} numbers: {n['agrees']} agree, {n['misprint']} are misprinted or damaged, "
+        f"{n['consequence']} follow from a misprint, {n['differs']} differ; {n['given']} are given, "
+        f"{n['not compared']} not compared"
     )
 
 

@@ -1,11 +1,11 @@
-"""Tables of printed numbers in `tests/data/book`: how far a computed number may be off, and what that makes of it.
+"""Tables of printed numbers in `tests/data/book`, and the rule by which a computed number agrees.
 
-A row has `source` and `quantity`, the number as it is `printed`, and `why` it is taken: `printed` in one of the three
-books; `chosen` because it agrees, where the print is damaged or does not say how; from `elsewhere`. Its `kind` is
-empty, or `bound` (the text says that it is not exceeded), `given` (computed from nothing: it cannot fail) or
-`not compared` (the reason says why). The tolerance is half a unit of the last printed digit unless another is given
-with its reason. A wrong print has its `erratum`, the `corrected` number where it is known, and `follows` names the
-misprint that it follows from.
+A row has `source` and `quantity`, the number as it is `printed`, and `why` it is taken: `printed` in one of
+the three books; `chosen` because it agrees, where the print is damaged or does not say how; from
+`elsewhere`. Its `kind` is empty, or `bound` (the text says that it is not exceeded), `given` (computed from
+nothing: it cannot fail) or `not compared` (the reason says why). The tolerance is half a unit of the last
+printed digit unless another is given with its reason. A wrong print has its `erratum`, the `corrected`
+number where it is known, and `follows` names the misprint that it follows from.
 """
 
 import csv
@@ -55,7 +55,7 @@ class Row:
         return float(self.tolerance) if self.tolerance else half_unit(self.printed)
 
     def status(self, computed):
-        """One of `STATUSES`; an erratum differs, too, where it agrees with the print or not with the correction."""
+        """One of `STATUSES`; an erratum that agrees with the print, or not with the correction, differs."""
         if self.kind == "not compared":
             return self.kind
         if self.kind == "bound":

@@ -1,8 +1,8 @@
 """Balancing examples that others have published: influence coefficients, weights and angles.
 
-The two-plane example of Brüel & Kjær's application note 17-227 and the weights left in of Feese and Grazier are the
-jobs `sample_data/bk_two_plane` and `sample_data/left_in`. The numbers of example 6 of the note, of Feese and Grazier,
-and of Foiles, Allaire and Gunter are those that the public tests of hsbalance quote.
+The two-plane example of Brüel & Kjær's application note 17-227 and the weights left in of Feese and Grazier
+are the jobs `sample_data/bk_two_plane` and `sample_data/left_in`. The numbers of example 6 of the note, of
+Feese and Grazier, and of Foiles, Allaire and Gunter are those that the public tests of hsbalance quote.
 """
 
 import cmath

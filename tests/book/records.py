@@ -1,7 +1,7 @@
 """Parameters from time records: [Q] tables 2.1 to 2.3 with its normal equations, and the three masses of [F].
 
-The tables of [Q] are its record, and the states and parameters of each step of its quasilinearization with the
-integrator "sequential-heun". Of [F] every number is compared whose time is known.
+The tables of [Q] are its record, and the states and parameters of each step of its quasilinearization with
+the integrator "sequential-heun". Of [F] every number is compared whose time is known.
 """
 
 import math
@@ -82,8 +82,8 @@ def _normal_equations(problem, theta, x):
 def _differences(truth):
     """[Q] (2.36): the parameters among the coefficients of the differences of table 2.1, all of them free.
 
-    The print does not say how they were computed. With the states and the input as table 2.1 has them, to four
-    digits, these regressions of the forward differences on both states and the input repeat all three.
+    The print does not say how they were computed. With the states and the input as table 2.1 has them, to
+    four digits, these regressions of the forward differences on both states and the input repeat all three.
     """
     table = np.array([[float(f"{v:.3e}") for v in row] for row in np.column_stack((truth.x, truth.y[:, 2]))])
     on_x1, on_x2, _ = solution(table[:-1], np.diff(table[:, :2], axis=0) / np.diff(truth.t)[:, None])
@@ -91,7 +91,7 @@ def _differences(truth):
 
 
 def three_masses():
-    """The printed record at c1 = 0.14, m1 = 12, m2 = 28, and what fits find from it and from the whole one."""
+    """The printed record at c1 = 0.14, m1 = 12, m2 = 28, and what fits find from it and the whole one."""
     chain = read_ode_model(CHAIN / "model.toml")
     started = read_ode_model(CHAIN / "from_record.toml")
     exact = simulate(chain, (0.14, 12.0, 28.0), TIMES, sensitivities=False)

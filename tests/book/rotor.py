@@ -1,7 +1,8 @@
-"""The rotor of 23 elements, [S] tasks 9.1 and 9.2: critical speeds, shapes, and its equivalent masses, formula (50).
+"""The rotor of 23 elements, [S] tasks 9.1 and 9.2: critical speeds, shapes, equivalent masses (50).
 
-The masses are computed three times: from the inputs as the book prints them; from the rotor's own, with all digits;
-and of these, with one and two modes, once more beside the printed masses, which follow from a misprint.
+The masses are computed three times: from the inputs as the book prints them; from the rotor's own, with all
+digits; and of these, with one and two modes, once more beside the printed masses, which follow from a
+misprint.
 """
 
 from dataclasses import dataclass
@@ -67,7 +68,7 @@ def exact():
 
 
 def speeds_and_shapes():
-    """Euler-Bernoulli elements, consistent masses, no shear, no rotary inertia: the defaults of a rotor table."""
+    """Slender elements, consistent masses, no shear, no rotary inertia: the defaults of a rotor table."""
     rotor = read_rotor(sample_data() / "rotor23.csv")
     modes, fine = fem.critical_speeds(rotor, 3), fem.critical_speeds(refined(rotor, 12), 3)
     names = "critical speed {}, rad/s", "critical speed {}, each element cut into twelve, rad/s"

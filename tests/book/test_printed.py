@@ -1,4 +1,4 @@
-"""Every printed number beside what is computed now, a test a printed table; the rule by which a number agrees."""
+"""Every printed number beside what is computed now, a test a printed table; the rule, and the page."""
 
 import math
 import tomllib

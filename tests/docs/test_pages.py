@@ -16,7 +16,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
-SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "validation.md", DOCS / "fleet.md"]
+SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "fleet.md"]
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 

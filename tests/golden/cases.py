@@ -313,8 +313,6 @@ identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/t
 identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
 reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
 fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
-validate                    validate --output numbers.csv
-validate-all                validate --all
 """
 
 EXERCISES = (
@@ -381,7 +379,6 @@ COMMANDS = (
         "modes",
         "calibrate",
         "schema",
-        "validate",
     ),
 )
 
@@ -455,7 +452,7 @@ EDITS = {
 }
 
 
-EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all", "fit-starts"}
+EXACT_ONLY = {"fit-limit-cycle-shooting", "fit-starts"}
 """Cases that take long or say much, and whose code others run, too; of several starts that end alike, which is
 the best and how many iterations it took is rounding."""
 
@@ -465,7 +462,6 @@ TEXT_ONLY = (
     "fit-run-down-plot",
     "holes-plot",
     "influence-rotor23",
-    "validate",
     "motion-bode",
 )
 """Cases whose document is long, or that of another case."""
