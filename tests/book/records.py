@@ -95,10 +95,8 @@ def three_masses():
     chain = read_ode_model(CHAIN / "model.toml")
     started = read_ode_model(CHAIN / "from_record.toml")
     exact = simulate(chain, (0.14, 12.0, 28.0), TIMES, sensitivities=False)
-    rows = [row for row in read("f_record.csv").values() if row.source == "[F] record" and _place(row)]
-    places = [(row, *_place(row)) for row in rows]
-    numbers = {row.quantity: exact.y[at, chain.outputs.index(state)] for row, state, at in places}
-    intact = _intact([place for place in places if not place[0].erratum])
+    numbers = {row.quantity: exact.y[at, chain.outputs.index(state)] for row, state, at in _places()}
+    intact = intact_record()
     fits = {
         "[F] from the intact printed values": fit(chain, intact),
         "[F] the same, steps 1 to 5": fit(started, intact, method="gauss-newton", integrator="rk4"),
@@ -111,16 +109,17 @@ def three_masses():
     return found | below("[F] record of five digits, recomputed", errors)
 
 
-def _place(row):
-    """State and sample of "y1(0.6 s)"; None where they are not known."""
-    if row.kind == "not compared":
-        return None
-    state, _, time = row.quantity.partition("(")
-    return state, round(5 * float(time.partition(" ")[0]))
+def _places():
+    """Rows of the record with state and sample, of "y1(0.6 s)", where they are known."""
+    for (source, quantity), row in read("f_record.csv").items():
+        if source == "[F] record" and row.kind != "not compared":
+            state, _, time = quantity.partition("(")
+            yield row, state, round(5 * float(time.partition(" ")[0]))
 
 
-def _intact(places):
-    """Intact printed values; the errors are those of rounding, uniform within half a unit."""
+def intact_record():
+    """The intact printed values; the errors are those of rounding, uniform within half a unit."""
+    places = [place for place in _places() if not place[0].erratum]
     names = dict.fromkeys(state for _, state, _ in places)
     values = {name: np.full(len(TIMES), np.nan) for name in names}
     sigma = {name: np.ones(len(TIMES)) for name in names}

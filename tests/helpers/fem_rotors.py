@@ -25,12 +25,6 @@ def rotor23(damping=0.0):
     )
 
 
-def printed_shapes():
-    """Mode shapes printed in [S], task 9.1, shape (24, 3)."""
-    path = ROOT / "tests" / "data" / "rotor23_modes.csv"
-    return np.loadtxt(path, delimiter=",", skiprows=1)[:, 1:]
-
-
 def uniform(n, *, length=1.0, diameter=0.1, **others):
     return fem.Rotor(np.full(n, length / n), diameter, density=7850.0, **others)
 

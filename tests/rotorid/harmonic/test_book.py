@@ -1,4 +1,4 @@
-"""Every exercise of [S] from the command line: printed results, singular problems, exact data."""
+"""Every exercise of [S] from the command line: singular problems, exact data, options."""
 
 import tomllib
 
@@ -34,13 +34,6 @@ def identify(cli):
     return run
 
 
-def half_unit(printed):
-    """Half a unit of the last printed digit: 999.935 -> 0.0005, 1.991e4 -> 5."""
-    mantissa, _, exponent = printed.partition("e")
-    decimals = len(mantissa.partition(".")[2])
-    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
-
-
 def test_every_exercise_that_the_book_has_is_here():
     assert sorted(EXPECTED) == sorted(
         [f"section_1_{n}" for n in (6, 7, 8)]
@@ -54,32 +47,13 @@ def test_every_exercise_that_the_book_has_is_here():
 
 
 @pytest.mark.parametrize("task", PRINTED)
-def test_printed_results_to_all_printed_digits(identify, task):
+def test_exercises_with_printed_results_are_determined(identify, task):
+    """The numbers themselves: tests/book."""
     found = identify(task)
     assert set(found) >= KEYS
     assert found["identifiable"] is True
     assert found["unidentifiable"] == []
-    expected = EXPECTED[task]
-    assert set(found["parameters"]) == set(expected["printed"]) == set(expected["truth"])
-    for name, printed in expected["printed"].items():
-        assert abs(found["parameters"][name]["value"] - float(printed)) <= half_unit(printed), name
-    for words, printed in expected.get("printed_combinations", {}).items():
-        assert abs(found["combinations"][words]["value"] - float(printed)) <= half_unit(printed), words
-
-
-def test_more_digits_of_the_reference(identify):
-    """Recomputed with plain NumPy from the printed data, before this program existed."""
-    for task, values in {
-        "task_5_2": {"c": 99791, "b": 9977},
-        "task_7_1": {"c1": 9954.3, "c2": 19906.2, "c3": 5006.7},
-        "task_7_2": {"c1": 10027.1, "c2": 19781.7, "c3": 4945.4, "m2": 19.7817, "m3": 9.8909},
-    }.items():
-        parameters = identify(task)["parameters"]
-        for name, value in values.items():
-            assert abs(parameters[name]["value"] - value) <= half_unit(str(value)), name
-    shapes = identify("task_7_2", data="data_three_digits.csv")["parameters"]
-    for name, value in {"c1": "10025", "c2": "19786", "c3": "4947", "m2": "19.790", "m3": "9.892"}.items():
-        assert abs(shapes[name]["value"] - float(value)) <= half_unit(value), name
+    assert set(found["parameters"]) == set(EXPECTED[task]["truth"])
 
 
 @pytest.mark.parametrize("task", EXACT)

@@ -1,53 +1,22 @@
-"""[Q] and [F] from the files in sample_data/fit and from the intact printed values."""
+"""[Q] and [F] from the files in sample_data/fit by every method; [F]'s algorithm, step by step."""
 
-from pathlib import Path
+from functools import cache
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.record import Record
 
 FOLDER = sample_data() / "fit"
-PRINTED = Path(__file__).parents[2] / "data" / "f_printed.csv"
 METHODS = ["levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting"]
 
 
-def printed_record():
-    """Values with standard deviations of their rounding (uniform within half a unit)."""
-    table = pd.read_csv(PRINTED, comment="#")
-    values = table.pivot(index="t_s", columns="state", values="value")
-    deviations = table.pivot(index="t_s", columns="state", values="half_unit") / np.sqrt(3)
-    outputs = {name: values[name].to_numpy() for name in values}
-    sigma = {name: deviations[name].to_numpy() for name in deviations}
-    return Record(values.index.to_numpy(), outputs, sigma=sigma, name="f_printed.csv")
-
-
-def test_intact_printed_values_of_f_alone_identify_the_chain():
-    record = printed_record()
-    counts = {name: int(np.isfinite(values).sum()) for name, values in record.outputs.items()}
-    assert counts == {"y1": 3, "v1": 4, "y2": 23, "v2": 34, "y3": 20, "v3": 17}
-    result = fit(read_ode_model(FOLDER / "three_masses" / "model.toml"), record)
-    shown = [
-        f"{value:.{n}f} ± {std:.{n}f}"
-        for value, std, n in zip(result.values, result.std, (5, 4, 5), strict=True)
-    ]
-    assert shown == ["0.13994 ± 0.00014", "11.9988 ± 0.0028", "27.99998 ± 0.00003"]
-    chi2 = result.estimate.residuals @ result.estimate.residuals
-    assert len(result.estimate.residuals) == 101 - 6  # known initial values fix the first of each
-    assert round(float(chi2)) == 97
-
-
-def test_the_record_of_f_agrees_with_every_intact_printed_value():
-    table = pd.read_csv(PRINTED, comment="#")
-    record = read_record(
-        FOLDER / "three_masses" / "record.csv", read_ode_model(FOLDER / "three_masses" / "model.toml")
-    )
-    for row in table.itertuples():
-        assert record.outputs[row.state][round(row.t_s / 0.2)] == row.value
+@cache
+def default_fit():
+    model = read_ode_model(FOLDER / "three_masses" / "model.toml")
+    return fit(model, read_record(FOLDER / "three_masses" / "record.csv", model))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -57,51 +26,11 @@ def test_f_with_every_method(cli, method):
     assert found["method"] == method
     values = np.array([entry["value"] for entry in found["parameters"].values()])
     std = np.array([entry["std"] for entry in found["parameters"].values()])
-    np.testing.assert_allclose(values, [0.13999975, 11.99998962, 28.00000273], rtol=1e-7)
-    np.testing.assert_allclose(std, [5.6e-7, 1.2e-5, 1.0e-5], rtol=0.05)
+    by_default = default_fit()
+    np.testing.assert_allclose(values, by_default.values, rtol=1e-7)
+    np.testing.assert_allclose(std, by_default.std, rtol=0.05)
     if method in ("gauss-newton", "quasilinearization"):
         assert found["iterations"] <= 6
-
-
-def test_q_with_an_accurate_integrator_finds_the_truth(cli):
-    folder = FOLDER / "quasilinearization"
-    found = cli(
-        "fit", folder / "model.toml", folder / "record.csv", "--method", "quasilinearization", "--json"
-    ).json
-    values = [entry["value"] for entry in found["parameters"].values()]
-    np.testing.assert_allclose(values, [1, -1, -1], rtol=0, atol=1e-8)
-
-
-TABLE_2_3 = np.array(
-    [
-        [-0.1849, -2.058, 1.139],
-        [-0.2652, -0.3099, -1.54],
-        [0.4036, -1.281, -1.019],
-        [0.8887, -1.028, -0.9184],
-        [0.9982, -1.0, -0.9968],
-        [0.9986, -1.001, -0.9981],
-    ]
-)
-HALF_A_UNIT = 0.5 * 10.0 ** (np.floor(np.log10(np.abs(TABLE_2_3))) - 3)
-
-
-def test_q_with_its_own_scheme_repeats_table_2_3(cli):
-    """Half a unit of four digits, but for two numbers of the ill-conditioned second iteration."""
-    folder = FOLDER / "quasilinearization"
-    options = ("--method", "quasilinearization", "--integrator")
-    misses = {}
-    for integrator in ("sequential-heun", "heun"):
-        command = ("fit", folder / "model.toml", folder / "record.csv", *options, integrator, "--json")
-        found = cli(*command).json
-        assert found["integrator"] == integrator
-        assert any("more accurate integration would change theta1" in text for text in found["warnings"])
-        history = np.array([list(step["parameters"].values()) for step in found["history"][:7]])
-        assert history[0].tolist() == [0, 0, 0]
-        misses[integrator] = np.abs(history[1:] - TABLE_2_3) / HALF_A_UNIT
-    beyond = np.argwhere(misses["sequential-heun"] > 1).tolist()
-    assert beyond == [[1, 0], [1, 1]]
-    assert misses["sequential-heun"].max() < 2.4
-    assert (misses["heun"] > 1).sum() == 13
 
 
 def as_f_prints(record, beta, steps):

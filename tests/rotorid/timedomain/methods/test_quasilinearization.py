@@ -1,6 +1,4 @@
-"""Quasilinearization against the tables of [Q], and from all kinds of first trajectories."""
-
-from pathlib import Path
+"""Quasilinearization from all kinds of first trajectories; the tables of [Q] are in tests/book."""
 
 import numpy as np
 import pytest
@@ -10,27 +8,7 @@ from rotorid.timedomain.fit import fit
 from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
-DATA = Path(__file__).parents[3] / "data"
 FIRST = {"x1": 1.5, "x2": "1 + sin(t)"}
-
-
-def table(name):
-    return np.loadtxt(DATA / f"quasilinearization_{name}.csv", delimiter=",", skiprows=1)[:, 1:]
-
-
-@pytest.mark.parametrize(
-    ("integrator", "first", "near"), [("heun", FIRST, 5e-3), ("sequential-heun", "model", 6e-4)]
-)
-def test_tables_of_the_book(integrator, first, near):
-    """The first trajectory of the print is that of its own scheme; most states are printed to 1e-3."""
-    options = {"method": "quasilinearization", "trajectory": first}
-    found = fit(book_model(), book_record(), integrator=integrator, **options)
-    parameters = table("table_2_3")
-    assert found.history[:7] == pytest.approx(parameters, abs=near * np.ptp(parameters))
-    states = table("table_2_2")
-    for k in range(6):
-        assert found.trajectories[k][0] == pytest.approx(states[:, 2 * k : 2 * k + 2], abs=near)
-    assert any("more accurate integration" in text for text in found.warnings)
 
 
 def test_truth_in_seven_iterations_with_error_control():
