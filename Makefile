@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint house docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -79,6 +79,10 @@ test-lowest: $(LOWEST_VENV)/lowest.txt
 $(LOWEST_VENV)/lowest.txt: pyproject.toml constraints.txt .ci/lowest.py
 	mkdir -p $(@D)
 	$(LOWEST_PYTHON) .ci/lowest.py > $@
+
+# What there is to read, against the ceilings of tests/helpers/house.py.
+house:
+	$(PYTHON) tests/helpers/house.py
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
