@@ -1,9 +1,9 @@
 """Size of the house against its ceilings, in units of what a reader has to read: `make house`.
 
 Prints a line a row; exit status 1 where a ceiling in force is exceeded or a package stands in no row.
-Units: tokens of Python without comments, docstrings, blank lines, commas and closing brackets (so that neither
-line length nor keyword arguments matter), a string one for every 40 characters begun; of JavaScript, HTML, CSS,
-TOML, CSV and JSON inside the packages one for every 5 characters.
+Units: tokens of Python without comments, docstrings, blank lines, commas and closing brackets (so that
+neither line length nor keyword arguments matter), a string one for every 40 characters begun; of JavaScript,
+HTML, CSS, TOML, CSV and JSON inside the packages one for every 5 characters.
 """
 
 import ast
