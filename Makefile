@@ -35,12 +35,14 @@ endef
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
 
+ON_TWO_CORES = -n 2 --dist loadfile --no-loadscope-reorder
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -q $(ON_TWO_CORES) -m 'not full'
 
-# Simulations with all their repetitions instead of 300.
-test-full: $(VENV)/.dev
-	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+# Everything, with all repetitions of simulations: also every page, whether intervals and regions hold what they say,
+# every browser and workbook.
+test-full: $(VENV)/.dev docs
+	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q $(ON_TWO_CORES) --ignore tests/docs
 
 # One-line defects drawn by SEED, N of them; does a test find each? MINUTES in all, on JOBS cores.
 SEED ?= 1
@@ -91,8 +93,10 @@ lint: $(VENV)/.dev
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
+# The pages, and every command, block of code and number that they show.
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	ROTORID_FULL_TEST=1 ROTORID_BUILT_DOCS=docs/_build/html $(BIN)/python -m pytest -q $(ON_TWO_CORES) tests/docs
 	@echo "docs/_build/html/index.html"
 
 # Literal outputs on the pages, after a change that is meant to change them; then look at `git diff docs`.
@@ -117,14 +121,14 @@ build: $(HOUSE_VENV)/.house
 # Every test against the installed wheel: a folder with all of the source but the packages, and an environment in it.
 # Left out are the tests of how the source is written.
 WHEEL ?= .wheel
-OF_SOURCE = tests/test_house.py tests/mutants tests/docs/test_architecture.py tests/docs/test_names.py
+OF_SOURCE = tests/test_house.py tests/mutants tests/docs/test_names.py
 test-wheel: build
 	rm -rf $(WHEEL)
 	mkdir $(WHEEL)
 	git ls-files -z | grep -zvE '^(fem|balancing|rotorid)/' | tar --null -T - -c | tar -x -C $(WHEEL)
 	$(call environment,$(WHEEL)/.venv)
 	$(WHEEL)/.venv/bin/python -m pip -q install $(DIST)/*.whl $(GROUPS:%=--group %)
-	cd $(WHEEL) && .venv/bin/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder $(OF_SOURCE:%=--ignore %)
+	cd $(WHEEL) && .venv/bin/python -m pytest -q $(ON_TWO_CORES) -m 'not full' $(OF_SOURCE:%=--ignore %)
 
 # Makes constraints.txt anew, one file for every Python and system, with the newest versions that fit together.
 constraints: CONSTRAINTS =

@@ -66,7 +66,6 @@ SLOW_FIRST = (
     "golden/test_balance.py",
     "golden/test_models.py",
     "golden/test_rotor.py",
-    "docs/test_docs.py",
     "rotorid/report/test_browser.py",
     "rotorid/report/test_balance.py",
     "rotorid/harmonic/test_coverage.py",
