@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint house docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint house sure docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -43,6 +43,11 @@ test: $(VENV)/.dev
 # every browser and workbook.
 test-full: $(VENV)/.dev docs
 	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q $(ON_TWO_CORES) --ignore tests/docs
+	$(MAKE) sure
+
+# The tables of docs/sure.md, from drawn readings whose truth is known.
+sure: $(VENV)/.dev
+	$(BIN)/python tests/coverage/sure.py
 
 # One-line defects drawn by SEED, N of them; does a test find each? MINUTES in all, on JOBS cores.
 SEED ?= 1

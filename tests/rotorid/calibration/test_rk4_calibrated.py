@@ -93,6 +93,7 @@ def test_what_the_runs_determine_and_what_not():
     assert {"bearing.kxx", "bearing.kyy", "bearing.cxx", "bearing.cyy"} <= unknown
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("stiffness", [1e6, 7e4] if FULL else [7e4])
 def test_the_runs_contradict_a_distance_of_480_mm_between_the_bearings(stiffness):
     assert not found(SPEEDS, 480, stiffness).explained
@@ -104,6 +105,7 @@ def test_they_do_not_contradict_bearings_five_times_as_soft():
     assert abs(found(SPEEDS, 560, 2e5).chi_square - found(SPEEDS).chi_square) < 4
 
 
+@pytest.mark.full
 def test_other_starts_end_at_the_same_numbers():
     start = read_rotor(FOLDER / "rotor.toml")
     files = [FOLDER / name for name in ("few.toml", "few_1005.toml")]

@@ -37,6 +37,7 @@ def threads():
         yield pool
 
 
+@pytest.mark.full
 def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypatch, threads):
     distributed = pytest.importorskip("distributed", reason="without the extra rotorid[cluster]")
 
@@ -55,6 +56,7 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypa
     assert len(set(ratios)) == 60
 
 
+@pytest.mark.full
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threads, monkeypatch):
     """The workers end with their parent."""

@@ -63,7 +63,7 @@ def test_a_run_up_through_a_resonance(run, seed):
     assert found.largest <= 0.25
     assert found.ends <= 0.6
     assert abs(found.offset) <= 0.1
-    assert (found.along + found.across) / 2 >= 0.9
+    assert 0.9 <= (found.along + found.across) / 2 <= 0.99  # ± twice too wide would hold all
 
 
 def test_a_speed_that_ripples_and_the_table_of_the_page(run, capsys, monkeypatch):
@@ -128,6 +128,7 @@ def drawn(seed, kind):
     return steady(x, turns), vector.mean()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["white", "coloured", "wandering"])
 def test_stated_errors_of_a_steady_record_hold(kind):
     pulls = []
@@ -236,6 +237,7 @@ def test_a_short_record(turns):
     assert error < 0.01 * abs(VECTOR)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("seconds", "noise"), [(1.0, 1e-6), (20.0, 1e-7)])
 def test_stated_errors_of_a_steady_phase_hold_where_the_tacho_is_the_bottleneck(seconds, noise):
     pulls = []

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from repetitions import FULL, of_a_spread
 
 import fem
 from fem.model.rotor_parameters import with_parameters
@@ -61,28 +60,6 @@ def test_one_run_balances_the_true_machine_as_well_as_its_exact_coefficients(mac
     squares = np.einsum("ni,nij,nj->n", z, np.linalg.inv(covariance.reshape(-1, 2, 2)), z)
     assert squares.max() < 18.0  # of 2 degrees of freedom: 1.2e-4
     assert shot.answer.judgement.startswith("Mount these weights")
-
-
-def test_errors_of_the_parameters_are_those_of_drawn_rotors(shot):
-    """Columns against coefficients of rotors drawn from the covariance that the file states."""
-    draws = 300 if FULL else 100
-    job = read_job(FOLDER / "later.toml")
-    known, influence = job.rotor.calibration, shot.influence
-    random = np.random.default_rng(1)
-    drawn = []
-    values = np.array([fem_value(job.rotor, name) for name in known.names])
-    for _ in range(draws):
-        theta = dict(zip(known.names, random.multivariate_normal(values, known.covariance), strict=True))
-        angles = {n: theta[n] for n in theta if n.startswith("probe")}
-        places = [
-            replace(place, angle=place.angle + angles[f"probe[{name}].angle"])
-            for name, place in job.sensor_places.items()
-        ]
-        rotor = with_parameters(job.rotor, theta)
-        drawn.append(fem.influence(rotor, list(job.planes), places, job.trials.speeds).W)
-    spread = np.std(drawn, axis=0)
-    stated = np.sqrt(np.sum(np.abs(influence.parameters[..., 1:]) ** 2, axis=0))
-    np.testing.assert_allclose(stated, spread, rtol=max(0.2, of_a_spread(draws)))
 
 
 def fem_value(rotor, name):

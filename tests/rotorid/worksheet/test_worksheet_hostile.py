@@ -22,6 +22,7 @@ def corrections(state):
     return state["results"]["answer"]["document"]["corrections"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("wait", [0.0, 1.5])
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl+C as terminals of POSIX send it")
 def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):

@@ -305,6 +305,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
     assert done.stderr == 'rotorid: the worksheet needs uvicorn: pip install "rotorid[worksheet]"\n'
 
 
+@pytest.mark.full
 def test_a_workbook_of_rotorid_is_edited_and_another_is_not(tmp_path, serve):
     import openpyxl
 
