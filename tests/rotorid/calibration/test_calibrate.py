@@ -107,6 +107,7 @@ def test_exact_data_give_the_numbers_back(rotor, values, more):
         assert found.unbalance[0] == pytest.approx(list(runs.unbalance.values()), rel=1e-6)
 
 
+@pytest.mark.full
 def test_several_jobs_with_unbalances_of_their_own():
     values = {"bearing[1].kxx": 4.6e7, "bearing[2].cyy": 2.4e4, "material.youngs_modulus.scale": 1.03}
     truth = with_parameters(machine(), values)
@@ -425,6 +426,7 @@ def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
 
 
+@pytest.mark.full
 def test_critical_speeds_over_bearing_tables():
     tables = [
         replace(s, speeds=(1.0, 300.0, 800.0, 3000.0), stiffness=[3e7, 5e7, 9e7, 1.2e8])

@@ -49,6 +49,7 @@ def estimates(rpm, kind, rotor=None, method="weighted"):
     return all_, np.sqrt(np.mean([each.errors**2 for each in all_], axis=0))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["weighted", "least-squares"])
 @pytest.mark.parametrize("rpm", SPEEDS)
 @pytest.mark.parametrize("speeds", [SPEEDS, (1206,), (1005,)], ids=str)
@@ -100,6 +101,7 @@ def test_the_runs_contradict_a_distance_of_480_mm_between_the_bearings(stiffness
     assert found(SPEEDS, 480, stiffness).chi_square > found(SPEEDS).chi_square + 40
 
 
+@pytest.mark.full
 def test_they_do_not_contradict_bearings_five_times_as_soft():
     assert found(SPEEDS, 560, 2e5).explained
     assert abs(found(SPEEDS, 560, 2e5).chi_square - found(SPEEDS).chi_square) < 4

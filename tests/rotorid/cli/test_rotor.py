@@ -166,6 +166,7 @@ def test_table_text_and_orbits_of_a_response_are_those_of_the_model(cli, files, 
         assert forces["largest_N"][k] == pytest.approx(at[0, k], rel=1e-6)
 
 
+@pytest.mark.full
 def test_what_the_pictures_of_a_response_are_drawn_from(cli, files, model, tmp_path, monkeypatch):
     import fem.plots.readings
 

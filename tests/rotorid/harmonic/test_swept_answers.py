@@ -35,6 +35,7 @@ def off(found, exact):
     return np.abs(found - exact).max(axis=0) / np.abs(exact).max(axis=0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("first", "rate"), SWEEPS)
 def test_constant_acceleration_as_dop853_has_it(first, rate):
     time = np.sort(np.random.default_rng(1).uniform(0, 24, 60))

@@ -34,6 +34,7 @@ def decays(seed, a_error=0.002, b_error=0.1):
     return model, Record(t, {"x": x, "q": q})
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("samples", [12, 60])
 @pytest.mark.parametrize("loss", ["linear", "huber"])
 def test_local_minima_of_a_frequency_get_no_interval(samples, loss):

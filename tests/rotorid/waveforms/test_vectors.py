@@ -56,7 +56,7 @@ def fine(run):
     return t, turns, (run.vector(t) * np.exp(2j * np.pi * turns)).real
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.full) for k in (1, 2))])
 def test_a_run_up_through_a_resonance(run, seed):
     found = accuracy(run, seed)
     assert found.rms <= 0.06
@@ -66,6 +66,7 @@ def test_a_run_up_through_a_resonance(run, seed):
     assert 0.9 <= (found.along + found.across) / 2 <= 0.99  # ± twice too wide would hold all
 
 
+@pytest.mark.full
 def test_a_speed_that_ripples_and_the_table_of_the_page(run, capsys, monkeypatch):
     """Whose numbers are the worst of ten records, this one among them."""
     monkeypatch.setattr("examples.vectors_accuracy.machine", lambda r: machine(r) if r else run)

@@ -68,6 +68,7 @@ def fem_value(rotor, name):
     return rotor.calibration.readings.get(name) or parameter_value(rotor, name)
 
 
+@pytest.mark.full
 def test_the_next_trial_run_tells_what_a_linear_update_by_differences_tells(shot):
     trial, job = shot.next_trial, read_job(FOLDER / "later.toml")
     known, W = job.rotor.calibration, shot.influence.W

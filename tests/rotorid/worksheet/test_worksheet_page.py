@@ -114,6 +114,7 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     assert [line for visit in visits for line in visit.console] == []
 
 
+@pytest.mark.full
 def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
     window = windows[0]
     served = serve(turbo / "job.toml")
