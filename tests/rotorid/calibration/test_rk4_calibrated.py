@@ -118,6 +118,7 @@ def test_other_starts_end_at_the_same_numbers():
     assert (np.abs(again.values - found(SPEEDS).values) < 1e-3 * found(SPEEDS).std).all()
 
 
+@pytest.mark.full
 def test_the_command_of_the_sample_makes_its_calibrated_rotor(tmp_path, cli, monkeypatch):
     (line,) = re.findall(r"^rotorid (calibrate .*)$", (FOLDER / "README.md").read_text("utf-8"), re.MULTILINE)
     monkeypatch.chdir(FOLDER)

@@ -324,6 +324,7 @@ def test_a_failing_command_says_only_what_is_wrong(cli):
     assert len(outcome.err.splitlines()) == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("arguments", "number"),
     [

@@ -66,6 +66,7 @@ def test_too_few_iterations_are_said(cli):
     assert found["provenance"]["options"]["max_iterations"] == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -109,6 +109,7 @@ def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_pat
     assert {way for node in by_supports["orbits"]["direction"] for way in node} == {"forward"}
 
 
+@pytest.mark.full
 def test_pictures_and_tables_of_a_response(cli, files, tmp_path):
     for view in ("bode", "polar", "orbits"):
         picture = tmp_path / f"{view}.png"

@@ -234,6 +234,7 @@ def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
     assert found.to_dict()["judgement"]["word"] == "do not mount"
 
 
+@pytest.mark.full
 def test_machines_of_the_type_are_seldom_called_others(fleet, tmp_path):
     rng, said = np.random.default_rng(25), 0
     for k in range(30):

@@ -155,6 +155,7 @@ def test_what_the_model_leaves_out_is_told(tmp_path):
     assert found.answer.warnings == known
 
 
+@pytest.mark.full
 def test_starts_end_where_calibrate_does():
     found = run(SAMPLE / "starts.toml", samples=6)
     options = CalibrateOptions("bearing[*].stiffness", exact=True)

@@ -91,6 +91,7 @@ def test_a_worker_that_dies_once_is_replaced_and_its_samples_repeated(tmp_path):
     assert numbers(tmp_path) == NUMBERS
 
 
+@pytest.mark.full
 def test_samples_that_kill_every_worker_are_named(tmp_path):
     data = {"flag": str(tmp_path / "died"), "deadly": NUMBERS[5], "always": True}
     with pytest.raises(ValueError, match=r"a worker died 3 times on the samples 4 to 5: BrokenProcessPool"):

@@ -96,6 +96,7 @@ def test_time_that_runs_out_while_outputs_are_weighed_ends_the_fit(monkeypatch):
     assert "stopped after 60 s" in found.message
 
 
+@pytest.mark.full
 def test_intervals_of_weighed_outputs_hold_the_truth():
     hits = np.zeros(2)
     for seed in range(100):

@@ -270,6 +270,7 @@ def test_a_steady_speed_integrates_with_its_mean(derivative):
     assert abs(found.vectors[0, 0, 0]) == pytest.approx(abs(VECTOR), rel=5e-5)
 
 
+@pytest.mark.full
 def test_one_speed_that_is_asked_for_is_integrated_as_all_are(run, fine):
     t, turns, x = fine
     measured = steady(np.gradient(x, t), turns, None, 1, FINE)

@@ -127,6 +127,7 @@ def test_python_gives_what_the_command_prints(cli, tmp_path, name):
     assert own.summary()
 
 
+@pytest.mark.full
 def test_a_rotor_and_its_unbalance_need_no_file():
     rotor, unbalance = read_rotor(COMPRESSOR), read_unbalance(UNBALANCE, read_rotor(COMPRESSOR))
     options = CASES["response"][2]
