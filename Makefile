@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact book lint docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact book lint house sure docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -35,12 +35,19 @@ endef
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
 
+ON_TWO_CORES = -n 2 --dist loadfile --no-loadscope-reorder
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -q $(ON_TWO_CORES) -m 'not full'
 
-# Simulations with all their repetitions instead of 300.
-test-full: $(VENV)/.dev
-	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+# Everything, with all repetitions of simulations: also every page, whether intervals and regions hold what they say,
+# every browser and workbook.
+test-full: $(VENV)/.dev docs
+	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q $(ON_TWO_CORES) --ignore tests/docs
+	$(MAKE) sure
+
+# The tables of docs/sure.md, from drawn readings whose truth is known.
+sure: $(VENV)/.dev
+	$(BIN)/python tests/coverage/sure.py
 
 # One-line defects drawn by SEED, N of them; does a test find each? MINUTES in all, on JOBS cores.
 SEED ?= 1
@@ -84,6 +91,10 @@ $(LOWEST_VENV)/lowest.txt: pyproject.toml constraints.txt .ci/lowest.py
 	mkdir -p $(@D)
 	$(LOWEST_PYTHON) .ci/lowest.py > $@
 
+# What there is to read, against the ceilings of tests/helpers/house.py.
+house:
+	$(PYTHON) tests/helpers/house.py
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -91,8 +102,10 @@ lint: $(VENV)/.dev
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
+# The pages, and every command, block of code and number that they show.
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	ROTORID_FULL_TEST=1 ROTORID_BUILT_DOCS=docs/_build/html $(BIN)/python -m pytest -q $(ON_TWO_CORES) tests/docs
 	@echo "docs/_build/html/index.html"
 
 # Literal outputs on the pages, after a change that is meant to change them; then look at `git diff docs`.
@@ -117,14 +130,14 @@ build: $(HOUSE_VENV)/.house
 # Every test against the installed wheel: a folder with all of the source but the packages, and an environment in it.
 # Left out are the tests of how the source is written.
 WHEEL ?= .wheel
-OF_SOURCE = tests/test_house.py tests/mutants tests/docs/test_architecture.py tests/docs/test_names.py
+OF_SOURCE = tests/test_house.py tests/mutants tests/docs/test_names.py
 test-wheel: build
 	rm -rf $(WHEEL)
 	mkdir $(WHEEL)
 	git ls-files -z | grep -zvE '^(fem|balancing|rotorid)/' | tar --null -T - -c | tar -x -C $(WHEEL)
 	$(call environment,$(WHEEL)/.venv)
 	$(WHEEL)/.venv/bin/python -m pip -q install $(DIST)/*.whl $(GROUPS:%=--group %)
-	cd $(WHEEL) && .venv/bin/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder $(OF_SOURCE:%=--ignore %)
+	cd $(WHEEL) && .venv/bin/python -m pytest -q $(ON_TWO_CORES) -m 'not full' $(OF_SOURCE:%=--ignore %)
 
 # Makes constraints.txt anew, one file for every Python and system, with the newest versions that fit together.
 constraints: CONSTRAINTS =

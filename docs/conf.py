@@ -28,7 +28,6 @@ extensions = [
     "methods",
     "names",
     "results",
-    "terms",
 ]
 exclude_patterns = ["_build", "_ext"]
 source_suffix = {".md": "markdown"}

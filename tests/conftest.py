@@ -1,10 +1,11 @@
-"""Shared by all tests: the command line run in this process."""
+"""Shared by all tests: the command line run in this process, and browsers."""
 
+import contextlib
 import functools
 import json
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -13,16 +14,14 @@ import typer.main
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy; before NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import browser
 import hypothesis
 
-import balancing.solvers.correction_methods
-import balancing.solvers.monte_carlo
 import rotorid.cli
+from rotorid.samples import sample_data
 
 # typer makes the commands anew for every command line; once is enough for all those of a worker.
 typer.main.get_command = functools.cache(typer.main.get_command)
-
-FEWER_DRAWS = functools.partial(balancing.solvers.monte_carlo.sampled_covariance, draws=100)
 
 # The suite is the same on every machine; HYPOTHESIS_PROFILE=search looks at new examples every time.
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)
@@ -41,24 +40,57 @@ class Outcome:
         return json.loads(self.out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
+SAMPLES = sample_data().resolve()
+PATCHED = "_setattr", "_setitem"
+"""Where a MonkeyPatch keeps what it has changed."""
+REPEATED: dict[tuple[str, ...], Outcome] = {}
+"""What command lines gave that read samples only and write nothing: each runs once a session."""
+
+
+def repeatable(words):
+    """Whether a command line gives the same again, and nothing else."""
+    if not words or words[0] in ("demo", "fleet", "study", "worksheet") or "--verbose" in words:
+        return False
+    paths = [Path(word) for word in words if "/" in word or Path(word).suffix.lstrip(".").isalpha()]
+    return bool(paths) and all(path.exists() and SAMPLES in path.resolve().parents for path in paths)
+
+
 @pytest.fixture
 def cli(capsys, monkeypatch):
-    """Run `rotorid ARGS`; returns exit status, standard output and standard error.
-
-    Errors of weights that are drawn come from 100 draws instead of 400.
-    """
-    monkeypatch.setattr(balancing.solvers.correction_methods, "sampled_covariance", FEWER_DRAWS)
+    """Run `rotorid ARGS`; returns exit status, standard output and standard error."""
 
     def run(*args):
-        monkeypatch.setattr(sys, "argv", ["rotorid", *map(str, args)])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as stop:
-            rotorid.cli.main()
-        captured = capsys.readouterr()
-        code = stop.value.code
-        return Outcome(0 if code is None else code, captured.out, captured.err)
+        words = tuple(map(str, args))
+        patched = [one for name in PATCHED for one in getattr(monkeypatch, name) if one[:2] != (sys, "argv")]
+        key = () if patched or not repeatable(words) else (os.getcwd(), *words)
+        if key not in REPEATED:
+            monkeypatch.setattr(sys, "argv", ["rotorid", *words])
+            capsys.readouterr()
+            with pytest.raises(SystemExit) as stop:
+                rotorid.cli.main()
+            captured = capsys.readouterr()
+            code = stop.value.code
+            outcome = Outcome(0 if code is None else code, captured.out, captured.err)
+            if not key:
+                return outcome
+            REPEATED[key] = outcome
+        return replace(REPEATED[key])
 
     return run
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    """Browsers by number, each started when it is first asked for."""
+    with contextlib.ExitStack() as stack:
+
+        @functools.cache
+        def started(number=0):
+            opened = browser.session(tmp_path_factory.mktemp("profile"))
+            stack.callback(opened.close)
+            return opened
+
+        yield started
 
 
 # The files that take longest begin, so that no worker ends with them: stored outputs, the pages, simulations.
@@ -66,12 +98,8 @@ SLOW_FIRST = (
     "golden/test_balance.py",
     "golden/test_models.py",
     "golden/test_rotor.py",
-    "docs/test_docs.py",
     "rotorid/report/test_browser.py",
     "rotorid/report/test_balance.py",
-    "rotorid/harmonic/test_coverage.py",
-    "balancing/correction/test_coverage.py",
-    "rotorid/calibration/test_calibration_study.py",
     "rotorid/worksheet/test_worksheet_page.py",
     "rotorid/worksheet/test_worksheet_server.py",
     "rotorid/report/test_rotor.py",

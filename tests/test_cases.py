@@ -49,6 +49,7 @@ def test_a_table_that_cannot_be_is_refused(values):
         each_of("a, b", values)
 
 
+@pytest.mark.full
 def test_the_hygiene_of_pictures_can_fail():
     from documents import check_hygiene
     from matplotlib.figure import Figure

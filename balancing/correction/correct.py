@@ -140,7 +140,7 @@ def correct(  # noqa: PLR0913
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
     covariance, dof = (None, None) if errors is None else errors.weights(fitted)
-    # of an update from a type: its regions hold (docs/coverage_fleet.md)
+    # of an update from a type: its regions hold (docs/sure.md)
     tested = influence.baseline is not None and influence.common is None and influence.parameters is not None
     estimated = influence.run_errors.origin == "estimated"
     if method == "weighted" and covariance is not None and not (tested or estimated):

@@ -9,7 +9,7 @@ Least squares is shifted as well, towards zero by about 1/ρ² where ρ is the e
 of the planes in units of its errors (√(χ²/n) of `balancing.coefficients.identifiability`); its standard
 deviation falls with the number of readings N, so that it is optimistic below a ρ that grows as √N.
 
-The shares below are those of table d of `examples/coverage_balance.py`.
+The shares below are those of table d of `tests/coverage/coverage_balance.py`.
 """
 
 from __future__ import annotations

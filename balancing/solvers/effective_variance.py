@@ -5,7 +5,7 @@ its region is optimistic. This fit minimises the residuals in units of their own
 through those of W: the maximum likelihood of normal errors (`balancing.solvers.likelihood`).
 
 Which covariance is honest was found by simulating jobs whose truth is known (two planes, twelve readings with
-3 % and 2°, no errors between runs; other jobs: `examples/coverage_balance.py`). Shares of 95 % regions with
+3 % and 2°, no errors between runs; other jobs: docs/sure.md). Shares of 95 % regions with
 the true weights, for trial weights that change the vibration by 30–100 % / 10–30 % / 3–10 %, at condition
 numbers up to 10:
 

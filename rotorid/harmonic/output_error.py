@@ -6,7 +6,7 @@ holds no measurement. Three stiffnesses of two masses, read at ten frequencies a
 5 % and 3° errors: the 95 % intervals of the linear estimate contain the truth in 14 to 16 % of 2000
 repetitions (75 to 78 % with stated errors) and its bias is 2.4 of its standard deviations; here it is
 95 % and a tenth. In task 5.1 of [S] it hardly matters. The figures are printed by
-`python examples/coverage_identify.py 2000`.
+`python tests/coverage/coverage_identify.py 2000`.
 
 Residuals are the stretched differences of amplitudes, along and across each amplitude, over their errors:
 stated, or relative to the amplitude. Their size is taken at the predicted amplitude after a first round at

@@ -87,6 +87,7 @@ def test_std_only_where_the_station_is_determined():
     np.testing.assert_allclose(found.std, [0.1, np.nan, np.nan], rtol=1e-12)
 
 
+@pytest.mark.full
 def test_covariance_is_that_of_drawn_readings():
     rng = np.random.default_rng(4)
     W, U = complex_normal(rng, (8, 3)), np.array([1.0, 2j, -1.5])

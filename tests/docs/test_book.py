@@ -109,6 +109,7 @@ def _once(text):
     return " ".join(text.split())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("command", [command for command in COMMANDS if command not in TYPED])
 def test_every_command_that_no_other_page_has_runs(command, tmp_path, monkeypatch, cli):
     shutil.copytree(sample_data(), tmp_path / "sample_data")

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 from docs_blocks import blocks, first_difference
-from repetitions import FULL
 
 from rotorid import read_ode_model
 from rotorid.base.compiled import COMPILED
 
+pytestmark = pytest.mark.full
 FOLDER = Path(__file__).parents[2] / "examples"
 PINNED = {
     "balance_a_machine": {
@@ -125,8 +125,7 @@ def load(name):
 
 
 def test_every_example_is_pinned():
-    names = {path.stem for path in FOLDER.glob("*.py") if not path.stem.startswith(("coverage_", "vectors_"))}
-    assert names == set(PINNED)
+    assert {path.stem for path in FOLDER.glob("*.py")} == {*PINNED, "vectors_accuracy"}
 
 
 @pytest.fixture(scope="session")
@@ -138,8 +137,6 @@ def ran(tmp_path_factory):
         if name == "reduce_and_run_up" and not COMPILED:
             pytest.skip("hours without the extra rotorid[fast]")
         folder, printed, module = tmp_path_factory.mktemp(name), io.StringIO(), load(name)
-        if name == "rk4_calibrated" and not FULL:
-            module.BELIEVED = module.BELIEVED[-1:]  # the one of which the numbers come
         with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
             found = module.main()
         return found, printed.getvalue(), list(folder.iterdir())
@@ -194,9 +191,7 @@ def test_the_page_of_the_calibrated_rig_shows_what_its_example_prints(ran):
     page = blocks(FOLDER.parent / "docs" / "rk4_calibrated.md")
     shown = [block.text for block in page if block.kind == "{code-block} text" and not block.caption]
     assert [len(part.splitlines()) for part in shown] == [6, 27]
-    head, *believed = shown[0].splitlines()
-    beliefs = [head, *(believed if FULL else believed[-1:])]
-    assert first_difference([*beliefs, "...", *shown[1].splitlines()], text) is None
+    assert first_difference([*shown[0].splitlines(), "...", *shown[1].splitlines()], text) is None
 
 
 def test_the_page_on_the_masses_in_motion_shows_what_its_example_prints(ran):

@@ -8,6 +8,7 @@ import re
 from importlib import import_module
 from pathlib import Path
 
+import pytest
 from cases import each_of
 
 PACKAGES = ("fem", "balancing", "rotorid")
@@ -118,6 +119,7 @@ def test_every_public_method_says_what_it_does(name):
             assert inspect.getdoc(value), method
 
 
+@pytest.mark.full
 def test_all_examples_of_all_docstrings_run():
     done = [doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE) for module in MODULES]
     assert sum(result.attempted for result in done) > 80

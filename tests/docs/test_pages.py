@@ -17,6 +17,8 @@ STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
 SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "fleet.md"]
+EVERY_TIME = ("getting_started/balancing", "getting_started/identification", "book/rotor")
+"""Pages of which `make test` runs the blocks; `make docs` runs all."""
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 
@@ -34,7 +36,17 @@ def test_there_is_a_page_for_each_of_the_three_users():
     assert {page.stem for page in STARTS} == {*USERS, "installation"}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
+def name_of(page):
+    return f"{page.parent.name}/{page.stem}"
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=name_of(page), marks=[] if name_of(page) in EVERY_TIME else pytest.mark.full)
+        for page in PAGES
+    ],
+)
 def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplace, cli, capsys):
     if page.stem == "motion" and not COMPILED:
         pytest.skip("long without the extra rotorid[fast]")

@@ -53,6 +53,7 @@ def run(page):
         exec(compile("\n" * first + block[1], str(FOLDER / f"{page}.md"), "exec"), names)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("page", PAGES)
 def test_the_code_of_a_page_runs_and_its_formulas_hold(page, monkeypatch):
     monkeypatch.chdir(ROOT)

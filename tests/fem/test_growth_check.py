@@ -235,6 +235,7 @@ def of_many_elements(rng):
     ), knots
 
 
+@pytest.mark.full
 def test_no_window_is_missed_where_the_basis_is_a_part_of_the_space():
     rng = np.random.default_rng(3)
     wrong, unstable = {}, 0

@@ -118,6 +118,7 @@ def names(file, accepted):
     return set(PLANES) if file.startswith("o") else {*PLANES, *accepted}
 
 
+@pytest.mark.full
 def test_a_page_shows_names_as_text(accepted, files, tmp_path):
     usual = [f"name {number}" for number in range(len(accepted))]
     done = answer([*job(tmp_path, usual, usual[: len(PLANES)]), "--report", str(tmp_path / "r.html")])

@@ -1,7 +1,7 @@
 """How often a simulation is repeated, and what so many repetitions can show.
 
 `make test` repeats 300 times where `make test-full` repeats 2,000 times or more: bounds are computed from the
-number, so that both ask the same question as sharply as they can. Full tables: `examples/coverage_*.py`.
+number, so that both ask the same question as sharply as they can. Full tables: docs/sure.md.
 
 Intervals of 95 % that are 1.4 times too large are refused by 300 repetitions in 73 of 100 cases, by 150 in
 none; those 1.4 times too small by 300 always, by 150 in 85. So a bound of both sides needs 300.

@@ -1,28 +1,14 @@
 """Run-ups of drawn rotors, by the example, and their tables as people write them."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
+import coverage_runup as example
 import numpy as np
 
 from rotorid.base.rpm import RPM
 
-PATH = Path(__file__).parents[2] / "examples" / "coverage_runup.py"
-
-
-def load_example():
-    if "coverage_runup" not in sys.modules:
-        spec = importlib.util.spec_from_file_location("coverage_runup", PATH)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["coverage_runup"] = module
-        spec.loader.exec_module(module)
-    return sys.modules["coverage_runup"]
-
 
 def drawn(seed=5, rate=100.0, noise=1e-6):
     """A rotor and the vectors of its sweep, rate in rpm a second."""
-    example, random = load_example(), np.random.default_rng(seed)
+    random = np.random.default_rng(seed)
     rotor = example.draw_rotor(random)
     return rotor, example.draw_sweep(random, rotor, rate / RPM, noise)
 

@@ -41,6 +41,7 @@ def test_a_function_is_what_it_was():
     assert getattr(hypotenuse, "py_func", hypotenuse)(3.0, 4.0) == 5.0
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not COMPILED, reason="without the extra rotorid[fast]")
 def test_machine_code_is_kept_until_what_it_calls_changes(tmp_path):
     """In another file, of the same size and date: numba by itself would go on with the old one."""

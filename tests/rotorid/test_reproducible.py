@@ -52,6 +52,7 @@ def _files(folder, seed):
     return {path.name: path for path in sorted({*folder.rglob("*")} - known)}
 
 
+@pytest.mark.full
 def test_every_kind_of_file_has_the_same_bytes(twice):
     one, other = twice
     assert {path.suffix for path in one.values()} == {

@@ -1,9 +1,6 @@
 """Coefficients of a type: what the example prints for many types, with few; reasons of odd machines."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,47 +8,6 @@ import pytest
 from balancing import ReadingErrors, Trials, UndeterminedError, estimate_influence
 from balancing.coefficients.machine_type import MachineRecord, fit_type, record_of, why_odd
 from balancing.data.conventions import Labels
-
-PATH = Path(__file__).parents[3] / "examples" / "coverage_fleet.py"
-
-
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("coverage_fleet", PATH)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["coverage_fleet"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def lower(share, n, deviations=3.0):
-    return share - deviations * np.sqrt(share * (1 - share) / n)
-
-
-def test_first_shots_hold_what_they_say(example):
-    found = []
-    for seed in range(8):
-        rng = np.random.default_rng([7, seed])
-        drawn = example.draw(rng, "each coefficient")
-        known = fit_type(drawn.records, *drawn[2:])
-        found += [example.shots(rng, drawn, known, m)[0] for m in range(50, 62)]
-    found = [shot for shot in found if shot is not None]
-    assert len(found) > 60  # of 96; two types have planes that act alike
-    left, weights, readings, *_ = np.array(found, dtype=float).T
-    assert np.median(left) < 0.32
-    assert weights.mean() > lower(0.95, len(found))
-    assert 0.90 < readings.mean() < 0.99
-
-
-def test_odd_machines_are_found_with_their_reason_and_few_others(example):
-    told, others = [], []
-    for seed in range(6):
-        rng = np.random.default_rng([8, seed])
-        own, rest = example.odd_machines(rng, example.draw(rng, "each coefficient"))
-        told += own
-        others += rest
-    assert np.mean([found and why for _, found, why in told]) >= 0.88  # 16 of 18
-    assert np.mean(others) < 0.02
 
 
 def drawn_type(seed=1, machines=30, S=1, C=2, P=2, noise=0.02):

@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from balancing_data import GRAM, complex_normal, job, noisy, synthetic
-from repetitions import highest_share, lowest_share, repetitions
-from scipy.stats import chi2
 
 from balancing import ReadingErrors, correct, estimate_influence
 from balancing.correction.check_run import compare_check
@@ -96,24 +94,6 @@ def test_directions_of_repeats_count(exact):
     made = replace(exact, readings=eight)
     assert error_model(measured(made, *right)).source == "measured"
     assert error_model(measured(made, *wrong)).source == "repeats"
-
-
-def test_coverage_of_weights_with_unequal_deviations():
-    rng = np.random.default_rng(21)
-    exact = synthetic(rng, sensors=3, speeds=2)[0]
-    Y = exact.readings
-    along = np.abs(Y) * np.exp(rng.uniform(np.log(0.002), np.log(0.05), Y.shape))
-    across = np.abs(Y) * np.exp(rng.uniform(np.log(0.002), np.log(0.05), Y.shape))
-    true = correct(estimate_influence(exact), method="least-squares").weights
-    n, inside, each = repetitions(2000), 0, 0
-    for _ in range(n):
-        trials = measured(replace(exact, readings=drawn(rng, Y, along, across)), along, across)
-        found = correct(estimate_influence(replace(trials, run_errors=STEADY)), method="least-squares")
-        d = (found.weights - true).view(float)
-        inside += d @ np.linalg.solve(found.covariance, d) < chi2.ppf(0.95, d.size)
-        each += np.mean(np.abs(d) < 1.96 * np.sqrt(np.diag(found.covariance)))
-    assert lowest_share(n, 0.95) <= inside / n <= highest_share(n, 0.95)
-    assert 0.93 <= each / n <= 0.97
 
 
 def test_digits_are_not_coarse_where_errors_are_large(exact):

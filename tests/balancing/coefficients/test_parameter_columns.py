@@ -110,6 +110,7 @@ def inside(away, covariance):
     return square < chdtri(away.shape[1], 0.05)
 
 
+@pytest.mark.full
 def test_covariance_of_the_weights_is_that_of_their_errors(drawn):
     expected = drawn.exact.covariance
     std = np.sqrt(np.linalg.eigvalsh(expected))

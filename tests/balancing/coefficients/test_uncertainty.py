@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, synthetic
-from repetitions import of_a_spread, repetitions
 
 from balancing import Influence, Labels, ReadingErrors, correct, estimate_influence
 from balancing.data.reading_errors import ASSUMED, error_model, reading_covariance
@@ -85,21 +84,6 @@ def test_the_stated_covariance_against_simulated_jobs():
     stated = c.after_covariance.reshape(6, 2, 2)
     distance = np.einsum("kni,nij,knj->kn", real, np.linalg.inv(stated), real)
     np.testing.assert_allclose(np.mean(distance < 5.991, axis=0), 0.95, atol=0.015)
-
-
-def test_over_determined_runs_with_errors_of_very_different_size():
-    """Rows are weighted; the stated covariance is that of the weighted solution."""
-    rng = np.random.default_rng(9)
-    T = np.array([[0, 0], [1, 0], [0, 1], [3, 0], [0, 3j], [0, 0]]) * GRAM
-    trials, _, _ = synthetic(rng, planes=2, sensors=2, speeds=1, weights=T, errors=ERRORS)
-    c = correct(estimate_influence(trials))
-    exact = trials.readings[0]
-    D = []
-    n = repetitions(1500)
-    for _ in range(n):
-        draw = job(noisy(rng, exact, ERRORS), T, speeds=trials.speeds, errors=ERRORS)
-        D.append(stretch(correct(estimate_influence(draw)).weights))
-    np.testing.assert_allclose(np.std(D, axis=0), np.sqrt(np.diag(c.covariance)), rtol=of_a_spread(n))
 
 
 def test_the_mean_of_repeats_has_less_variance():

@@ -90,6 +90,7 @@ def expected(n):
     return binom.ppf((0.0005, 0.9995), n, 0.05)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("check_repeats", READ)
 def test_false_alarms_near_5_percent(stated, check_repeats):
     """Errors stated 1.2 times too small would be seen, or so large that nothing is an alarm."""
@@ -108,6 +109,7 @@ def test_each_distance_is_that_of_two_dimensions(plain):
     assert abs(np.mean(distance < np.sqrt(5.991)) - 0.95) < 0.015
 
 
+@pytest.mark.full
 def test_errors_from_repeats_are_compared_with_f():
     """Estimated errors: 3 repeats of 3 runs, 72 degrees of freedom of each direction; less between runs."""
     found = simulated(75, REPEATED, repeats=(3,), errors=None)[()]

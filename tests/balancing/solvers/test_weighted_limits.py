@@ -23,6 +23,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(correction_methods, "sampled_covariance", lambda *_, **__: None)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_global_search_finds_better_weights(quick, seed):
     stack, fit = problem(seed)

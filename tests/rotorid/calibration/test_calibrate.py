@@ -9,7 +9,6 @@ import pytest
 from fem_rotors import rotor23, uniform
 from helpers.calibration.jobs import Runs, machine
 from repetitions import FULL
-from scipy.stats import chi2
 
 import fem
 from balancing.data.trials import ReadingErrors
@@ -108,6 +107,7 @@ def test_exact_data_give_the_numbers_back(rotor, values, more):
         assert found.unbalance[0] == pytest.approx(list(runs.unbalance.values()), rel=1e-6)
 
 
+@pytest.mark.full
 def test_several_jobs_with_unbalances_of_their_own():
     values = {"bearing[1].kxx": 4.6e7, "bearing[2].cyy": 2.4e4, "material.youngs_modulus.scale": 1.03}
     truth = with_parameters(machine(), values)
@@ -273,33 +273,6 @@ def test_natural_frequencies_and_shapes_at_rest():
     assert np.mean(chi) == pytest.approx(found.dof, abs=4 * np.sqrt(2 * found.dof / 16))
 
 
-def test_chi_square_and_errors_of_simulated_readings():
-    """Noise as stated: χ² has its mean and quantile, and the numbers scatter as their deviations say."""
-    values = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy": 2.2e4, "disc[1].mass": 25.0}
-    truth = with_parameters(machine(), values)
-    runs, rng, draws = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(8), 30
-    exact = runs.readings(truth)
-    unknowns = [Unknown(path, start=value) for path, value in values.items()]
-    found = []
-    for _ in range(draws):
-        noise = 1 + ERRORS.amplitude * rng.standard_normal(exact.shape)
-        turned = np.exp(1j * ERRORS.phase * rng.standard_normal(exact.shape))
-        found.append(
-            calibrate(machine(), unknowns, [runs.data(exact * noise * turned, errors=ERRORS)], starts=1)
-        )
-    dof = 2 * 2 * 4 * 3 - 2 * 2 - 3
-    assert {each.dof for each in found} == {dof}
-    chi = np.array([each.chi_square for each in found])
-    assert chi.mean() == pytest.approx(dof, abs=4 * np.sqrt(2 * dof / draws))
-    assert np.mean(chi > chi2.ppf(0.8, dof)) == pytest.approx(0.2, abs=4 * np.sqrt(0.16 / draws))
-    u = np.array([each.unbalance[0] - list(runs.unbalance.values()) for each in found])
-    u = u / np.array([each.unbalance_std[0] for each in found])
-    assert np.sqrt((abs(u) ** 2).mean(axis=0) / 2) == pytest.approx(1.0, abs=4 / np.sqrt(4 * draws))
-    z = np.array([(each.values - list(values.values())) / each.std for each in found])
-    assert z.std(axis=0) == pytest.approx(1.0, abs=4 / np.sqrt(2 * draws))
-    assert abs(z.mean(axis=0)).max() < 4 / np.sqrt(draws)
-
-
 def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
     """Neither is given a value, nor a deviation: only the stiffness of both in series is seen."""
     stand = fem.Pedestal(0.0, 1e8)
@@ -453,6 +426,7 @@ def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
 
 
+@pytest.mark.full
 def test_critical_speeds_over_bearing_tables():
     tables = [
         replace(s, speeds=(1.0, 300.0, 800.0, 3000.0), stiffness=[3e7, 5e7, 9e7, 1.2e8])

@@ -50,6 +50,7 @@ def expected(runs, which, relative, sensors=slice(None)):
     return np.linalg.inv(information)[:2, :2]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("n", [1, 2, 3, 6])
 def test_the_chosen_runs_are_the_best_of_all_subsets(n):
     runs, data = candidates(errors=ReadingErrors(0.02, 0.03), run_errors=RunScatter(0.04))

@@ -49,6 +49,7 @@ def estimates(rpm, kind, rotor=None, method="weighted"):
     return all_, np.sqrt(np.mean([each.errors**2 for each in all_], axis=0))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["weighted", "least-squares"])
 @pytest.mark.parametrize("rpm", SPEEDS)
 @pytest.mark.parametrize("speeds", [SPEEDS, (1206,), (1005,)], ids=str)
@@ -93,17 +94,20 @@ def test_what_the_runs_determine_and_what_not():
     assert {"bearing.kxx", "bearing.kyy", "bearing.cxx", "bearing.cyy"} <= unknown
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("stiffness", [1e6, 7e4] if FULL else [7e4])
 def test_the_runs_contradict_a_distance_of_480_mm_between_the_bearings(stiffness):
     assert not found(SPEEDS, 480, stiffness).explained
     assert found(SPEEDS, 480, stiffness).chi_square > found(SPEEDS).chi_square + 40
 
 
+@pytest.mark.full
 def test_they_do_not_contradict_bearings_five_times_as_soft():
     assert found(SPEEDS, 560, 2e5).explained
     assert abs(found(SPEEDS, 560, 2e5).chi_square - found(SPEEDS).chi_square) < 4
 
 
+@pytest.mark.full
 def test_other_starts_end_at_the_same_numbers():
     start = read_rotor(FOLDER / "rotor.toml")
     files = [FOLDER / name for name in ("few.toml", "few_1005.toml")]
@@ -114,6 +118,7 @@ def test_other_starts_end_at_the_same_numbers():
     assert (np.abs(again.values - found(SPEEDS).values) < 1e-3 * found(SPEEDS).std).all()
 
 
+@pytest.mark.full
 def test_the_command_of_the_sample_makes_its_calibrated_rotor(tmp_path, cli, monkeypatch):
     (line,) = re.findall(r"^rotorid (calibrate .*)$", (FOLDER / "README.md").read_text("utf-8"), re.MULTILINE)
     monkeypatch.chdir(FOLDER)

@@ -81,6 +81,7 @@ def test_the_judgement_comes_first(cli, command, judgement):
     assert max(map(len, lines)) <= 100
 
 
+@pytest.mark.full
 def test_one_peak_of_each_critical_speed_and_all_behind_them(cli):
     command = (*RESPONSE, "--speeds", "1000:10000:50rpm", "--operating", "4800:6500rpm")
     document = cli(*command, "--json").json

@@ -59,6 +59,7 @@ def test_prediction_of_what_is_mounted():
     assert m.answer.tables[0].startswith("Hole by hole:")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["least-squares", "weighted", "minmax"])
 def test_few_pieces_are_the_default(cli, method):
     few = cli("balance", HOLES, "--split", "--method", method, "--json").json["mounting"]

@@ -13,6 +13,8 @@ TURBO = sample_data() / "turbo_job"
 JOB = TURBO / "job.toml"
 MODEL = sample_data() / "model_job" / "job.toml"
 METHODS = ("least-squares", "weighted", "minmax")
+FEW_DRAWS = [pytest.param(m, marks=pytest.mark.full if m == "weighted" else ()) for m in METHODS]
+"""The methods, of which `make test` leaves out the one whose errors are drawn, 4 s for each limit."""
 
 
 def vectors(found):
@@ -397,6 +399,7 @@ r1,3000,S5,34.507939,265.44605
 )
 
 
+@pytest.mark.full
 def test_weighted_within_a_limit_is_the_best_place_and_nothing_is_certified(cli, tmp_path):
     for name, text in zip(("runs.csv", "weights.csv"), PHASES_KNOWN_BETTER, strict=True):
         (tmp_path / name).write_text(text)
@@ -427,7 +430,7 @@ def test_objective_of_weighted_readings_is_named(cli, tmp_path):
 
 
 @pytest.mark.parametrize("weights", ['[sensors."probe 4"]\nweight = 0\n', "speed_weights"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FEW_DRAWS)
 def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, weights):
     job = job_with(tmp_path, "" if weights == "speed_weights" else weights)
     if weights == "speed_weights":
@@ -459,7 +462,7 @@ def test_weight_zero_with_ridge_and_truncation(answers, tmp_path, soft):
     assert zero["condition_number"] == pytest.approx(left_out["condition_number"])
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FEW_DRAWS)
 def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, method):
     job = job_with(tmp_path, "")
     job.write_text((TURBO / "holes.toml").read_text() + '\n[sensors."probe 4"]\nweight = 0\n')

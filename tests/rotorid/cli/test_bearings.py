@@ -48,6 +48,7 @@ def test_the_threshold_does_not_depend_on_the_steps(cli):
     assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
 
 
+@pytest.mark.full
 def test_the_linear_rotor_is_read_by_the_other_commands(cli, tmp_path):
     linear = tmp_path / "linear.toml"
     speeds = ",".join(map(str, [*range(600, 9001, 400), 6405, 6409])) + "rpm"

@@ -126,9 +126,12 @@ def test_influence_of_the_model_is_symmetric_and_feeds_balance(cli, tmp_path):
 @pytest.mark.parametrize(
     "command",
     [
-        ("critical", ROTOR),
-        ("reduce", ROTOR, "--nodes", "7,12,18"),
-        ("influence", ROTOR, "--planes", "7", "--sensors", "2,12", "--speeds", "50:700:5"),
+        pytest.param(("critical", ROTOR), marks=pytest.mark.full),
+        pytest.param(("reduce", ROTOR, "--nodes", "7,12,18"), marks=pytest.mark.full),
+        pytest.param(
+            ("influence", ROTOR, "--planes", "7", "--sensors", "2,12", "--speeds", "50:700:5"),
+            marks=pytest.mark.full,
+        ),
         ("balance", TURBO),
     ],
 )

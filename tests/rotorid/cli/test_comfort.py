@@ -149,6 +149,7 @@ def test_help_of_an_option_names_its_methods(cli):
             assert said.count(f"{method}: ") == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("args", [["critical", "--help"], ["balanec"]])
 def test_colours_only_where_they_are_wanted(args):
     assert "\x1b[" in at_terminal(*args, TERM="xterm-256color")
@@ -323,6 +324,7 @@ def test_a_failing_command_says_only_what_is_wrong(cli):
     assert len(outcome.err.splitlines()) == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("arguments", "number"),
     [

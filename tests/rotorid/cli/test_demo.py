@@ -48,6 +48,7 @@ def test_a_sample_runs_and_writes_its_pictures(name):
     assert "make_" not in texts["copied"]
 
 
+@pytest.mark.full
 def test_the_commands_are_those_a_user_would_type(cli, tmp_path):
     folder = tmp_path / "a folder"
     outcome = cli("demo", folder, "--sample", "holes")

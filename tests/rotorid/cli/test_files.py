@@ -83,6 +83,7 @@ def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, mon
     assert sorted(job.iterdir()) == before
 
 
+@pytest.mark.full
 def test_demo_keeps_what_people_changed(cli, tmp_path):
     folder = tmp_path / "d"
     assert cli("demo", folder, "--sample", "holes").code == 0

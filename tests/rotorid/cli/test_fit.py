@@ -71,6 +71,7 @@ def test_noisy_record_has_errors_of_the_size_of_its_noise(cli):
         assert entry["std"] < 0.01
 
 
+@pytest.mark.full
 def test_stated_errors_scale_the_intervals(cli):
     one, two = (
         cli("fit", *files("limit_cycle"), "--sigma", s, "--json").json["parameters"]["lambda"]

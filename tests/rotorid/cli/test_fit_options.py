@@ -67,6 +67,7 @@ def test_too_few_iterations_are_said(cli):
     assert found["provenance"]["options"]["max_iterations"] == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -86,6 +87,7 @@ def test_options_reach_the_fit_and_its_provenance(cli, arguments):
         assert str(options[option.strip("-")]) == value
 
 
+@pytest.mark.full
 def test_a_loose_integration_is_another_one(cli):
     one, two = (
         cli("fit", *files("limit_cycle"), "--rtol", rtol, "--json").json for rtol in ("1e-3", "1e-11")

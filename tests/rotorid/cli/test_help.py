@@ -88,6 +88,7 @@ def test_an_option_that_no_panel_names_stands_in_the_first():
     assert panels == [INPUT, "Method", "Output"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "line"), EXAMPLES, ids=[f"{n}-{i}" for i, (n, _) in enumerate(EXAMPLES)])
 def test_every_example_runs_as_typed(cli, checkout, name, line):
     words = shlex.split(line)

@@ -102,6 +102,7 @@ def test_pictures_of_a_motion(cli, tmp_path, view):
     assert picture.stat().st_size > 10_000
 
 
+@pytest.mark.full
 def test_pictures_of_a_run_up(unbalance):
     options = MotionOptions(run_up="1000:3000rpm", time=2.0, unbalance=unbalance, sensors="12")
     found = motion(ROTOR, options)

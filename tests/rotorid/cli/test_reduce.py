@@ -157,6 +157,7 @@ def test_the_small_compressor_has_both_planes_and_damped_supports(cli, tmp_path)
     assert outcome.json["stability"]["full"]["status"] == outcome.json["stability"]["small"]["status"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "view",
     ["shapes", "methods", "trade-off", "placement", "response", "stability", "errors", "what-if"],

@@ -109,6 +109,7 @@ def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_pat
     assert {way for node in by_supports["orbits"]["direction"] for way in node} == {"forward"}
 
 
+@pytest.mark.full
 def test_pictures_and_tables_of_a_response(cli, files, tmp_path):
     for view in ("bode", "polar", "orbits"):
         picture = tmp_path / f"{view}.png"
@@ -166,6 +167,7 @@ def test_table_text_and_orbits_of_a_response_are_those_of_the_model(cli, files, 
         assert forces["largest_N"][k] == pytest.approx(at[0, k], rel=1e-6)
 
 
+@pytest.mark.full
 def test_what_the_pictures_of_a_response_are_drawn_from(cli, files, model, tmp_path, monkeypatch):
     import fem.plots.readings
 

@@ -64,7 +64,7 @@ def test_a_closed_pipe_ends_quietly():
     assert process.wait(timeout=60) == -signal.SIGPIPE  # 141 for a shell, as with any other program
 
 
-@pytest.mark.parametrize("redirection", ["2>/dev/full", "2>&-"])
+@pytest.mark.parametrize("redirection", ["2>/dev/full", pytest.param("2>&-", marks=pytest.mark.full)])
 @pytest.mark.parametrize(
     "words", ["critical nofile.csv", "critical --nope", "critical {} -n 99", "{} --verbose"]
 )

@@ -36,6 +36,7 @@ ONCE = ("--amplitude-error", "--phase-error", "--phase", "--angles", "--max-mass
 """What the workbook says from then on."""
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("sample", "options"), CALLS)
 def test_a_workbook_gives_the_same_result(cli, tmp_path, sample, options):
     job, sheet = DATA / f"{sample}.toml", tmp_path / "sheet.xlsx"

@@ -190,6 +190,7 @@ def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
     assert list((tree.parent / "F").rglob("*.tmp")) == []
 
 
+@pytest.mark.full
 def test_two_writers_at_once_one_with_two_processes(tmp_path):
     command = [sys.executable, "-m", "rotorid", "fleet", "add", "F", sample_data() / "fleet"]
     both = [

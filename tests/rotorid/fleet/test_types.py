@@ -140,6 +140,7 @@ def test_a_check_run_refines(fleet, tmp_path):
     assert refined.result.mounted[0] == "check 0"
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("cli")  # with which weights are drawn 100 times, not 400
 @pytest.mark.parametrize("runs", [1, 3])
 def test_a_check_run_that_does_not_say_its_weights_has_those_within_the_limits(fleet, tmp_path, runs):
@@ -233,6 +234,7 @@ def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
     assert found.to_dict()["judgement"]["word"] == "do not mount"
 
 
+@pytest.mark.full
 def test_machines_of_the_type_are_seldom_called_others(fleet, tmp_path):
     rng, said = np.random.default_rng(25), 0
     for k in range(30):

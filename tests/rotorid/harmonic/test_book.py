@@ -133,6 +133,7 @@ def test_the_generator_wrote_these_tables(tmp_path, monkeypatch):
             assert (tmp_path / path).read_text() == (FOLDER / path).read_text(), path
 
 
+@pytest.mark.full
 def test_pictures_and_tables(cli, tmp_path):
     for task in ("task_5_1", "task_7_1", "task_4_1"):
         picture, table = tmp_path / f"{task}.png", tmp_path / f"{task}.csv"

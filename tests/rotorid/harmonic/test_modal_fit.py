@@ -90,6 +90,7 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
     np.testing.assert_allclose(result.shapes[0], shapes[:, 1], rtol=2e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("errors", "masses", "read", "draws"),
     [("stated", 3, 3, 60), ("share of", 3, 3, 60), ("stated", 4, 2, 60), ("size everywhere", 4, 1, 200)]

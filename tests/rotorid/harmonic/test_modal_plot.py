@@ -127,6 +127,7 @@ def test_velocities_are_drawn_as_the_displacements_that_they_are(tmp_path):
     np.testing.assert_allclose(points(axes[0, 1])[0][:, 1], 1e6 * np.abs(response(omega))[:, 0], rtol=1e-9)
 
 
+@pytest.mark.full
 def test_what_is_left_out_is_said_and_the_points_that_fit_worst_are_drawn(tmp_path):
     """Nine equal masses, five modes; the readings at two points are far noisier."""
     rng, n = np.random.default_rng(2), 9
@@ -159,6 +160,7 @@ def test_a_mode_that_is_not_determined_has_its_warning_and_no_number():
     assert figure._suptitle.get_color() == WARNING
 
 
+@pytest.mark.full
 def test_many_warnings_are_cut(tmp_path):
     omega = around()
     Z = response(omega) * np.exp(1j * np.deg2rad([0.0, 40.0, -40.0]))
@@ -170,6 +172,7 @@ def test_many_warnings_are_cut(tmp_path):
     assert len(lines) <= 9
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_the_command_writes_the_picture(tmp_path, cli, ending):
     target = tmp_path / f"circles.{ending}"

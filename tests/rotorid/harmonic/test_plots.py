@@ -166,6 +166,7 @@ def test_units_are_kept_by_repeated_readings_and_by_a_choice_of_experiments(tmp_
     assert found.axis.scale * found.frequencies == pytest.approx([10, 20, 30])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "task", ["task_5_1", "task_1_2", "task_4_1", "task_7_2", "section_1_8", "task_8_2", "task_3_3"]
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from run_ups import load_example
+from run_ups import example
 from scipy.integrate import solve_ivp
 
 from rotorid.harmonic.modal.modal_readings import SteadyAnswers
@@ -35,6 +35,7 @@ def off(found, exact):
     return np.abs(found - exact).max(axis=0) / np.abs(exact).max(axis=0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("first", "rate"), SWEEPS)
 def test_constant_acceleration_as_dop853_has_it(first, rate):
     time = np.sort(np.random.default_rng(1).uniform(0, 24, 60))
@@ -65,7 +66,7 @@ def test_the_closed_form_is_the_same(first, rate):
     """But for how it begins, which is forgotten."""
     time = np.linspace(0, 24, 300)
     modes = zip(OMEGA, ZETA, strict=True)
-    exact = np.transpose([w**2 * load_example().swept(w, z, first, rate, time) for w, z in modes])
+    exact = np.transpose([w**2 * example.swept(w, z, first, rate, time) for w, z in modes])
     found = swept_answers(time, first + rate * time).basis(Q)[0][:, :2]
     late = time > 12
     assert off(found[late], exact[late]).max() < 1e-5

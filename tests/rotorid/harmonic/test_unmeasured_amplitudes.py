@@ -154,6 +154,7 @@ def test_several_solutions_beside_a_hidden_amplitude_are_said_as_such():
         assert "can be exchanged" in found.unidentifiable[0]
 
 
+@pytest.mark.full
 def test_too_few_experiments_for_the_elimination_are_said_and_output_error_does():
     model, truth, data = drawn_chain(121, 3, lost=2)
     few = data.take(np.arange(4))

@@ -185,6 +185,7 @@ def by_size(values):
     return np.sort_complex(np.where(values.imag < 0, values.conj(), values))
 
 
+@pytest.mark.full
 def test_a_period_doubling_and_its_branch_against_integration():
     damping = 0.04
     problem = disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=damping, **SAGGING)

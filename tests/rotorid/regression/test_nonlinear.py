@@ -213,6 +213,7 @@ def test_a_robust_loss_shrugs_off_gross_errors(loss, stated):
     assert harm.max() > 10 * error.max()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("loss", ["linear", "huber", "soft_l1", "cauchy"])
 def test_spread_of_a_robust_estimate_is_the_spread_of_repetitions(loss):
     K, _ = line(m=60)

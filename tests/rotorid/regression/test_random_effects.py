@@ -115,6 +115,7 @@ def test_what_is_known_of_a_group_is_what_the_others_and_its_jobs_say():
     assert covariance == pytest.approx(prior - G @ prior)
 
 
+@pytest.mark.full
 def test_groups_that_do_not_belong_are_found_and_few_others():
     false = []
     for seed in range(40):

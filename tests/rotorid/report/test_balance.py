@@ -28,7 +28,13 @@ JOBS = {
 }
 
 
-@pytest.fixture(scope="module", params=JOBS)
+LONG = ("hard, holes", "refined", "left in", "bk", "holes")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.full if name in LONG else ()) for name in JOBS],
+)
 def made(request, tmp_path_factory):
     name, options = JOBS[request.param]
     options = dict(options)

@@ -5,7 +5,7 @@ Without Chromium the tests are skipped, and say which packages bring it; where C
 
 import re
 
-import browser as chromium
+import browser as browsers
 import pytest
 from sheets import COMMANDS, ESTIMATES, disagreements, make
 
@@ -14,11 +14,13 @@ A4 = (595, 842)  # points
 MOST_PAGES = 12
 
 
-@pytest.fixture(scope="session")
-def browser(tmp_path_factory):
-    session = chromium.session(tmp_path_factory.mktemp("profile"))
-    yield session
-    session.close()
+EVERY_TIME = ("balance holes", "reduce", "identify several")
+"""Sheets that `make test` opens."""
+
+
+@pytest.fixture
+def browser(chromium):
+    return chromium()
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +42,9 @@ def foreign(visit, path):
     return [url for url in visit.requests if url != path.resolve().as_uri() and not url.startswith("data:")]
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[] if n in EVERY_TIME else pytest.mark.full) for n in COMMANDS]
+)
 def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
     path = address(name)
     document = make(name).document
@@ -126,8 +130,8 @@ def test_a_good_page_is_not_complained_about(browser, tmp_path):
 
 def test_a_machine_without_a_browser_says_what_to_install(monkeypatch):
     monkeypatch.setenv("PATH", "")
-    assert "chromium and chromium-driver" in chromium.missing()
+    assert "chromium and chromium-driver" in browsers.missing()
     monkeypatch.setenv("CI", "true")
-    assert chromium.on_ci()
+    assert browsers.on_ci()
     monkeypatch.delenv("CI")
-    assert not chromium.on_ci()
+    assert not browsers.on_ci()

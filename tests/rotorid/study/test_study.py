@@ -98,17 +98,6 @@ def test_counts_are_those_of_the_table_and_later_corrections_help(tmp_path):
     assert found.to_frame()["met"].tolist() == counts
 
 
-def test_small_errors_within_the_model_are_covered(tmp_path):
-    """The engine draws errors as the analysis takes them: 95 % of the regions hold the truth."""
-    text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 1").replace("corrections = 3", "corrections = 1")
-    samples, errors = 400 if FULL else 200, "[readings]\namplitude_percent = 0.5\nphase_deg = 0.3\n"
-    found = run(write(tmp_path, text + errors), samples=samples)
-    good, n = found.held.sum(axis=0).tolist()
-    assert n > 0.975 * samples
-    low, high = binomtest(good, n).proportion_ci(0.999)
-    assert low < 0.95 < high
-
-
 def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
     """A sample again, its runs given to `balancing.refine` one by one."""
     text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 0.02") + SCATTER
@@ -166,6 +155,7 @@ def test_what_the_model_leaves_out_is_told(tmp_path):
     assert found.answer.warnings == known
 
 
+@pytest.mark.full
 def test_starts_end_where_calibrate_does():
     found = run(SAMPLE / "starts.toml", samples=6)
     options = CalibrateOptions("bearing[*].stiffness", exact=True)

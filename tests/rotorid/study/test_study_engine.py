@@ -37,6 +37,7 @@ def threads():
         yield pool
 
 
+@pytest.mark.full
 def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypatch, threads):
     distributed = pytest.importorskip("distributed", reason="without the extra rotorid[cluster]")
 
@@ -55,6 +56,7 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypa
     assert len(set(ratios)) == 60
 
 
+@pytest.mark.full
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threads, monkeypatch):
     """The workers end with their parent."""
@@ -89,6 +91,7 @@ def test_a_worker_that_dies_once_is_replaced_and_its_samples_repeated(tmp_path):
     assert numbers(tmp_path) == NUMBERS
 
 
+@pytest.mark.full
 def test_samples_that_kill_every_worker_are_named(tmp_path):
     data = {"flag": str(tmp_path / "died"), "deadly": NUMBERS[5], "always": True}
     with pytest.raises(ValueError, match=r"a worker died 3 times on the samples 4 to 5: BrokenProcessPool"):

@@ -43,6 +43,7 @@ def test_three_masses_with_error_control(integrator):
     assert np.abs(found.integration_change).max() < 1e-7
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("start", [{"a": 0.5, "b": 0.5, "c": 5.0}, {"a": 0.0, "b": 1.5, "c": 0.5}])
 def test_multiple_shooting_finds_a_limit_cycle(start):
     found = fit(fitzhugh_nagumo(), fitzhugh_nagumo_record(), method="multiple-shooting", start=start)

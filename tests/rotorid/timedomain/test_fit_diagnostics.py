@@ -34,6 +34,7 @@ def test_three_masses_from_far_off(method):
     assert right_or_said(found, [0.14, 12.0, 28.0])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sigma", [None, {"x": 0.05}] if FULL else [None])
 def test_van_der_pol_from_far_off(sigma):
     found = fit(van_der_pol(), van_der_pol_record(sigma=sigma), max_iterations=30)
@@ -54,6 +55,7 @@ def test_fitzhugh_nagumo_from_far_off(start):
     assert right_or_said(found, [0.2, 0.2, 3.0])
 
 
+@pytest.mark.full
 def test_coverage_of_intervals():
     inside = 0
     for seed in range(100):

@@ -34,6 +34,7 @@ def drawn(seed):
     return model, Record(t, {"y": y}, sigma=sigma)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", names(METHODS))
 def test_numbers_of_any_size_are_answered_or_refused_in_words(method):
     answered, refused = 0, []

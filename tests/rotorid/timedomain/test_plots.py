@@ -124,6 +124,7 @@ def test_several_records_differ_by_mark_line_and_colour_in_every_panel():
     assert [line.get_ydata()[0] for line in entered.lines] == [1, 2, 3]
 
 
+@pytest.mark.full
 def test_times_stand_in_the_unit_of_the_record(tmp_path):
     lines = (FOLDER / "quasilinearization" / "record.csv").read_text(encoding="utf-8").splitlines()
     rows = [lines[0].replace("t_s", "t_ms"), *lines[1:]]
@@ -136,6 +137,7 @@ def test_times_stand_in_the_unit_of_the_record(tmp_path):
     assert above.axes[0].lines[0].get_xdata()[1] == pytest.approx(0.1047197551)
 
 
+@pytest.mark.full
 def test_more_signals_stand_in_two_columns():
     above, _ = drawn(result_of("three_masses"))
     assert [ax.get_ylabel().split(",")[0] for ax in above.axes[:4]] == ["y1", "v1", "residual", "residual"]

@@ -34,6 +34,7 @@ def decays(seed, a_error=0.002, b_error=0.1):
     return model, Record(t, {"x": x, "q": q})
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("samples", [12, 60])
 @pytest.mark.parametrize("loss", ["linear", "huber"])
 def test_local_minima_of_a_frequency_get_no_interval(samples, loss):
@@ -95,6 +96,7 @@ def test_time_that_runs_out_while_outputs_are_weighed_ends_the_fit(monkeypatch):
     assert "stopped after 60 s" in found.message
 
 
+@pytest.mark.full
 def test_intervals_of_weighed_outputs_hold_the_truth():
     hits = np.zeros(2)
     for seed in range(100):

@@ -56,16 +56,17 @@ def fine(run):
     return t, turns, (run.vector(t) * np.exp(2j * np.pi * turns)).real
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.full) for k in (1, 2))])
 def test_a_run_up_through_a_resonance(run, seed):
     found = accuracy(run, seed)
     assert found.rms <= 0.06
     assert found.largest <= 0.25
     assert found.ends <= 0.6
     assert abs(found.offset) <= 0.1
-    assert (found.along + found.across) / 2 >= 0.9
+    assert 0.9 <= (found.along + found.across) / 2 <= 0.99  # ± twice too wide would hold all
 
 
+@pytest.mark.full
 def test_a_speed_that_ripples_and_the_table_of_the_page(run, capsys, monkeypatch):
     """Whose numbers are the worst of ten records, this one among them."""
     monkeypatch.setattr("examples.vectors_accuracy.machine", lambda r: machine(r) if r else run)
@@ -128,6 +129,7 @@ def drawn(seed, kind):
     return steady(x, turns), vector.mean()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["white", "coloured", "wandering"])
 def test_stated_errors_of_a_steady_record_hold(kind):
     pulls = []
@@ -236,6 +238,7 @@ def test_a_short_record(turns):
     assert error < 0.01 * abs(VECTOR)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("seconds", "noise"), [(1.0, 1e-6), (20.0, 1e-7)])
 def test_stated_errors_of_a_steady_phase_hold_where_the_tacho_is_the_bottleneck(seconds, noise):
     pulls = []
@@ -267,6 +270,7 @@ def test_a_steady_speed_integrates_with_its_mean(derivative):
     assert abs(found.vectors[0, 0, 0]) == pytest.approx(abs(VECTOR), rel=5e-5)
 
 
+@pytest.mark.full
 def test_one_speed_that_is_asked_for_is_integrated_as_all_are(run, fine):
     t, turns, x = fine
     measured = steady(np.gradient(x, t), turns, None, 1, FINE)

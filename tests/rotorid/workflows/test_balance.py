@@ -98,6 +98,7 @@ def test_a_job_that_was_read(tmp_path):
         found.workbook(tmp_path / "sheet.xlsx")
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("cli")  # with which weights are drawn 100 times, not 400
 def test_what_else_it_gives_can_be_read_back(tmp_path):
     found = balance(TURBO / "job.toml", BalanceOptions(max_mass="200g_mm"))

@@ -99,6 +99,7 @@ def test_trial_weights_and_their_readings_are_hollow(turbo):
         assert np.degrees(line.get_xdata()[1]) % 360 == pytest.approx(phase)
 
 
+@pytest.mark.full
 def test_a_reading_that_may_grow_is_hollow_and_limits_are_drawn():
     found = balance(sample_data() / "left_in" / "job.toml", BalanceOptions(max_mass="4g", limit=("1.5",)))
     figure = found.figure()
@@ -146,6 +147,7 @@ def test_speeds_stand_in_the_unit_of_the_job():
     assert upper.get_xticklabels()[2].get_text() == "60"
 
 
+@pytest.mark.full
 def test_grade_shows_the_rotor_with_residuals_far_below_their_tolerance():
     found = balance(TURBO / "checked.toml", BalanceOptions(**RIGID))
     figure = found.figure()
@@ -303,6 +305,7 @@ def test_holes_have_their_pieces_as_on_the_console():
     assert {str(k) for k in range(1, 25)} <= set(texts)
 
 
+@pytest.mark.full
 def test_of_many_holes_those_that_are_used_have_their_numbers():
     figure = split("35g@10.5", SplitOptions(holes=48, pieces="35g", first_hole=3.0)).figure()
     check_hygiene(figure)
@@ -310,6 +313,7 @@ def test_of_many_holes_those_that_are_used_have_their_numbers():
     assert numbers == {"2"} | {str(k) for k in range(1, 49, 2)}
 
 
+@pytest.mark.full
 def test_forbidden_arcs_are_hatched_where_the_job_counts_them(tmp_path):
     from matplotlib.patches import Wedge
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from repetitions import FULL, of_a_spread
 
 import fem
 from fem.model.rotor_parameters import with_parameters
@@ -63,34 +62,13 @@ def test_one_run_balances_the_true_machine_as_well_as_its_exact_coefficients(mac
     assert shot.answer.judgement.startswith("Mount these weights")
 
 
-def test_errors_of_the_parameters_are_those_of_drawn_rotors(shot):
-    """Columns against coefficients of rotors drawn from the covariance that the file states."""
-    draws = 300 if FULL else 100
-    job = read_job(FOLDER / "later.toml")
-    known, influence = job.rotor.calibration, shot.influence
-    random = np.random.default_rng(1)
-    drawn = []
-    values = np.array([fem_value(job.rotor, name) for name in known.names])
-    for _ in range(draws):
-        theta = dict(zip(known.names, random.multivariate_normal(values, known.covariance), strict=True))
-        angles = {n: theta[n] for n in theta if n.startswith("probe")}
-        places = [
-            replace(place, angle=place.angle + angles[f"probe[{name}].angle"])
-            for name, place in job.sensor_places.items()
-        ]
-        rotor = with_parameters(job.rotor, theta)
-        drawn.append(fem.influence(rotor, list(job.planes), places, job.trials.speeds).W)
-    spread = np.std(drawn, axis=0)
-    stated = np.sqrt(np.sum(np.abs(influence.parameters[..., 1:]) ** 2, axis=0))
-    np.testing.assert_allclose(stated, spread, rtol=max(0.2, of_a_spread(draws)))
-
-
 def fem_value(rotor, name):
     from fem.model.rotor_parameters import parameter_value
 
     return rotor.calibration.readings.get(name) or parameter_value(rotor, name)
 
 
+@pytest.mark.full
 def test_the_next_trial_run_tells_what_a_linear_update_by_differences_tells(shot):
     trial, job = shot.next_trial, read_job(FOLDER / "later.toml")
     known, W = job.rotor.calibration, shot.influence.W

@@ -13,6 +13,7 @@ ROTOR = sample_data() / "motion" / "rotor.toml"
 RANGE = ("--speeds", "6200:6600rpm")
 
 
+@pytest.mark.full
 def test_rest_loses_stability_where_the_linear_rotor_does(cli, tmp_path):
     found = cli("periodic", ROTOR, *RANGE, "--json", "--output", tmp_path / "p.csv").json
     (hopf,) = found["bifurcations"]
@@ -30,6 +31,7 @@ def test_rest_loses_stability_where_the_linear_rotor_does(cli, tmp_path):
     assert {"amplitude_2_m", "amplitude_22_m", "largest_multiplier"} <= {*table.columns}
 
 
+@pytest.mark.full
 def test_the_answer_and_the_picture(cli, tmp_path):
     told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--plot", tmp_path / "p.png")
     assert "limit cycle" in told.out

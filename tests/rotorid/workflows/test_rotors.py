@@ -108,6 +108,7 @@ def same(one, other):
         assert other == (pytest.approx(one, rel=1e-7, abs=1e-12) if isinstance(one, float) else one)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", CASES)
 def test_python_gives_what_the_command_prints(cli, tmp_path, name):
     work, data, text, si = CASES[name]
@@ -126,6 +127,7 @@ def test_python_gives_what_the_command_prints(cli, tmp_path, name):
     assert own.summary()
 
 
+@pytest.mark.full
 def test_a_rotor_and_its_unbalance_need_no_file():
     rotor, unbalance = read_rotor(COMPRESSOR), read_unbalance(UNBALANCE, read_rotor(COMPRESSOR))
     options = CASES["response"][2]

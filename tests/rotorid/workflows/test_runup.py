@@ -150,6 +150,7 @@ def test_slow_roll_of_a_speed_and_of_a_file(cli, vectors, tmp_path):
         assert one["frequency_rad_s"] == other["frequency_rad_s"]  # the fit has its own
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("view", ["bode", "polar"])
 def test_pictures(cli, rotor_and_sweep, tmp_path, view):
     _, sweep = rotor_and_sweep
@@ -179,6 +180,7 @@ def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
     assert shown[1] == "315°"  # a lead of 45°
 
 
+@pytest.mark.full
 def test_a_sweep_without_a_resonance_is_still_drawn(cli, rotor_and_sweep, tmp_path):
     rotor, sweep = rotor_and_sweep
     slow = sweep.take(np.flatnonzero(sweep.speeds < 0.6 * rotor.omega[0]))

@@ -102,6 +102,7 @@ def test_command_line(cli, tmp_path):
     assert "nothing states whether phases lead or lag" in shown.out
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("picture", ["tacho", "orbit", "waterfall"])
 def test_pictures(cli, tmp_path, picture):
     words = ("--tacho", 1, "--unit", "um", "--picture", picture, "--plot", tmp_path / "p.png")

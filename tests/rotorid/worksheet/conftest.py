@@ -24,7 +24,7 @@ def serve():
         one.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def shared(tmp_path_factory):
     """Gives the running worksheet of a sample job, `shared("holes.toml")`, as it was before other tests."""
     needed()

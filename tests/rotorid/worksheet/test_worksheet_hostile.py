@@ -22,6 +22,7 @@ def corrections(state):
     return state["results"]["answer"]["document"]["corrections"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("wait", [0.0, 1.5])
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl+C as terminals of POSIX send it")
 def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
@@ -36,6 +37,7 @@ def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
     assert process.returncode == 130
 
 
+@pytest.mark.full
 def test_an_interrupt_answers_the_windows_that_wait(tmp_path):
     served = Served(copy(tmp_path) / "job.toml")
     version, got = served.settled()["version"], []
@@ -48,6 +50,7 @@ def test_an_interrupt_answers_the_windows_that_wait(tmp_path):
     assert got == [200]
 
 
+@pytest.mark.full
 def test_another_folder_of_the_same_name_is_computed_anew(tmp_path, serve):
     folder = copy(tmp_path)
     served = serve(folder / "job.toml")
@@ -132,6 +135,7 @@ def test_a_body_of_any_form_is_refused_with_one_sentence(shared, body, monkeypat
     assert answer["error"].count("\n") == 0
 
 
+@pytest.mark.full
 def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_path):
     import numpy as np
 

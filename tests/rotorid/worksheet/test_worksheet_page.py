@@ -3,12 +3,10 @@
 Without Chromium the tests are skipped, and say which packages bring it; where CI=true it must be there.
 """
 
-import contextlib
 import shutil
 import tomllib
 from pathlib import Path
 
-import browser as chromium
 import pytest
 from repetitions import FULL
 from worksheet.served import command
@@ -41,18 +39,10 @@ axe.run().then(found => done(found.violations), e => done([{impact: 'none', id: 
 """
 
 
-@pytest.fixture(scope="module")
-def browsers(tmp_path_factory):
-    """Two, for two windows that both have the focus."""
-    with contextlib.ExitStack() as stack:
-        both = [chromium.session(tmp_path_factory.mktemp("profile")) for _ in range(2)]
-        for one in both:
-            stack.callback(one.close)
-        yield both
-
-
 @pytest.fixture
-def windows(browsers):
+def windows(chromium):
+    """Two, that both have the focus."""
+    browsers = [chromium(0), chromium(1)]
     for one in browsers:
         one.resize(1366, 768)
     yield [Window(one) for one in browsers]
@@ -124,6 +114,7 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     assert [line for visit in visits for line in visit.console] == []
 
 
+@pytest.mark.full
 def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
     window = windows[0]
     served = serve(turbo / "job.toml")
@@ -183,6 +174,7 @@ def test_two_windows_on_one_job_lose_nothing(shared, windows):
     assert one.texts("[data-write]") == []
 
 
+@pytest.mark.full
 def test_a_wrong_token_another_origin_another_host(shared, windows):
     window = windows[0]
     served = shared()
@@ -207,6 +199,7 @@ def test_a_wrong_token_another_origin_another_host(shared, windows):
     assert served.job.read_bytes() == before
 
 
+@pytest.mark.full
 def test_a_block_from_excel_is_one_step(shared, windows):
     window, served = windows[0], shared()
     turbo = served.job.parent
@@ -235,6 +228,7 @@ def test_a_block_from_excel_is_one_step(shared, windows):
     assert (turbo / "runs.csv").read_bytes() == before
 
 
+@pytest.mark.full
 def test_headings_of_a_block_are_no_readings(shared, windows):
     window, served = windows[0], shared()
     window.open(served.address)
@@ -247,6 +241,7 @@ def test_headings_of_a_block_are_no_readings(shared, windows):
     assert lines[1] == "baseline,1220,probe 1,3.5,91"
 
 
+@pytest.mark.full
 def test_material_is_removed_where_the_command_line_says(turbo, serve, windows):
     """And what to add if the last run's weights stay, and the limits, stand beside the weights."""
     window, job = windows[0], turbo / "checked.toml"
@@ -270,6 +265,7 @@ def test_material_is_removed_where_the_command_line_says(turbo, serve, windows):
     assert window.text("#now .why").startswith("Fail")
 
 
+@pytest.mark.full
 def test_a_check_run_is_that_of_the_pieces_in_the_holes(shared, windows):
     window, served = windows[0], shared("holes.toml")
     job, turbo = served.job, served.job.parent
@@ -284,6 +280,7 @@ def test_a_check_run_is_that_of_the_pieces_in_the_holes(shared, windows):
     assert mounted == [[row["plane"], pytest.approx(row["mass"], rel=1e-4)] for row in planes]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("job", ["new", "holes.toml", "checked.toml"])
 def test_nothing_sticks_out_and_axe_finds_nothing_serious(tmp_path, serve, shared, windows, job):
     axe = Path(pytest.importorskip("axe_core_python").__file__).parent / "axe.min.js"

@@ -187,6 +187,7 @@ def test_changes_from_outside_are_noticed(shared):
     assert found["corrections"] == command(job)["corrections"]
 
 
+@pytest.mark.full
 def test_long_work_runs_aside_and_is_given_up_when_the_input_changes(tmp_path, serve):
     folder = copy(tmp_path)
     job = folder / "holes.toml"
@@ -288,6 +289,7 @@ def test_a_folder_that_is_not_there_yet_becomes_a_job(tmp_path, serve):
     assert serve(tmp_path / "my_fan").state()["settings"] == {"runs": "runs.csv", "phase": "lag"}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("given", ["no_such/job.toml", "runs.csv", "."])
 def test_what_is_no_job_is_refused_with_one_sentence(tmp_path, given):
     folder = copy(tmp_path)
@@ -305,6 +307,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
     assert done.stderr == 'rotorid: the worksheet needs uvicorn: pip install "rotorid[worksheet]"\n'
 
 
+@pytest.mark.full
 def test_a_workbook_of_rotorid_is_edited_and_another_is_not(tmp_path, serve):
     import openpyxl
 

@@ -98,6 +98,7 @@ def test_the_form_has_headers_explanations_and_choices():
     assert choices("planes")["E2:E1048576"] == ["yes", "no"]
 
 
+@pytest.mark.full
 def test_every_name_that_the_form_offers_is_known(tmp_path):
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
     path = filled(tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS))

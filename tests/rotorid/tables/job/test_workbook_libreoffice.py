@@ -39,6 +39,7 @@ def saved(folder, *paths):
     return found
 
 
+@pytest.mark.full
 def test_results_of_every_sample_job_survive_libreoffice(tmp_path):
     folder = tmp_path / "in"  # as far from the tables of the samples as what comes out
     folder.mkdir()

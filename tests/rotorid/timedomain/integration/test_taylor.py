@@ -37,6 +37,7 @@ def model_of(rates, size=1.0, **options):
     return ode_model(rates, initial={"x": 0.4 * size, "v": "c"}, estimate=estimate, **options)
 
 
+@pytest.mark.full
 def test_drawn_models_in_drawn_units_are_integrated_as_without_it(monkeypatch):
     monkeypatch.setattr(taylor, "WORK", 1)
     rng, compiled = np.random.default_rng(1), 0

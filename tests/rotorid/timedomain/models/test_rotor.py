@@ -42,6 +42,7 @@ def test_bearing_of_a_finite_element_rotor_from_its_decay():
     assert (found.std < 0.05 * truth).all()
 
 
+@pytest.mark.full
 def test_frequency_of_the_model_in_time_is_that_of_the_rotor():
     rotor = read_rotor(ROTOR)
     motion = fem.equations_of_motion(rotor, plane="x")

@@ -5,7 +5,7 @@ with 3 % from run to run. A further machine of the type is balanced from its bas
 run in one plane, then in all. Three kinds: each coefficient for itself, planes alike (the sensors' gains and
 delays differ), the whole machine alike. Of odd machines there are three in each type.
 
-    python examples/coverage_fleet.py [TYPES [SEED [MACHINES]]]
+    python tests/coverage/coverage_fleet.py [TYPES [SEED [MACHINES]]]
 """
 
 from __future__ import annotations

@@ -1,69 +1,43 @@
 """Drawn machines, calibrated, balanced in one shot: how well, how honest the intervals, what is recognised.
 
-The example with few machines; bounds are those of what it prints for many (docs/coverage_calibrate.md), by
+The example with few machines; bounds are those of what it prints for many (docs/sure.md), by
 the binomial distribution of so few.
 """
 
-import importlib.util
 import re
-import sys
 from dataclasses import replace
-from pathlib import Path
 
+import coverage_calibrate as example
 import numpy as np
 import pytest
+import sure
 from repetitions import DEVIATIONS, FULL, highest_share, lowest_share
 
-PATH = Path(__file__).parents[3] / "examples" / "coverage_calibrate.py"
 EACH = 60 if FULL else 3
 """Machines of each kind."""
 SEED = 2
 
 
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("coverage_calibrate", PATH)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    if not FULL:
-        module.calibrate = searched_once(module.calibrate)
-    yield module
-    del sys.modules[spec.name]
-
-
-def searched_once(calibrate):
-    """Where one start does not explain the readings, more are made by `make test-full` alone."""
-    last = []
-
-    def found(*given, starts=None, **options):
-        if starts is not None:
-            last[:] = [calibrate(*given, starts=starts, **options)]
-        return last[0]
-
-    return found
-
-
-def simulated(example, case, each=EACH, names=None):
+def simulated(case, each=EACH, names=None):
     return [one for name in names or example.MACHINES for one in example.simulate(each, SEED, name, case)]
 
 
 @pytest.fixture(scope="module")
-def four(example):
-    return simulated(example, "four speeds")
+def four():
+    return simulated("four speeds")
 
 
 @pytest.fixture(scope="module")
-def single(example):
-    return simulated(example, "one speed", EACH if FULL else 2)
+def single():
+    return simulated("one speed", EACH if FULL else 2)
 
 
 @pytest.fixture(scope="module")
-def exact(example):
-    return simulated(example, "exact, four speeds", max(EACH // 2, 2))
+def exact():
+    return simulated("exact, four speeds", max(EACH // 2, 2))
 
 
-def test_one_shot_at_four_speeds(example, four):
+def test_one_shot_at_four_speeds(four):
     good = [one.good for one in four]
     assert np.mean(good) >= lowest_share(len(good), 0.95)
     believed = [one.left_believed <= max(example.GOOD, example.NEAR * one.left_exact) for one in four]
@@ -99,26 +73,29 @@ def test_numbers_wrongly_taken_as_exact(exact):
     assert np.mean([one.told for one in soft]) >= lowest_share(len(soft), 0.95)
 
 
-def test_a_third_bearing_is_recognised(example):
-    found = simulated(example, "third bearing", max(EACH // 3, 1))
+def test_a_third_bearing_is_recognised():
+    found = simulated("third bearing", max(EACH // 3, 1))
     assert np.mean([one.told for one in found]) >= max(lowest_share(len(found), 0.95), 0.6)  # two of three
 
 
-def test_errors_between_runs_that_nobody_states_are_noticed(example, monkeypatch):
+def test_errors_between_runs_that_nobody_states_are_noticed(monkeypatch):
     whole = example.trials
-    monkeypatch.setattr(example, "trials", lambda *given: replace(whole(*given), run_errors=None))
-    found = simulated(example, "four speeds", names=None if FULL else ["compressor"])
+    monkeypatch.setattr("trials", lambda *given: replace(whole(*given), run_errors=None))
+    found = simulated("four speeds", names=None if FULL else ["compressor"])
     n = sum(len(one.numbers) for one in found)
     off = sum(one.joint for one in found) / n > 1 + DEVIATIONS * np.sqrt(2 / n)
     assert off or np.mean([one.told for one in found]) > highest_share(len(found), 0.01)
 
 
-def test_the_tables_are_those_of_the_page(example, four, capsys):
+def test_the_tables_are_those_of_the_page(four, capsys):
     example.report(lambda name, case: four)
     text = capsys.readouterr().out
-    page = (PATH.parents[1] / "docs" / "coverage_calibrate.md").read_text(encoding="utf-8")
-    shown = [line for block in page.split("```text\n")[1:] for line in block.split("```")[0].splitlines()]
+    shown = shown_lines("calibrate")
     assert [name(line) for line in shown if line] == [name(line) for line in text.splitlines() if line]
+
+
+def shown_lines(table):
+    return [line for block in sure.blocks(table) for line in block.splitlines()]
 
 
 def name(line):

@@ -1,7 +1,7 @@
 """Are the intervals of an identification honest? Simulated repetitions of tests whose truth is known.
 
-Run `python examples/coverage_identify.py [repetitions]`. For each case, method and parameter it prints the
-share of 95 % intervals that contain the truth, the bias in standard deviations and the relative standard
+Run `python tests/coverage/coverage_identify.py [repetitions]`. For each case, method and parameter it prints
+the share of 95 % intervals that contain the truth, the bias in standard deviations and the relative standard
 deviation.
 """
 

@@ -1,6 +1,6 @@
 """Do the intervals of a run-up's critical speeds and damping hold the truth? Drawn rotors of two modes.
 
-Run `python examples/coverage_runup.py [seed] [rotors]`, rotors at each acceleration (1 and 500).
+Run `python tests/coverage/coverage_runup.py [seed] [rotors]`, rotors at each acceleration (1 and 500).
 
 A rotor has critical speeds of 900 to 1500 rpm and 1.7 to 2.4 times that, damping of 1 to 5 %, and unbalance
 of both modes at angles of their own. It runs up from 300 rpm to 1.25 times its second critical speed, or

@@ -1,6 +1,7 @@
 """Are the 95 % regions of the correction weights honest? Drawn jobs whose truth is known.
 
-Run `python examples/coverage_balance.py [jobs]`, jobs of each table (2500). An ordinary job: 1–4 planes, 2–8
+Run `python tests/coverage/coverage_balance.py [jobs]`, jobs of each table (2500).
+An ordinary job: 1–4 planes, 2–8
 sensors, 1–5 speeds, more readings than planes; coefficients normal, with different sensitivities of sensors
 (30 %) and speeds (50 %); a trial weight for each plane, 0.3–1.5 of its correction; 0.5–5 % of error in each
 reading, and errors between runs: none in a fifth of the jobs, else up to 5 %. Spare runs are one to four, the

@@ -1,6 +1,6 @@
 """Does a calibrated rotor balance in one shot, do its intervals hold, is a misfit seen? Drawn machines.
 
-Run `python examples/coverage_calibrate.py [seed] [machines]`, machines of each case (1 and 510: three hours).
+Run `python tests/coverage/coverage_calibrate.py [seed] [machines]`, machines of each case (1, 510: 3 hours).
 
 A machine is the compressor of `sample_data`, its rotor23 on unlike bearings, or an overhung fan of drawn
 sizes on soft pedestals. Its bearings differ by 20 % from what is believed, each coefficient on its own,
@@ -163,7 +163,7 @@ def overhung(random: Random) -> Machine:
     return Machine(rotor, (1, 6, 9, 16, 17), (1, 17), (4, 13), critical * np.array([0.7, 0.9, 1.1, 1.4]))
 
 
-SAMPLES = Path(__file__).parents[1] / "sample_data"
+SAMPLES = Path(__file__).parents[2] / "sample_data"
 MACHINES: dict[str, Callable[[Random], Machine]] = {
     "compressor": compressor,
     "rotor23": rotor23,

@@ -1,28 +1,13 @@
 """Intervals contain the truth as often as they say: simulated repetitions of tests whose truth is known."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
+import coverage_identify as example
 import numpy as np
 import pytest
 from repetitions import FULL, highest_share, lowest_share, of_a_mean, repetitions
 
-PATH = Path(__file__).parents[3] / "examples" / "coverage_identify.py"
-
-
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("coverage_identify", PATH)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[spec.name]
-
 
 @pytest.mark.parametrize("case", ["task_5_1", "two_masses"])
-def test_intervals_of_output_error_contain_the_truth_in_95_percent(example, case):
+def test_intervals_of_output_error_contain_the_truth_in_95_percent(case):
     n = repetitions(2000)
     found = example.repeat(getattr(example, case)(), "output-error", n)
     assert (found.coverage >= lowest_share(n, 0.95)).all(), found.coverage
@@ -31,18 +16,18 @@ def test_intervals_of_output_error_contain_the_truth_in_95_percent(example, case
     assert (np.abs(found.bias) < of_a_mean(n) + 0.01).all(), found.bias
 
 
-def test_without_stated_errors_the_residuals_give_honest_intervals(example):
+def test_without_stated_errors_the_residuals_give_honest_intervals():
     found = example.repeat(example.two_masses(), "output-error", 200 if FULL else 150, stated=False)
     assert (found.coverage > 0.91).all(), found.coverage
 
 
-def test_in_task_5_1_the_linear_estimate_is_as_good(example):
+def test_in_task_5_1_the_linear_estimate_is_as_good():
     found = example.repeat(example.task_5_1(), "equation-error", 300 if FULL else 150)
     assert (np.abs(found.bias) < 0.2).all(), found.bias
     assert (found.coverage > 0.91).all(), found.coverage
 
 
-def test_near_a_resonance_the_linear_estimate_is_biased_and_output_error_is_not(example):
+def test_near_a_resonance_the_linear_estimate_is_biased_and_output_error_is_not():
     case = example.near_resonance()
     plain = example.repeat(case, "equation-error", 150 if FULL else 50, stated=False)
     assert (plain.coverage < 0.4).all(), plain.coverage
@@ -55,7 +40,7 @@ def test_near_a_resonance_the_linear_estimate_is_biased_and_output_error_is_not(
     assert (output.coverage > 0.91).all(), output.coverage
 
 
-def test_the_figures_are_printed(example, capsys):
+def test_the_figures_are_printed(capsys):
     example.main(3)
     text = capsys.readouterr().out
     assert "two masses near a resonance, 5 % and 3°" in text

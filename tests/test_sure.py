@@ -1,0 +1,146 @@
+"""Every claim of an error in short: of draws with a known truth, the mean of eᵀC⁻¹e over its size is near 1.
+
+A ± that is 1.3 times too small or too large gives 1.7 or 0.59. How often intervals and regions hold is
+counted in tests/coverage, which `make test-full` runs.
+"""
+
+import coverage_balance
+import coverage_fleet
+import coverage_identify
+import coverage_runup
+import numpy as np
+import pytest
+from helpers.calibration.jobs import Runs, machine
+
+from balancing import ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
+from balancing.coefficients.machine_type import fit_type
+from balancing.correction.update_coefficients import update
+from balancing.data.conventions import Labels
+from fem.model.rotor_parameters import with_parameters
+from rotorid.calibration import Unknown, calibrate
+from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
+from rotorid.harmonic.experiments import experiments
+from rotorid.regression import stretch
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.integration.simulate import simulate
+from rotorid.timedomain.models.ode_model import ode_model
+from rotorid.timedomain.models.record import Record
+
+RPM = np.pi / 30
+
+
+def square(error, covariance):
+    """eᵀC⁻¹e over its dimension."""
+    return error @ np.linalg.solve(covariance, error) / len(error)
+
+
+def assert_near_one(squares):
+    assert 20 <= len(squares) <= 60
+    assert 0.6 < np.mean(squares) < 1.6, np.mean(squares)
+
+
+@pytest.mark.parametrize("kind", coverage_balance.KINDS)
+def test_weights_of_a_correction(kind):
+    rng, squares = np.random.default_rng([30, coverage_balance.KINDS.index(kind)]), []
+    while len(squares) < 30:
+        job = coverage_balance.draw(rng, "stated", kind, (0.02, 0.02))
+        try:
+            answer = correct(estimate_influence(job.trials))
+        except UndeterminedError:
+            continue
+        if not answer.warnings:
+            squares.append(square(stretch(answer.weights - job.D), answer.covariance))
+    assert_near_one(squares)
+
+
+def test_weights_and_readings_of_a_first_shot():
+    weights, readings = [], []
+    for seed in range(3):
+        rng = np.random.default_rng([31, seed])
+        drawn = coverage_fleet.draw(rng, "each coefficient")
+        prior = fit_type(drawn.records, *drawn[2:]).influence(Labels())
+        P = len(drawn.planes)
+        for m in range(50, 62):
+            D = coverage_fleet.normal(rng, P)
+            Y = coverage_fleet.read(rng, -drawn.W[m] @ D)[None]
+            errors = ReadingErrors(coverage_fleet.RUN, coverage_fleet.RUN)
+            trials = Trials(("0",), *drawn[2:], Y, np.zeros((1, P), dtype=complex), errors=errors)
+            answer = correct(update(prior, trials)[0], refuse=False)
+            if answer.warnings:
+                continue
+            weights.append(square(stretch(answer.weights - D), answer.covariance))
+            check = coverage_fleet.read(rng, drawn.W[m] @ (answer.weights - D))
+            off = stretch((check - answer.after).ravel()).reshape(-1, 2)
+            covariances = answer.after_covariance.reshape(-1, 2, 2)
+            readings.append(np.mean([square(*one) for one in zip(off, covariances, strict=True)]))
+    assert_near_one(weights)
+    assert_near_one(readings)
+
+
+@pytest.mark.parametrize("case", ["task_5_1", "two_masses"])
+def test_parameters_of_output_error(case):
+    case, rng, squares = getattr(coverage_identify, case)(), np.random.default_rng(32), []
+    for _ in range(40):
+        found = identify(
+            case.model, coverage_identify.simulate(case, rng), method="output-error", start=case.truth
+        )
+        squares.append(square(found.values - list(case.truth.values()), found.covariance))
+    assert_near_one(squares)
+
+
+def test_parameters_with_a_prior():
+    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    rng, w, squares = np.random.default_rng(33), np.array([9.0, 10.0, 11.0, 12.0]), []
+    for _ in range(40):
+        c, b = rng.normal(1000, 20), rng.normal(20, 0.5)
+        noise = np.exp(0.05 * rng.standard_normal(4) + 0.05j * rng.standard_normal(4))
+        X = 10 / (c - 10 * w**2 + 1j * b * w) * noise
+        data = experiments(model, w, {"X": X, "F": 10.0}, errors=AmplitudeErrors(relative=0.05, phase=0.05))
+        found = identify(model, data, method="output-error", prior={"c": (1000.0, 20.0), "b": (20.0, 0.5)})
+        squares.append(square(found.values - [c, b], found.covariance))
+    assert_near_one(squares)
+
+
+def test_parameters_of_records():
+    equations = {"x": "v", "v": "-k*x - d*v"}
+    truth, times, rng, squares = [4.0, 0.4], np.linspace(0.0, 3.0, 16), np.random.default_rng(34), []
+    model = ode_model(
+        equations,
+        initial={"x": "record", "v": "record"},
+        outputs={"x": "x", "v": "v"},
+        estimate={"k": 3.5, "d": 0.3},
+    )
+    exact = simulate(
+        ode_model(
+            equations,
+            initial={"x": 1.0, "v": 0.5},
+            outputs={"x": "x", "v": "v"},
+            estimate={"k": 3.5, "d": 0.3},
+        ),
+        truth,
+        times,
+        sensitivities=False,
+    ).y
+    for _ in range(30):
+        x, v = (exact + 0.05 * rng.standard_normal(exact.shape)).T
+        found = fit(model, Record(times, {"x": x, "v": v}, sigma={"x": 0.05, "v": 0.05}))
+        squares.append(np.mean(((found.values - [*truth, 1.0, 0.5]) / found.std) ** 2))
+    assert_near_one(squares)
+
+
+def test_numbers_of_a_calibrated_rotor():
+    values = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy": 2.2e4, "disc[1].mass": 25.0}
+    unknowns = [Unknown(path, start=value) for path, value in values.items()]
+    runs, rng, squares = Runs(speeds=(180.0, 300.0), free=False), np.random.default_rng(35), []
+    exact, errors = runs.readings(with_parameters(machine(), values)), ReadingErrors(0.02, 0.02)
+    for _ in range(20):
+        a, b = rng.standard_normal((2, *exact.shape))
+        readings = exact * (1 + 0.02 * a) * np.exp(0.02j * b)
+        found = calibrate(machine(), unknowns, [runs.data(readings, errors=errors)], starts=1)
+        squares.append(square(found.values - list(values.values()), found.covariance))
+    assert_near_one(squares)
+
+
+def test_modes_of_a_run_up():
+    outcomes = [coverage_runup.one_rotor(np.random.default_rng([36, k]), 60.0) for k in range(20)]
+    assert_near_one([np.mean(one.errors**2) for one in outcomes])
