@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact lint docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact golden-mutations lint docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -38,7 +38,7 @@ demo: $(VENV)/.user
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
-# Simulations with all their repetitions instead of 300.
+# Simulations with all their repetitions instead of 300; stored answers with other kernels of BLAS, too.
 test-full: $(VENV)/.dev
 	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
@@ -56,12 +56,22 @@ MUTANTS ?= 5000
 fuzz: $(VENV)/.dev
 	PYTHONPATH=tests:. $(BIN)/python -m fuzz --seed $(SEED) --mutants $(MUTANTS) --jobs $(JOBS)
 
-# Stored outputs of every command on every sample (tests/golden): after a change that is meant to change them.
+# Stored answers (tests/golden): after a change that is meant to change them.
 golden: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden store
 
-# The same byte for byte with another commit, on this machine: make golden-exact PARENT=main
+# Exit status, keys and numbers beside those of another commit in an environment of its own, within tolerances; prints
+# what differs, stores nothing: make golden-near PARENT=main CASES=all (stored: the stored ones only)
 PARENT ?= HEAD~1
+CASES ?= stored
+golden-near: $(VENV)/.dev
+	PYTHONPATH=tests $(BIN)/python -m golden near $(PARENT) $(CASES)
+
+# Eight wrong formulas: does the comparison with the unmutated tree, and with what is stored, see each?
+golden-mutations: $(VENV)/.dev
+	PYTHONPATH=tests $(BIN)/python -m golden mutations
+
+# All that every command prints and writes, byte for byte with another commit: make golden-exact PARENT=main
 golden-exact: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden exact $(PARENT)
 

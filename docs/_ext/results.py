@@ -1,4 +1,4 @@
-"""`{validation}`, `{benchmarks}`, `{answers}`: tables of what the program computes, made with the pages."""
+"""`{validation}`, `{benchmarks}`: tables of what the program computes, made with the pages."""
 
 from __future__ import annotations
 
@@ -16,45 +16,6 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 STORED = Path(__file__).parents[1] / "benchmarks.json"
-OUTPUTS = Path(__file__).parents[2] / "tests" / "golden" / "stored"
-ANSWERS = (
-    *(
-        "turbo",
-        "holes-plot",
-        "checked",
-        "turbo-limit",
-        "model-job",
-        "rk4",
-        "unbalance-model-job",
-        "split-holes",
-    ),
-    *("fleet-add", "fleet-show", "fleet-fit"),
-    *("split-drill", "trial-weight", "tolerance", "critical-rotor23", "campbell-compressor"),
-    *(
-        "response-compressor",
-        "influence-compressor",
-        "study",
-        "bearings",
-        "motion",
-        "periodic-jumps",
-        "reduce-report",
-        "reduce-rank",
-        "identify-task_5_1",
-    ),
-    *(
-        "identify-task_4_1",
-        "identify-two-models",
-        "fit-run_down",
-        "simulate-lesson-5",
-        "modes-chain",
-        "vectors",
-        "runup-record",
-        "calibrate",
-        "validate",
-        "demo-main",
-    ),
-)
-"""Stored outputs that `{answers}` counts: those of every command on its sample."""
 
 
 class ValidationTable(SphinxDirective):
@@ -141,24 +102,6 @@ def benchmark_nodes(document: Mapping[str, Any]) -> list[nodes.Node]:
     return [paragraph(f"Measured with {document['machine']}."), table(head, lines)]
 
 
-class AnswerTable(SphinxDirective):
-    """How long the answers of the commands are, from the stored outputs with which the tests compare."""
-
-    def run(self) -> list[nodes.Node]:
-        """The table."""
-        for name in ANSWERS:
-            self.env.note_dependency(str(OUTPUTS / f"{name}.txt"))
-        return [table(("command", "lines", "width"), [answer_row(name) for name in ANSWERS])]
-
-
-def answer_row(name: str) -> tuple[str, str, str]:
-    """The command of a stored output, how many lines it prints, and the columns of the widest."""
-    stored = (OUTPUTS / f"{name}.txt").read_text(encoding="utf-8")
-    status, _, rest = stored.removeprefix("=== status\n$ ").partition("\n=== output\n")
-    lines = rest.partition("\n=== ")[0].rstrip("\n").splitlines()
-    return f"`{status.splitlines()[0]}`", str(len(lines)), str(max(map(len, lines)))
-
-
 def number(value: float | None, digits: int) -> str:
     """A number with so many digits and a real minus; a dash where there is none."""
     if value is None:
@@ -170,5 +113,4 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("validation", ValidationTable)
     app.add_directive("benchmarks", BenchmarkTable)
-    app.add_directive("answers", AnswerTable)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

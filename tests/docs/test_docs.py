@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.base.answer import COLUMNS, LINES
-
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 for _folder in (DOCS / "_ext", DOCS):
@@ -285,26 +283,6 @@ def test_measured_times_are_shown_and_differing_answers_are_refused():
     ]
     with pytest.raises(ValueError, match="critical speeds"):
         results.benchmark_nodes({"machine": "x", "rows": [row | {"difference": 1e-3}]})
-
-
-def test_the_answers_of_all_commands_are_counted_and_fit_a_terminal(built):
-    counted = [results.answer_row(name) for name in results.ANSWERS]
-    typed = [row[0].removeprefix("`rotorid ") for row in counted]
-    assert {re.match(r"(fleet )?\S+", words)[0] for words in typed} == {
-        name for name, _ in command_pages.all_commands() if name not in ("schema", "worksheet")
-    }
-    text = text_of(page(built, "commands"))
-    for command, lines, widest in counted:
-        assert 3 <= int(lines) <= LINES, command
-        assert int(widest) <= COLUMNS, command
-        assert f"{command.strip('`')} {lines} {widest}" in text
-
-
-def test_an_answer_is_counted_without_what_stands_around_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "OUTPUTS", tmp_path)
-    stored = "=== status\n$ rotorid split 3g\nstatus 0\n=== output\nMount it.\n\n  ± 1\n\n=== error\nlonger\n"
-    (tmp_path / "one.txt").write_text(stored, encoding="utf-8")
-    assert results.answer_row("one") == ("`rotorid split 3g`", "3", "9")
 
 
 def test_bars_and_stars_of_docstrings_are_taken_literally():

@@ -529,32 +529,11 @@ def _all() -> list[Case]:
 CASES = {case.name: case for case in _all()}
 
 STORED = tuple(
-    """
-balance-equations bearings bearings-linear calibrate-critical calibrate-design calibrate-rk4
-campbell-compressor-coarse campbell-model-job checked-grade-positions checked-refine checked-verbose
-combined critical-compressor-map critical-rk4 critical-rotor23 critical-rotor23-mesh demo-list
-fit-design fit-equations fit-prior-auto fit-run-down-plot fit-shooting fleet-add fleet-fit
-fleet-show-type holes-minmax holes-report identify-design identify-equations identify-modes
-identify-output-error identify-task_3_3 identify-two-models influence-coarse model-job-ridge
-modes-chain motion-run-up one-shot periodic-jumps reduce-apart reduce-book reduce-compressor-json
-reduce-equations reduce-errors reduce-everything reduce-force reduce-given-relative
-reduce-keep-supports reduce-model-job reduce-output reduce-place-mac reduce-rank response-report
-runup-record schema-study simulate-modes simulate-record simulate-record-errors split-drill
-split-free split-grind split-holes split-scale split-stock split-sum split-two study study-starts
-tolerance-positions trial-weight trial-weight-critical trial-weight-model-all trial-weight-tried
-turbo turbo-lag turbo-limit-minmax turbo-output turbo-stored turbo-trade-off turbo-truncate type
-type-foreign type-refined unbalance-modal unbalance-model-job unbalance-ridge validate
-vectors-run-up waveforms
-""".split()
+    ["balance-equations", "bearings", "bearings-linear", "calibrate-critical", "calibrate-design", "calibrate-rk4", "campbell-compressor-coarse", "campbell-model-job", "checked-grade-positions", "checked-refine", "checked-verbose", "combined", "critical-compressor-map", "critical-rk4", "critical-rotor23", "critical-rotor23-mesh", "demo-list", "fit-design", "fit-equations", "fit-prior-auto", "fit-run-down-plot", "fit-shooting", "fleet-add", "fleet-fit", "fleet-show-type", "holes-minmax", "holes-report", "identify-design", "identify-equations", "identify-modes", "identify-output-error", "identify-task_3_3", "identify-two-models", "influence-coarse", "model-job-ridge", "modes-chain", "motion-run-up", "one-shot", "periodic-jumps", "reduce-apart", "reduce-book", "reduce-compressor-json", "reduce-equations", "reduce-errors", "reduce-everything", "reduce-force", "reduce-given-relative", "reduce-keep-supports", "reduce-model-job", "reduce-output", "reduce-place-mac", "reduce-rank", "response-report", "runup-record", "schema-study", "simulate-modes", "simulate-record", "simulate-record-errors", "split-drill", "split-free", "split-grind", "split-holes", "split-scale", "split-stock", "split-sum", "split-two", "study", "study-starts", "tolerance-positions", "trial-weight", "trial-weight-critical", "trial-weight-model-all", "trial-weight-tried", "turbo", "turbo-lag", "turbo-limit-minmax", "turbo-output", "turbo-stored", "turbo-trade-off", "turbo-truncate", "type", "type-foreign", "type-refined", "unbalance-modal", "unbalance-model-job", "unbalance-ridge", "validate", "vectors-run-up", "waveforms"]
 )
 """Cases whose documents are stored: together they run what the documents of all cases run, but for the longest ones."""
 
 REFUSED = tuple(
-    """
-balance-missing-run balance-misspelt-column balance-misspelt-key balance-no-file balance-ending
-balance-undetermined calibrate-no-bearing calibrate-says-nothing critical-misspelt critical-missing
-critical-two-into-one fit-no-output fit-not-measured fleet-add-nothing identify-misspelt
-identify-no-column study-misspelt trial-weight-nothing vectors-no-tacho workbook-empty
-""".split()
+    ["balance-missing-run", "balance-misspelt-column", "balance-misspelt-key", "balance-no-file", "balance-ending", "balance-undetermined", "calibrate-no-bearing", "calibrate-says-nothing", "critical-misspelt", "critical-missing", "critical-two-into-one", "fit-no-output", "fit-not-measured", "fleet-add-nothing", "identify-misspelt", "identify-no-column", "study-misspelt", "trial-weight-nothing", "vectors-no-tacho", "workbook-empty"]
 )
 """Cases whose exit status and place of the complaint are stored."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-
 from typing import Any
 
 from golden.document import Arrays, is_number
@@ -74,5 +73,3 @@ def _leaves(values: Any, place: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(value, f"{place}[{i}]")
     else:
         yield place, values
-
-

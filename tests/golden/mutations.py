@@ -1,1 +1,115 @@
-def mutations(): ...
+"""Eight wrong formulas, and whether the net sees them: `make golden-mutations`."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from golden.cases import CASES, REFUSED, STORED
+from golden.comparing import compare
+from golden.parent import apart
+from golden.running import HERE, run
+from golden.storing import read, storable
+
+PRODUCT = ("fem", "balancing", "rotorid", "sample_data")
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """A wrong formula: in a file, `new` instead of `old`, which stands there once."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+
+    def apply(self, tree: Path) -> None:
+        """Write it into a tree; ValueError where the file is not as it was when this was written."""
+        path = tree / self.file
+        text = path.read_text(encoding="utf-8") if path.is_file() else ""
+        if text.count(self.old) != 1:
+            raise ValueError(
+                f"{self.name}: {self.file} has {self.old!r} {text.count(self.old)} times, not once"
+            )
+        path.write_text(text.replace(self.old, self.new), encoding="utf-8")
+
+
+MUTATIONS = (
+    Mutation(
+        "formula (50)'s weight",
+        "rotorid/reduction/equivalent/equivalent_masses_formula_50.py",
+        "omega[..., None, :] ** 2",
+        "omega[..., None, :]",
+    ),
+    Mutation(
+        "sign of phase lag",
+        "balancing/data/conventions.py",
+        'return 1 if self.phase == "lead" else -1',
+        'return 1 if self.phase == "lead" else 1',
+    ),
+    Mutation(
+        "sign of seal damping",
+        "fem/model/supports.py",
+        "return both[..., 0, :, :], both[..., 1, :, :]",
+        'return both[..., 0, :, :], both[..., 1, :, :] * (-1 if self.kind == "seal" else 1)',
+    ),
+    Mutation(
+        "stacking of speeds",
+        "balancing/correction/correct.py",
+        "        Y.ravel(),",
+        "        Y[::-1].ravel(),",
+    ),
+    Mutation(
+        "one entry of the gyroscopic matrix",
+        "fem/matrices/elements.py",
+        "return [(2 * rotor.density * rotor.second_moment / rotor.length, _TILT)]",
+        "return [(2 * rotor.density * rotor.second_moment / rotor.length, _TILT * (1 - 2 * np.diag(np.eye(6)[0])))]",
+    ),
+    Mutation(
+        "the Student quantile",
+        "rotorid/regression/estimate.py",
+        "stdtrit(dof, 0.975)",
+        "stdtrit(dof, 0.95)",
+    ),
+    Mutation("the unit mil", "rotorid/tables/reader/units.py", '"mil": (254.0, 1e7)', '"mil": (254.0, 1e6)'),
+    Mutation(
+        "rounding of a hole's angle",
+        "balancing/mounting/holes.py",
+        "np.arange(int(n)) / int(n), 2 * np.pi)",
+        "np.arange(int(n)) / int(n) + np.radians(0.5), 2 * np.pi)",
+    ),
+)
+
+
+def mutations() -> int:
+    """Run the stored cases with each mutation; 1 where the net is blind to one."""
+    names = [*STORED, *REFUSED]
+    with ThreadPoolExecutor(2) as pool:
+        right, *wrong = pool.map(lambda mutation: _outcomes(mutation, names), (None, *MUTATIONS))
+    blind = 0
+    for mutation, outcomes in zip(MUTATIONS, wrong, strict=True):
+        near = apart(right, outcomes)
+        stored = [name for name in names if compare(name, read(name), storable(name, outcomes[name]))]
+        files = Counter(f"tests/golden/test_{CASES[name].group}.py" for name in stored)
+        blind += not near or not stored
+        print(
+            f"{mutation.name}: golden-near {len(near)} cases ({', '.join([*near][:3])}); make test {dict(files)}"
+        )
+    print(f"{len(MUTATIONS)} mutations, {blind} not seen")
+    return 1 if blind else 0
+
+
+def _outcomes(mutation: Mutation | None, names: list[str]) -> Mapping[str, Any]:
+    with tempfile.TemporaryDirectory(prefix="mutation") as folder:
+        tree = Path(folder)
+        for name in PRODUCT:
+            shutil.copytree(HERE / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+        if mutation:
+            mutation.apply(tree)
+        return run(names, tree)

@@ -40,11 +40,20 @@ def worktree(commit: str) -> Iterator[Path]:
 def python_of(tree: Path) -> str:
     """Its interpreter: this one where it requires the same, else that of the environment its Makefile makes there."""
     same = all(
-        (tree / name).is_file() and (tree / name).read_bytes() == (HERE / name).read_bytes() for name in REQUIREMENTS
+        (tree / name).is_file() and (tree / name).read_bytes() == (HERE / name).read_bytes()
+        for name in REQUIREMENTS
     )
     if same:
         return sys.executable
-    drop = ("MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES", "VENV", "CONSTRAINTS", "PIP_CONSTRAINT", "PIP_BUILD_CONSTRAINT")
+    drop = (
+        "MAKEFLAGS",
+        "MFLAGS",
+        "MAKEOVERRIDES",
+        "VENV",
+        "CONSTRAINTS",
+        "PIP_CONSTRAINT",
+        "PIP_BUILD_CONSTRAINT",
+    )
     env = {name: value for name, value in os.environ.items() if name not in (*drop, "PYTHONPATH")}
     subprocess.run(["make", "-s", "-C", str(tree), ".venv/.dev"], check=True, env=env)
     return str(tree / ".venv" / "bin" / "python")
@@ -108,7 +117,9 @@ def flat(outcome: Mapping[str, Any]) -> dict[str, str]:
     """All that a case gave as named texts."""
     forms = {"json": outcome, "text": outcome.get("text", {})}
     texts = {
-        f"{form} {key}": str(given.get(key, "")) for form, given in forms.items() for key in ("status", "output", "error")
+        f"{form} {key}": str(given.get(key, ""))
+        for form, given in forms.items()
+        for key in ("status", "output", "error")
     }
     return texts | outcome.get("files", {})
 

@@ -53,7 +53,9 @@ def read(name: str) -> Arrays:
 
 def written(table: dict[str, Any]) -> str:
     """JSON with one line a key."""
-    lines = [f"{json.dumps(k, ensure_ascii=False)}: {json.dumps(v, ensure_ascii=False)}" for k, v in table.items()]
+    lines = [
+        f"{json.dumps(k, ensure_ascii=False)}: {json.dumps(v, ensure_ascii=False)}" for k, v in table.items()
+    ]
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
@@ -68,4 +70,6 @@ def store() -> None:
         (FOLDER / f"{name}.json").write_text(written(table), encoding="utf-8")
     size = sum(file.stat().st_size for file in FOLDER.iterdir())
     seconds = sum(outcome.get("seconds", 0) for outcome in outcomes.values())
-    print(f"{len(STORED)} documents, {len(REFUSED)} refusals, {size / 1000:.0f} kB, {seconds:.0f} s of processor")
+    print(
+        f"{len(STORED)} documents, {len(REFUSED)} refusals, {size / 1000:.0f} kB, {seconds:.0f} s of processor"
+    )

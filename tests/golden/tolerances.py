@@ -71,7 +71,16 @@ _DRAWN = "the spread comes from draws, or from a linearization beside them"
 SPREAD = tuple(
     Tolerance("*", key, _DRAWN, relative=0.15)
     for key in (
-        *("*std", "*std[[]*", "*std_*", "*_std*", "*covariance*", "*correlation*", "*interval*", "*uncertainty*"),
+        *(
+            "*std",
+            "*std[[]*",
+            "*std_*",
+            "*_std*",
+            "*covariance*",
+            "*correlation*",
+            "*interval*",
+            "*uncertainty*",
+        ),
         *("*_low", "*_low[[]*", "*_high", "*_high[[]*", "*quantile*", "*probabilit*", "*95*", "*spread*"),
     )
 )
