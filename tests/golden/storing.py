@@ -70,6 +70,5 @@ def store() -> None:
         (FOLDER / f"{name}.json").write_text(written(table), encoding="utf-8")
     size = sum(file.stat().st_size for file in FOLDER.iterdir())
     seconds = sum(outcome.get("seconds", 0) for outcome in outcomes.values())
-    print(
-        f"{len(STORED)} documents, {len(REFUSED)} refusals, {size / 1000:.0f} kB, {seconds:.0f} s of processor"
-    )
+    count = f"{len(STORED)} documents, {len(REFUSED)} refusals"
+    print(f"{count}, {size / 1000:.0f} kB, {seconds:.0f} s of processor")

@@ -69,9 +69,9 @@ def complaints(words, output):
 
 def test_an_answer_fits_a_terminal_and_begins_with_the_judgement(printed):
     assert len(printed) >= len(FEW)
-    assert {name: complaints(CASES[name].words, text) for name, text in printed.items()} == dict.fromkeys(
-        printed, []
-    )
+    assert {name: complaints(CASES[name].words, text) for name, text in printed.items()} == {
+        name: [] for name in printed
+    }
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The net finds what it is there for: changes of a key, a length, a word, a status, a place, and of numbers."""
+"""The net finds what it is there for: changes of a key, length, word, status, place, and of numbers."""
 
 import copy
 import subprocess

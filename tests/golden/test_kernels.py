@@ -1,4 +1,4 @@
-"""Other kernels of BLAS, as another machine has them, give the stored outputs too: part of `make test-full`."""
+"""Other kernels of BLAS, as another machine has them, give the stored outputs too (`make test-full`)."""
 
 import os
 import platform
