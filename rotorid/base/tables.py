@@ -173,7 +173,7 @@ def excel(*tables: Table) -> bytes:
 
 
 def html(table: Table) -> Markup:
-    """A table of HTML: numbers with their places in the JSON document as `data-key`; class `blocks` if wide."""
+    """A table of HTML: numbers with their place in the JSON document as `data-key`; `blocks` if wide."""
     from markupsafe import Markup
 
     shown = [[column.heading, *(text or NOTHING for text in column.texts)] for column in table.columns]

@@ -46,8 +46,8 @@ MUTATIONS = (
         "formula (50)'s weight",
         "reduce-given-relative reduce-book reduce-everything",
         "rotorid/reduction/equivalent/equivalent_masses_formula_50.py",
-        "omega[..., None, :] ** 2",
-        "omega[..., None, :]",
+        "return np.asarray(omega[..., None, :] ** 2)",
+        "return np.asarray(omega[..., None, :])",
     ),
     Mutation(
         "sign of phase lag",
