@@ -1,7 +1,8 @@
 """What differs between two outcomes beyond rounding.
 
-Keys, lengths of lists, categorical words and the exit status are compared exactly; numbers to 1e-6 of the largest of
-their array (all numbers of one key, whatever the indices). `TOLERANCES` names what may differ more, and why.
+Keys, lengths of lists, categorical words and the exit status are compared exactly; numbers to 1e-6 of the
+largest of their array (all numbers of one key, whatever the indices). `TOLERANCES` names what may
+differ more, and why.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A JSON document as arrays: all values of one key, whatever the indices above it.
 
-`{"rows": [{"mass": 1.0}, {"mass": 2.0}]}` is `{"rows#": [2], "rows[].mass": [1.0, 2.0]}`: `#` holds how many items
-each list has, `[]` stands for the indices. What is prose, or echoes the command line, has its key only.
+`{"rows": [{"mass": 1.0}, {"mass": 2.0}]}` is `{"rows#": [2], "rows[].mass": [1.0, 2.0]}`: `#` holds how many
+items each list has, `[]` stands for the indices. What is prose, or echoes the command line, has its key only.
 """
 
 from __future__ import annotations

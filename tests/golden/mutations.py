@@ -22,7 +22,7 @@ PRODUCT = ("fem", "balancing", "rotorid", "sample_data")
 
 @dataclass(frozen=True)
 class Mutation:
-    """A wrong formula: in a file, `new` instead of `old`, which stands there once; stored cases that reach it."""
+    """A wrong formula: `new` instead of `old`, once in a file; and stored cases that reach it."""
 
     name: str
     cases: str
@@ -74,8 +74,8 @@ MUTATIONS = (
         "one entry of the gyroscopic matrix",
         "critical-rotor23 campbell-model-job",
         "fem/matrices/elements.py",
-        "return [(2 * rotor.density * rotor.second_moment / rotor.length, _TILT)]",
-        "return [(2 * rotor.density * rotor.second_moment / rotor.length, _TILT * (1 - 2 * np.diag(np.eye(6)[0])))]",
+        "rotor.second_moment / rotor.length, _TILT)]",
+        "rotor.second_moment / rotor.length, _TILT * (1 - 2 * np.diag(np.eye(6)[0])))]",
     ),
     Mutation(
         "the Student quantile",

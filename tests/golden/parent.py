@@ -38,7 +38,7 @@ def worktree(commit: str) -> Iterator[Path]:
 
 
 def python_of(tree: Path) -> str:
-    """Its interpreter: this one where it requires the same, else that of the environment its Makefile makes there."""
+    """This interpreter where a tree requires the same packages, else that of an environment made there."""
     same = all(
         (tree / name).is_file() and (tree / name).read_bytes() == (HERE / name).read_bytes()
         for name in REQUIREMENTS
@@ -60,7 +60,7 @@ def python_of(tree: Path) -> str:
 
 
 def both(commit: str, names: Sequence[str], *, whole: bool = False) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Outcomes of a commit and of this tree, uncommitted changes included; the list of cases is that of this tree."""
+    """Outcomes of a commit and of this tree, uncommitted changes included; cases are those of this tree."""
     with worktree(commit) as tree, ThreadPoolExecutor() as pool:
         pairs = ((tree, python_of(tree)), (HERE, sys.executable))
         jobs = [pool.submit(run, names, place, python=python, whole=whole) for place, python in pairs]

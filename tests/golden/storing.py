@@ -27,7 +27,7 @@ def place(error: str) -> str:
 
 
 def document(outcome: dict[str, Any]) -> Arrays:
-    """Status and document of an outcome as arrays, whole; of one without a document, the place of its complaint."""
+    """Status and document of an outcome as arrays; of one without a document, the place of its complaint."""
     output = outcome["output"]
     if output.startswith("{"):
         return {"exit status": outcome["status"]} | arrays(json.loads(output))
