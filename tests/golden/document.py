@@ -81,13 +81,14 @@ def thinned(values: Any) -> Any:
     return short
 
 
-def rounded(value: Any) -> Any:
-    """Numbers with so many digits that a comparison does not see it."""
+def rounded(value: Any, digits: int = DIGITS) -> Any:
+    """Numbers with so many digits that no comparison sees it; more for a sum, compared as one of its numbers."""
     if isinstance(value, dict):
-        return {key: rounded(item) for key, item in value.items()}
+        more = dict.fromkeys(("sum", "moment"), DIGITS + 4)
+        return {key: rounded(item, more.get(key, DIGITS)) for key, item in value.items()}
     if isinstance(value, list):
         return [rounded(item) for item in value]
     if isinstance(value, float):
-        short = float(f"{value:.{DIGITS}g}")
+        short = float(f"{value:.{digits}g}")
         return int(short) if short.is_integer() and abs(short) < 10**DIGITS else short
     return value
