@@ -82,7 +82,7 @@ def thinned(values: Any) -> Any:
 
 
 def rounded(value: Any, digits: int = DIGITS) -> Any:
-    """Numbers with so many digits that no comparison sees it; more for a sum, compared as one of its numbers."""
+    """Numbers with so many digits that no comparison sees it; more for a sum, compared like one number."""
     if isinstance(value, dict):
         more = dict.fromkeys(("sum", "moment"), DIGITS + 4)
         return {key: rounded(item, more.get(key, DIGITS)) for key, item in value.items()}

@@ -72,7 +72,7 @@ MUTATIONS = (
     ),
     Mutation(
         "one entry of the gyroscopic matrix",
-        "critical-rotor23 campbell-model-job",
+        "campbell-compressor-coarse critical-compressor-map",
         "fem/matrices/elements.py",
         "rotor.second_moment / rotor.length, _TILT)]",
         "rotor.second_moment / rotor.length, _TILT * (1 - 2 * np.diag(np.eye(6)[0])))]",
