@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-exact book lint house sure docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact golden-mutations book lint house sure docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -40,7 +40,8 @@ test: $(VENV)/.dev
 	$(BIN)/python -m pytest -q $(ON_TWO_CORES) -m 'not full'
 
 # Everything, with all repetitions of simulations: also every page, whether intervals and regions hold what they say,
-# every browser and workbook.
+# every browser and workbook,
+# and the stored answers with other kernels of BLAS.
 test-full: $(VENV)/.dev docs
 	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q $(ON_TWO_CORES) --ignore tests/docs
 	$(MAKE) sure
@@ -63,12 +64,22 @@ MUTANTS ?= 5000
 fuzz: $(VENV)/.dev
 	PYTHONPATH=tests:. $(BIN)/python -m fuzz --seed $(SEED) --mutants $(MUTANTS) --jobs $(JOBS)
 
-# Stored outputs of every command on every sample (tests/golden): after a change that is meant to change them.
+# Stored answers (tests/golden): after a change that is meant to change them.
 golden: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden store
 
-# The same byte for byte with another commit, on this machine: make golden-exact PARENT=main
+# Exit status, keys and numbers beside those of another commit in an environment of its own, within tolerances; prints
+# what differs, stores nothing: make golden-near PARENT=main CASES=all (stored: the stored ones only)
 PARENT ?= HEAD~1
+CASES ?= stored
+golden-near: $(VENV)/.dev
+	PYTHONPATH=tests $(BIN)/python -m golden near $(PARENT) $(CASES)
+
+# Eight wrong formulas: does the comparison with the unmutated tree, and with what is stored, see each?
+golden-mutations: $(VENV)/.dev
+	PYTHONPATH=tests $(BIN)/python -m golden mutations
+
+# All that every command prints and writes, byte for byte with another commit: make golden-exact PARENT=main
 golden-exact: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden exact $(PARENT)
 

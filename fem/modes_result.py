@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from fem.model.rotor import Rotor
 from fem.parameter_bands import NORMAL_95
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table, frame, terminal
 from rotorid.base.text import counted, error_figures, listing
 
 if TYPE_CHECKING:
@@ -91,25 +90,38 @@ class Modes(Answered):
             }
         )
 
+    def tables(self) -> tuple[Table, ...]:
+        """The critical speeds; and the shapes, a row for each node."""
+        ways = zip(self.frequencies, self.direction, strict=True)
+        rpm, speed = "critical_speeds_rpm.*", "critical_speeds_rad_s.*"
+        errors = () if self.std is None else (NORMAL_95 * RPM * self.std,)
+        speeds = (
+            Column("mode", range(1, self.frequencies.size + 1)),
+            Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways]),
+            Column("rpm", self.rpm, "{:.2f}".format, rpm),
+            *(Column("± (95 %)", values, error_figures) for values in errors),
+            Column("Hz", self.frequencies / math.tau, "{:.4f}".format, speed, 1 / math.tau),
+            Column("rad/s", self.frequencies, "{:.4f}".format, speed),
+        )
+        shapes = (
+            Column("node", range(1, self.rotor.n_nodes + 1)),
+            Column("position_m", self.positions, "{:.6g}".format, "positions_m.*"),
+            *(
+                Column(f"mode_{k + 1}", shape, "{:.4f}".format, f"mode_shapes.{k}.*")
+                for k, shape in enumerate(self.shapes.T)
+            ),
+        )
+        return (Table("critical speeds", speeds), Table("mode shapes", shapes))
+
     def to_frame(self) -> pd.DataFrame:
         """One row per node: number, position and the deflection in each mode."""
-        nodes = (Column("node", range(1, self.rotor.n_nodes + 1)), Column("position_m", self.positions))
-        return frame((*nodes, *numbered("mode_{}", self.shapes)))
+        return frame(self.tables()[1])
 
     @property
     def answer(self) -> Answer:
         """The critical speeds, in rpm, Hz and rad/s."""
         own = [f"{speed:.6g}" for speed in self.rpm if speed > 0]
         shown = listing(own, "and") if len(own) < _NAMED else f"{', '.join(own[:_NAMED])} …"
-        ways = zip(self.frequencies, self.direction, strict=True)
-        error = () if self.std is None else (NORMAL_95 * RPM * self.std,)
-        columns = (
-            Column("mode", range(1, self.frequencies.size + 1), str),
-            Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways], str),
-            Column("rpm", self.rpm, "{:.2f}".format),
-            *(Column("error", values, error_figures, "± (95 %)") for values in error),
-            Column("Hz", self.frequencies / (2 * np.pi), "{:.4f}".format),
-            Column("rad/s", self.frequencies, "{:.4f}".format),
-        )
-        said = f"{counted(len(own), 'critical speed')} without damping{f': {shown} rpm' if own else ''}."
-        return Answer(said, text(columns, left=2), self.warnings, (self.cut,) if self.cut else ())
+        judgement = f"{counted(len(own), 'critical speed')} without damping{f': {shown} rpm' if own else ''}."
+        cut = (self.cut,) if self.cut else ()
+        return Answer(judgement, terminal(self.tables()[0]), self.warnings, cut)

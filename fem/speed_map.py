@@ -17,8 +17,8 @@ from fem.solvers.bracketed_roots import bracketed_root
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, numbered, rows, text
 from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table, frame, terminal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,41 +88,59 @@ class SpeedMap(Answered):
                 "critical_speeds_rad_s": self.speeds.T,
                 "free_rad_s": self.free,
                 "pinned_rad_s": self.pinned,
-                "intersections": rows(self._meetings()),
+                "intersections": [
+                    {
+                        "support": item.support,
+                        "direction": item.direction,
+                        "mode": item.mode,
+                        "speed_rad_s": item.speed,
+                        "stiffness_N_per_m": item.stiffness,
+                    }
+                    for item in self.intersections
+                ],
             }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The map, a row for each stiffness; where the supports' own stiffness meets it; its limits."""
+        met, rpm = self.intersections, "{:.2f}".format
+        chart = (
+            Column("stiffness_N_per_m", self.stiffness, "{:.4g}".format),
+            *(Column(f"critical_speed_{k}_rad_s", v) for k, v in enumerate(self.speeds.T, start=1)),
+        )
+        meetings = (
+            Column("own stiffness of", [item.support for item in met]),
+            Column("direction", [item.direction for item in met]),
+            Column("mode", [item.mode for item in met]),
+            Column("rpm", [item.speed * RPM for item in met], rpm),
+            Column("rad/s", [item.speed for item in met], "{:.4f}".format),
+            Column("N/m", [item.stiffness for item in met], "{:.4g}".format),
+        )
+        limits = (
+            Column("mode", range(1, self.free.size + 1)),
+            Column("free supports, rpm", self.free * RPM, rpm),
+            Column("pinned, rpm", self.pinned * RPM, rpm),
+        )
+        return (
+            Table("map", chart),
+            Table("own stiffness on the map", meetings),
+            Table("limits of soft and of stiff supports", limits),
         )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per stiffness, one column per critical speed."""
-        speeds = numbered("critical_speed_{}_rad_s", self.speeds)
-        return frame((Column("stiffness_N_per_m", self.stiffness), *speeds))
+        return frame(self.tables()[0])
 
     @property
     def answer(self) -> Answer:
         """Where the supports' own stiffness meets the map; behind it the limits of each critical speed."""
-        limits = (
-            Column("mode", range(1, self.free.size + 1), str),
-            Column("free", self.free * RPM, "{:.2f}".format, "free supports, rpm"),
-            Column("pinned", self.pinned * RPM, "{:.2f}".format, "pinned, rpm"),
-        )
-        speeds = [item.speed * RPM for item in self.intersections]
-        met = self._meetings()
         low, high = self.stiffness[0], self.stiffness[-1]
+        _, meetings, limits = self.tables()
         return Answer(
             f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each.",
-            text((*met[:3], Column("rpm", speeds, "{:.2f}".format), *met[3:]), left=2),
-            tables=(text(limits),),
-            more="limits of soft and of stiff supports",
-        )
-
-    def _meetings(self) -> tuple[Column, ...]:
-        met = self.intersections
-        return (
-            Column("support", [item.support for item in met], str, "own stiffness of"),
-            Column("direction", [item.direction for item in met], str),
-            Column("mode", [item.mode for item in met], str),
-            Column("speed_rad_s", [item.speed for item in met], "{:.4f}".format, "rad/s"),
-            Column("stiffness_N_per_m", [item.stiffness for item in met], "{:.4g}".format, "N/m"),
+            terminal(meetings),
+            tables=(terminal(limits),),
+            more=limits.name,
         )
 
 

@@ -86,14 +86,14 @@ class Destination:
         """
         from rotorid.cli.verbose import note
         from rotorid.tables.reader.problems import printable
-        from rotorid.tables.reader.table_writing import table_bytes, write_files
+        from rotorid.tables.reader.table_writing import write_files
 
         if self.latex and (self.show is None or self.json or self.table):
             raise ValueError("--latex belongs to --show equations, without --json or --table")
         plot, output = self.plot, self.output
         files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = [
             (plot, PICTURES, lambda r: figure_bytes(draw(r) if draw else r.figure(), plot or Path())),
-            (output, TABLES, lambda r: table_bytes(output or Path(), r.to_frame())),
+            (output, TABLES, lambda r: r.table_file(output or Path())),
             *more,
             (self.report, (".html",), lambda r: r.sheet()),
         ]

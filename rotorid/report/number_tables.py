@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.result import Column
+from rotorid.base.tables import LETTERS, NARROW, Table
 from rotorid.report.document import NOTHING, Cells
 
 if TYPE_CHECKING:
     from rotorid.report.rotor_figures import Drawing
-
-NARROW, LETTERS = 6, 50
-"""Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
 
 
 def words(head: str, cells: Iterable[object]) -> Cells:
@@ -121,7 +119,7 @@ class Part:
 
     heading: str
     said: tuple[str, ...] = ()
-    tables: tuple[Grid, ...] = ()
+    tables: tuple[Grid | Table, ...] = ()
     drawings: tuple[Drawing, ...] = ()
     listing: str = ""
 

@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.tables import html
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.report.document import Document
 
@@ -30,8 +31,8 @@ def render_report(
     """Make a sheet: a template that extends base.html, filled from the JSON document of a result.
 
     The template gets `document`, `title`, `warnings`, `provenance`, `context`, and the functions
-    `show("corrections.0.mass", digits=4)`, which prints a number of the document (`Document.show`), and
-    `found("corrections.0.mass")`, what it holds there. The document
+    `show("corrections.0.mass", digits=4)`, which prints a number of the document (`Document.show`),
+    `found("corrections.0.mass")`, what it holds there, and `html(table)`. The document
     itself, with its provenance, lies in the sheet as JSON in the element "result".
 
     Parameters
@@ -66,6 +67,7 @@ def render_report(
         json_text=json_inside(whole.data),
         show=whole.show,
         found=whole.found,
+        html=html,
         **context,
     )
     return text.encode("utf-8", "replace")  # names of files may be anything

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +11,9 @@ from fem.model.rotor import Rotor
 from fem.plots.mode_shapes import smooth_shapes
 from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.number_tables import Grid, Part, evenly, every_warning, figures, numbered, words
+from rotorid.base.tables import Column, Table
+from rotorid.report.document import NOTHING, Document
+from rotorid.report.number_tables import Grid, Part, evenly, every_warning, words
 from rotorid.report.page import render_report
 from rotorid.report.rotor_description import place, rotor_sheet, unbalance_table
 from rotorid.report.rotor_figures import bode_picture, map_picture, modes_picture
@@ -58,11 +58,11 @@ def critical_report(
     parts = [
         Part(
             "Critical speeds",
-            tables=(_criticals(document),),
+            tables=(_criticals(document, modes),),
             drawings=(modes_picture(modes),),
         ),
         *_map(document, chart, operating),
-        Part("Mode shapes", tables=_shapes(document, modes)),
+        Part("Mode shapes", tables=_shapes(modes)),
     ]
     return render_report(
         "parts.html",
@@ -160,73 +160,83 @@ def _inside(document: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _criticals(document: Document) -> Grid:
-    speeds, operating = document["critical_speeds_rad_s"], document.get("operating")
-    whirl = zip(document["direction"], speeds, strict=True)
-    columns = [
-        numbered("mode", len(speeds)),
-        document.column("rpm", "critical_speeds_rpm.*", decimals=2),
-        document.column("rad/s", "critical_speeds_rad_s.*", decimals=4),
-        document.column("Hz", "critical_speeds_rad_s.*", decimals=4, scale=1 / math.tau),
-        words("whirl", (way if speed else "rigid body" for way, speed in whirl)),
-    ]
-    notes = []
+def _criticals(document: Document, modes: Modes) -> Table:
+    """The critical speeds, with their distance from the operating range and the error of the mesh."""
+    speeds, _ = modes.tables()
+    columns = [column for column in speeds.columns if column.key or column.heading in ("mode", "whirl")]
+    operating, notes = document.get("operating"), []
     if operating:
+        rows = operating["critical_speeds"]
         path = "operating.critical_speeds.*.separation_percent"
-        distance = document.column("from operating range, %", path, decimals=1)
-        rows = zip(operating["critical_speeds"], distance.cells, strict=True)
-        shown = tuple("INSIDE" if row["inside"] else cell for row, cell in rows)
-        columns.append(Cells(distance.head, shown))
+        distance = [row["separation_percent"] for row in rows]
+        columns.append(Column("operating range", ["INSIDE" if row["inside"] else "outside" for row in rows]))
+        columns.append(Column("from operating range, %", distance, "{:.1f}".format, path))
         notes.append("The distance is in percent of the nearest end of the operating range.")
     if document.get("mesh_check"):
-        columns.append(document.column("error of the mesh, %", "mesh_check.relative_error.*", 2, scale=100.0))
+        errors = [100.0 * error for error in document["mesh_check"]["relative_error"]]
+        path = "mesh_check.relative_error.*"
+        columns.append(Column("error of the mesh, %", errors, "{:.2g}".format, path, 100.0))
     if document.get("critical_speeds_cut"):
         notes.append(document["critical_speeds_cut"])
     caption = "Where the frequency of free whirl equals the speed of rotation"
-    return Grid(caption, tuple(columns), " ".join(notes))
+    return Table(caption, tuple(columns), " ".join(notes))
 
 
 def _map(document: Document, chart: SpeedMap | None, operating: Band) -> list[Part]:
     if chart is None:
         return []
     found = document["map"]
-    free, pinned = (
-        document.column(f"{which}, rpm", f"map.{which}_rad_s.*", decimals=1, scale=RPM)
-        for which in ("free", "pinned")
-    )
-    modes = numbered("mode", len(found["free_rad_s"]))
-    met = found["intersections"]
-    tables = [
-        Grid("Limits of soft and of stiff supports", (modes, free, pinned)),
-        Grid(
-            "With the stiffness that the supports have",
-            (
-                words("support", (item["support"] for item in met)),
-                words("direction", (item["direction"] for item in met)),
-                figures("critical speed", (item["mode"] for item in met)),
-                document.column("rpm", "map.intersections.*.speed_rad_s", decimals=1, scale=RPM),
-                document.column("stiffness, MN/m", "map.intersections.*.stiffness_N_per_m", 4, scale=1e-6),
-            ),
-        ),
+    modes = Column("mode", range(1, len(found["free_rad_s"]) + 1))
+    limits = [
+        Column(
+            f"{name}, rpm",
+            [None if speed is None else RPM * speed for speed in found[f"{name}_rad_s"]],
+            "{:.1f}".format,
+            f"map.{name}_rad_s.*",
+            RPM,
+        )
+        for name in ("free", "pinned")
     ]
-    said = "Undamped, every support of the same stiffness in x and y."
-    kept = tuple(table for table in tables if table.rows)
-    return [Part("Critical speed map", (said,), kept, (map_picture(chart, operating),))]
+    tables = [Table("Limits of soft and of stiff supports", (modes, *limits))]
+    if met := found["intersections"]:
+        place, mega = "map.intersections.*.", 1e-6
+        meetings = (
+            Column("support", [item["support"] for item in met]),
+            Column("direction", [item["direction"] for item in met]),
+            Column("critical speed", [item["mode"] for item in met]),
+            Column(
+                "rpm",
+                [RPM * item["speed_rad_s"] for item in met],
+                "{:.1f}".format,
+                place + "speed_rad_s",
+                RPM,
+            ),
+            Column(
+                "stiffness, MN/m",
+                [mega * item["stiffness_N_per_m"] for item in met],
+                "{:.4g}".format,
+                place + "stiffness_N_per_m",
+                mega,
+            ),
+        )
+        tables.append(Table("With the stiffness that the supports have", meetings))
+    sentence = "Undamped, every support of the same stiffness in x and y."
+    return [Part("Critical speed map", (sentence,), tuple(tables), (map_picture(chart, operating),))]
 
 
-def _shapes(document: Document, modes: Modes) -> tuple[Grid, ...]:
+def _shapes(modes: Modes) -> tuple[Table, ...]:
     """Deflections at the nodes, some modes abreast, each in the scale of the picture."""
     largest = np.abs(smooth_shapes(modes)[1]).max(axis=0)
-    nodes = numbered("node", len(document["positions_m"]))
-    positions = document.column("position, m", "positions_m.*", decimals=4)
-    shapes = [
-        document.column(f"mode {k + 1}", f"mode_shapes.{k}.*", decimals=4, scale=1 / float(size))
-        for k, size in enumerate(largest)
+    _, (node, position, *shapes) = (table.columns for table in modes.tables())
+    position = Column("position, m", position.values, "{:.4f}".format, position.key)
+    scaled = [
+        Column(f"mode {k}", np.array(shape.values) / size, shape.shown, shape.key, 1 / float(size))
+        for k, (shape, size) in enumerate(zip(shapes, largest, strict=True), start=1)
     ]
     caption = "Deflection at the nodes, in the scale of the picture: the largest between the ends is 1"
     return tuple(
-        Grid(caption, (nodes, positions, *shapes[first : first + MODES_ABREAST]))
-        for first in range(0, len(shapes), MODES_ABREAST)
+        Table(caption, (node, position, *scaled[first : first + MODES_ABREAST]))
+        for first in range(0, len(scaled), MODES_ABREAST)
     )
 
 

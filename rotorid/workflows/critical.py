@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.tables import Table, file_bytes, frame
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -62,9 +63,22 @@ class CriticalSpeeds(Parts):
         apart = self.operating and Separation(speeds, self.operating, doubt and f"{doubt} (-n)")
         return {"": self.modes, "operating": apart, "mesh_check": self.mesh, "map": self.chart}
 
+    def tables(self) -> tuple[Table, ...]:
+        """The critical speeds and the shapes; and those of the map."""
+        return (*self.modes.tables(), *(self.chart.tables() if self.chart else ()))
+
     def to_frame(self) -> pd.DataFrame:
         """The modes, or the map."""
-        return self.modes.to_frame() if self.chart is None else self.chart.to_frame()
+        return frame(self._main)
+
+    def table_file(self, path: Path) -> bytes:
+        """The modes, or the map, as `.csv` or `.xlsx`."""
+        return file_bytes(path, self._main)
+
+    @property
+    def _main(self) -> Table:
+        """The shapes, or the map."""
+        return self.modes.tables()[1] if self.chart is None else self.chart.tables()[0]
 
     def figure(self) -> Figure:
         """The mode shapes, or the map."""

@@ -49,6 +49,12 @@ class Outcome(Answered):
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
 
+    def table_file(self, path: Path) -> bytes:
+        """What `--output` writes to a file of this name."""
+        from rotorid.tables.reader.table_writing import table_bytes
+
+        return table_bytes(path, self.to_frame())
+
     @property
     def equations(self) -> Equations:
         """What was solved, in symbols and in numbers."""

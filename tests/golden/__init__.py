@@ -1,6 +1,6 @@
-"""The net: stored outputs of every command on every sample job, model and rotor.
+"""The net: numbers and keys of the documents of every command, exit status and place of what is refused.
 
-`make golden` writes them to `stored`; `make golden-exact` compares with another commit byte for byte; the
-tests `test_golden_*.py` compare what the command line says now with what is stored. Nothing here knows
-more of the product than `rotorid.cli.main`.
+`make golden` writes them to `stored`, and the tests compare; `make golden-near` compares command lines with
+another commit within tolerances, `make golden-exact` byte for byte; `make golden-mutations` shows what the
+net sees. Nothing here knows more of the product than `rotorid.cli.main`.
 """

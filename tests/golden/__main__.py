@@ -1,11 +1,10 @@
-"""`python -m golden store`; `python -m golden exact COMMIT`."""
+"""`python -m golden store`; `near COMMIT [stored|all]`; `exact COMMIT`; `mutations`."""
 
 import sys
 
-from golden.exact import exact
+from golden.mutations import mutations
+from golden.parent import exact, near
 from golden.storing import store
 
-if sys.argv[1] == "store":
-    store()
-else:
-    sys.exit(exact(sys.argv[2]))
+COMMANDS = {"store": store, "near": near, "exact": exact, "mutations": mutations}
+sys.exit(COMMANDS[sys.argv[1]](*sys.argv[2:]))

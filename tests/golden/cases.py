@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - a command line is as long as it is
-"""Which command lines the net holds.
+"""The command lines that the net knows, and which of them are stored.
 
-Every command runs in a folder that has a copy of `sample_data`, as text and once more with `--json`.
+Every command runs in a folder that has a copy of `sample_data`.
 """
 
 from __future__ import annotations
@@ -9,8 +9,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-
-TEXT, JSON = "text", "json"
 
 
 @dataclass(frozen=True)
@@ -20,29 +18,22 @@ class Case:
     Attributes
     ----------
     name
-        Of the stored files.
+        Of the stored file.
     command
         As typed after `rotorid`.
     group
         The cases of one group run in one process, one after the other.
-    forms
-        As text, with `--json`, or both.
     before
         Commands, run first, that make files which this one reads.
     edits
         Files to write before: new name → (sample file, old text, new text).
-    stored
-        Whether the outputs are stored. Where they are not (what the libraries below say in their own words, as
-        `--help`, or what takes long), only `make golden-exact` runs the case.
     """
 
     name: str
     command: str
     group: str
-    forms: tuple[str, ...] = (TEXT, JSON)
     before: tuple[str, ...] = ()
     edits: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
-    stored: bool = True
 
     @property
     def words(self) -> list[str]:
@@ -51,7 +42,9 @@ class Case:
 
     @property
     def json_words(self) -> list[str]:
-        """After `rotorid`, with `--json`, without pictures and pages: the text has made them already."""
+        """After `rotorid`, with `--json`, without pictures and pages; usage has no document."""
+        if self.group == "usage":
+            return self.words
         words = [*self.words, "--json"]
         for option in ("--plot", "--report"):
             if option in words and self.name not in REFUSED_TARGETS:
@@ -197,6 +190,7 @@ one-shot                    balance sample_data/calibration/later.toml
 template                    balance --template job.xlsx
 schema-job                  schema job
 schema-rotor                schema rotor
+schema-study                schema study
 schema-misspelt             schema jop
 balance-misspelt-column     balance misspelt.csv {TURBO}/weights.csv
 balance-missing-run         balance {TURBO}/runs.csv short.csv
@@ -452,21 +446,6 @@ EDITS = {
 }
 
 
-EXACT_ONLY = {"fit-limit-cycle-shooting", "fit-starts"}
-"""Cases that take long or say much, and whose code others run, too; of several starts that end alike, which is
-the best and how many iterations it took is rounding."""
-
-
-TEXT_ONLY = (
-    "response-compressor",
-    "fit-run-down-plot",
-    "holes-plot",
-    "influence-rotor23",
-    "motion-bode",
-)
-"""Cases whose document is long, or that of another case."""
-
-
 def _listed(text: str, group: str) -> list[Case]:
     rows = [line.split(maxsplit=1) for line in text.strip().splitlines()]
     return [
@@ -474,9 +453,7 @@ def _listed(text: str, group: str) -> list[Case]:
             name,
             command.strip(),
             group,
-            forms=(TEXT,) if name in TEXT_ONLY else (TEXT, JSON),
             edits=EDITS.get(name, {}),
-            stored=name not in EXACT_ONLY,
         )
         for name, command in rows
     ]
@@ -488,14 +465,13 @@ def _all() -> list[Case]:
         + _listed(BALANCE_COMMANDS, "balance")
         + _listed(MODEL_COMMANDS, "models")
     )
-    for name in EXERCISES:  # of task 4.1 without errors the deviations are rounding, or 0 on some machines
+    for name in EXERCISES:
         data = ["data"] if name in PRINTED_ONLY else ["data", "data_exact"]
         cases += [
             Case(
                 f"identify-{name}" + table.removeprefix("data").replace("_", "-"),
                 f"identify {IDENTIFY}/{name}/model.toml {IDENTIFY}/{name}/{table}.csv",
                 "models",
-                stored=f"{name}-{table}" != "task_4_1-data_exact",
             )
             for table in data
         ]
@@ -523,7 +499,7 @@ def _all() -> list[Case]:
         Case("fleet-add-nothing", "fleet add d sample_data/motion", "fleet"),
         Case("fleet-show", shown, "fleet", before=(added,)),
         Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
-        Case("fleet-show-other", f"{shown} --type fan-123", "fleet", (TEXT,), before=(added,)),
+        Case("fleet-show-other", f"{shown} --type fan-123", "fleet", before=(added,)),
         Case("fleet-fit", "fleet fit fans --type fan-132 --plot t.png", "fleet", before=(added,)),
         Case(
             "fleet-fit-table",
@@ -533,23 +509,134 @@ def _all() -> list[Case]:
         ),
         Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=(added,)),
         Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
-        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", (TEXT,), before=(added,)),
+        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", before=(added,)),
     ]
-    for name in DEMOS:
-        forms = (TEXT, JSON) if name == "identification" else (TEXT,)
-        cases.append(Case(f"demo-{name}", f"demo d --sample {name}", "demos", forms))
+    cases += [Case(f"demo-{name}", f"demo d --sample {name}", "demos") for name in DEMOS]
+    cases += [Case(f"help-{name.replace(' ', '-')}", f"{name} --help", "usage") for name in COMMANDS]
     cases += [
-        Case(f"help-{name.replace(' ', '-')}", f"{name} --help", "usage", (TEXT,), stored=False)
-        for name in COMMANDS
-    ]
-    cases += [
-        Case("help", "--help", "usage", (TEXT,), stored=False),
-        Case("version", "--version", "usage", (TEXT,)),
-        Case("no-such-command", "balence", "usage", (TEXT,)),
-        Case("no-such-option", f"critical {ROTOR23} --nubmer 3", "usage", (TEXT,)),
-        Case("no-such-choice", f"{RESPONSE} --speeds 5000rpm --view bodde", "usage", (TEXT,)),
+        Case("help", "--help", "usage"),
+        Case("version", "--version", "usage"),
+        Case("no-such-command", "balence", "usage"),
+        Case("no-such-option", f"critical {ROTOR23} --nubmer 3", "usage"),
+        Case("no-such-choice", f"{RESPONSE} --speeds 5000rpm --view bodde", "usage"),
     ]
     return cases
 
 
 CASES = {case.name: case for case in _all()}
+
+STORED = (
+    "balance-equations",
+    "bearings",
+    "bearings-linear",
+    "calibrate-critical",
+    "calibrate-design",
+    "calibrate-rk4",
+    "campbell-compressor-coarse",
+    "campbell-model-job",
+    "checked-grade-positions",
+    "checked-refine",
+    "checked-verbose",
+    "combined",
+    "critical-compressor-map",
+    "critical-rk4",
+    "critical-rotor23",
+    "critical-rotor23-mesh",
+    "demo-list",
+    "fit-design",
+    "fit-equations",
+    "fit-prior-auto",
+    "fit-run-down-plot",
+    "fit-shooting",
+    "fleet-add",
+    "fleet-fit",
+    "fleet-show-type",
+    "holes-minmax",
+    "holes-report",
+    "identify-design",
+    "identify-equations",
+    "identify-modes",
+    "identify-output-error",
+    "identify-task_3_3",
+    "identify-two-models",
+    "influence-coarse",
+    "model-job-ridge",
+    "modes-chain",
+    "motion-run-up",
+    "one-shot",
+    "periodic-jumps",
+    "reduce-apart",
+    "reduce-book",
+    "reduce-compressor-json",
+    "reduce-equations",
+    "reduce-errors",
+    "reduce-everything",
+    "reduce-force",
+    "reduce-given-relative",
+    "reduce-keep-supports",
+    "reduce-model-job",
+    "reduce-output",
+    "reduce-place-mac",
+    "reduce-rank",
+    "response-report",
+    "runup-record",
+    "schema-study",
+    "simulate-modes",
+    "simulate-record",
+    "simulate-record-errors",
+    "split-drill",
+    "split-free",
+    "split-grind",
+    "split-holes",
+    "split-scale",
+    "split-stock",
+    "split-sum",
+    "split-two",
+    "study",
+    "study-starts",
+    "tolerance-positions",
+    "trial-weight",
+    "trial-weight-critical",
+    "trial-weight-model-all",
+    "trial-weight-tried",
+    "turbo",
+    "turbo-lag",
+    "turbo-limit-minmax",
+    "turbo-output",
+    "turbo-stored",
+    "turbo-trade-off",
+    "turbo-truncate",
+    "type",
+    "type-foreign",
+    "type-refined",
+    "unbalance-modal",
+    "unbalance-model-job",
+    "unbalance-ridge",
+    "vectors-run-up",
+    "waveforms",
+)
+"""Cases whose documents are stored: together they run what the documents of all cases run, but for the longest ones."""
+
+REFUSED = (
+    "balance-missing-run",
+    "balance-misspelt-column",
+    "balance-misspelt-key",
+    "balance-no-file",
+    "balance-ending",
+    "balance-undetermined",
+    "calibrate-no-bearing",
+    "calibrate-says-nothing",
+    "critical-misspelt",
+    "critical-missing",
+    "critical-two-into-one",
+    "fit-no-output",
+    "fit-not-measured",
+    "fleet-add-nothing",
+    "identify-misspelt",
+    "identify-no-column",
+    "study-misspelt",
+    "trial-weight-nothing",
+    "vectors-no-tacho",
+    "workbook-empty",
+)
+"""Cases whose exit status and place of the complaint are stored."""

@@ -1,4 +1,4 @@
-"""Balancing commands say what is stored: see `tests/golden`."""
+"""Balancing commands give what is stored: see `tests/golden`."""
 
 from golden.checks import checks
 

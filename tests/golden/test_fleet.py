@@ -1,4 +1,4 @@
-"""Commands over fleets say what is stored: see `tests/golden`."""
+"""Commands over fleets give what is stored: see `tests/golden`."""
 
 import pytest
 

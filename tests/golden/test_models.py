@@ -1,4 +1,4 @@
-"""Reduction, identification and fits say what is stored: see `tests/golden`."""
+"""Reduction, identification and fits give what is stored: see `tests/golden`."""
 
 from golden.checks import checks
 

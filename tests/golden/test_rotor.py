@@ -1,5 +1,5 @@
-"""Rotor commands, demos and wrong usage say what is stored: see `tests/golden`."""
+"""Rotor commands give what is stored: see `tests/golden`."""
 
 from golden.checks import checks
 
-test_as_stored = checks("rotor", "demos", "usage")
+test_as_stored = checks("rotor")

@@ -12,9 +12,9 @@ from scipy.io import loadmat
 
 import balancing
 import rotorid
+from rotorid.base.tables import csv_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.samples import sample_data
-from rotorid.tables.reader.table_writing import csv_bytes
 
 ROTOR = sample_data() / "rotor23.csv"
 JOB = sample_data() / "turbo_job" / "job.toml"

@@ -5,21 +5,18 @@ from __future__ import annotations
 import errno
 import math
 import os
-import re
 import stat
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base import logs
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.tables import Value, csv_bytes, one_line
 from rotorid.tables.reader.excel_pages import Page, book_bytes
 from rotorid.tables.reader.problems import InputError, Problem
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Value = str | int | float | bool | None
 
 
 def write_table(path: str | Path, frame: pd.DataFrame) -> None:
@@ -57,7 +54,7 @@ def table_bytes(
         return csv_bytes(comments, names, rows)
     if kind == ".xlsx":
         lines = [*((f"# {comment}",) for comment in comments), names, *rows]
-        page = [tuple(_one_line(cell) if isinstance(cell, str) else cell for cell in line) for line in lines]
+        page = [tuple(one_line(cell) if isinstance(cell, str) else cell for cell in line) for line in lines]
         return book_bytes([Page(sheet, page)], sheet)
     raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
 
@@ -128,39 +125,3 @@ def _plain(value: object) -> Value:
     if isinstance(value, float) and math.isinf(value):
         raise ValueError("an infinite number cannot be written to a table")
     return value if isinstance(value, (bool, int, float)) else str(value)
-
-
-def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
-    """A CSV file: comment lines (with the version above them), columns, rows; numbers with all their digits.
-
-    A table without comments stays one that every program reads.
-    """
-    versioned = [f"schema_version = {SCHEMA_VERSION}", *comments] if comments else []
-    lines = [f"# {_one_line(comment)}" for comment in versioned]
-    lines += [",".join(map(_csv_cell, row)) for row in (names, *rows)]
-    text = "\n".join([*lines, ""])
-    # Excel takes a file without the mark for its own 8-bit encoding; plain ASCII needs none.
-    return text.encode("utf-8" if text.isascii() else "utf-8-sig")
-
-
-def _csv_cell(value: Value) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (int, float)):
-        return repr(value)
-    text = "" if value is None else guarded(value)
-    # any sign that could separate columns: a reader looks for one in the header
-    return '"' + text.replace('"', '""') + '"' if re.search('[,;\t"]|^#', text) else text
-
-
-def guarded(text: str) -> str:
-    """Text of one line that no spreadsheet takes for a formula; readers drop the blank before it."""
-    text = _one_line(text)
-    return f" {text}" if text.startswith(("=", "+", "-", "@")) else text
-
-
-def _one_line(text: str) -> str:
-    line = " ".join(text.split())
-    if re.search(r"[\x00-\x1f\x7f]", line):
-        raise ValueError(f"text with control characters cannot be written to a table: {text!r}")
-    return line

@@ -1,0 +1,264 @@
+"""Tables of results, told once: named columns, and one writer each for terminal, CSV, Excel, HTML and pandas.
+
+>>> speeds = Table(
+...     "critical speeds",
+...     (
+...         Column("mode", (1, 2)),
+...         Column("whirl", ("forward", "mixed")),
+...         Column("speed, rpm", (2980.5, float("nan")), "{:.1f}".format),
+...     ),
+... )
+>>> print(terminal(speeds))
+  mode  whirl     speed, rpm
+  1     forward       2980.5
+  2     mixed
+>>> print(csv(speeds).decode(), end="")
+mode,whirl,"speed, rpm"
+1,forward,2980.5
+2,mixed,
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.base.json import cell
+from rotorid.base.text import WIDTH
+from rotorid.base.text import table as aligned
+from rotorid.base.versions import SCHEMA_VERSION, now
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from markupsafe import Markup
+    from numpy.typing import NDArray
+
+Value = str | int | float | bool | None
+LONGEST_TITLE = 31
+"""Characters of the name of a sheet in a workbook."""
+NARROW, LETTERS = 6, 50
+"""Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
+NOTHING = "\N{EN DASH}"
+"""In HTML, where nothing is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    heading
+        What it holds, with its unit.
+    values
+        One cell a row, one-dimensional; what is not finite becomes None, which is unknown.
+    shown
+        A value as a reader sees it; CSV and workbooks keep all digits.
+    key
+        Where the JSON document of the result holds the values, `*` for the row from 0; empty: nowhere.
+    scale
+        What one unit of the document is in that of the heading.
+
+    Raises
+    ------
+    ValueError
+        For values that are not one-dimensional.
+    """
+
+    heading: str
+    values: Sequence[Value] | NDArray[Any]
+    shown: Callable[[Any], str] = str
+    key: str = ""
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        values = tuple(cell(value) for value in self.values)
+        if any(isinstance(value, list | dict) for value in values):
+            raise ValueError(f"the column {self.heading!r} must be one-dimensional")
+        object.__setattr__(self, "values", values)
+
+    @property
+    def words(self) -> bool:
+        """Whether it holds texts."""
+        return any(isinstance(value, str) for value in self.values)
+
+    @property
+    def texts(self) -> list[str]:
+        """Cells as a reader sees them; blank where nothing is known."""
+        return ["" if value is None else self.shown(value) for value in self.values]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of one length under a name.
+
+    Attributes
+    ----------
+    name
+        What it shows, in a few words.
+    columns
+        At least one.
+    note
+        What a reader must know about it.
+
+    Raises
+    ------
+    ValueError
+        For columns of different lengths, and without any.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if len({len(column.values) for column in self.columns}) != 1:
+            raise ValueError(f"the table {self.name!r} must have columns of one length")
+
+    @property
+    def headings(self) -> list[str]:
+        """Of the columns."""
+        return [column.heading for column in self.columns]
+
+    @property
+    def rows(self) -> list[tuple[Value, ...]]:
+        """Values row by row."""
+        return list(zip(*(column.values for column in self.columns), strict=True))
+
+
+def terminal(table: Table, width: int = WIDTH) -> str:
+    """Aligned text: numbers to the right, but for those before a column of words."""
+    left = max([1, *(k for k, column in enumerate(table.columns, start=1) if column.words)])
+    texts = [[column.heading, *column.texts] for column in table.columns]
+    return aligned([list(row) for row in zip(*texts, strict=True)], left, width)
+
+
+def csv(table: Table) -> bytes:
+    """A CSV file; a note stands in a line with # above the header."""
+    return csv_bytes([table.note] if table.note else [], table.headings, table.rows)
+
+
+def excel(*tables: Table) -> bytes:
+    """A workbook (.xlsx) with a sheet for each table."""
+    import openpyxl
+    from openpyxl.packaging.custom import IntProperty
+    from openpyxl.styles import Font
+
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    book.properties.creator = "rotorid"
+    book.properties.created = book.properties.modified = now().replace(tzinfo=None)
+    book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
+    for table in tables:
+        sheet = book.create_sheet(table.name[:LONGEST_TITLE])
+        above = [(f"# {table.note}",)] if table.note else []
+        for number, row in enumerate([*above, table.headings, *table.rows], start=1):
+            for place, value in enumerate(row, start=1):
+                written = sheet.cell(number, place)
+                if isinstance(value, str):
+                    written.value = one_line(value)
+                    written.data_type = "s"  # never a formula
+                else:
+                    written.value = value
+        for written in sheet[len(above) + 1]:
+            written.font = Font(bold=True)
+        sheet.freeze_panes = f"A{len(above) + 2}"
+    stream = io.BytesIO()
+    book.save(stream)
+    return stream.getvalue()
+
+
+def html(table: Table) -> Markup:
+    """A table of HTML: numbers with their place in the JSON document as `data-key`; `blocks` if wide."""
+    from markupsafe import Markup
+
+    shown = [[column.heading, *(text or NOTHING for text in column.texts)] for column in table.columns]
+    wide = len(shown) > NARROW or sum(max(map(len, texts)) for texts in shown) > LETTERS
+    numbers = [Markup("") if column.words else Markup(' class="n"') for column in table.columns]
+    heads = Markup("").join(
+        Markup("<th{}>{}</th>").format(*pair) for pair in zip(numbers, table.headings, strict=True)
+    )
+    cells = [
+        [
+            Markup('<td{} data-label="{}">{}</td>').format(number, column.heading, text)
+            for text in _cells(column)
+        ]
+        for number, column in zip(numbers, table.columns, strict=True)
+    ]
+    body = Markup("\n").join(
+        Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*cells, strict=True)
+    )
+    kind = Markup(' class="blocks"') if wide else Markup("")
+    note = Markup('\n<p class="note">{}</p>').format(table.note) if table.note else Markup("")
+    return Markup(
+        "<table{}>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>{}"
+    ).format(kind, table.name, heads, body, note)
+
+
+def _cells(column: Column) -> list[Markup]:
+    from markupsafe import Markup, escape
+
+    if column.words:
+        return [escape(text or NOTHING) for text in column.texts]
+    texts = [text.replace("-", "\N{MINUS SIGN}") or NOTHING for text in column.texts]
+    if not column.key:
+        return [escape(text) for text in texts]
+    factor = Markup("") if column.scale == 1.0 else Markup(' data-scale="{}"').format(repr(column.scale))
+    places = [column.key.replace("*", str(row)) for row in range(len(texts))]
+    return [
+        Markup('<span data-key="{}"{}>{}</span>').format(place, factor, text)
+        for place, text in zip(places, texts, strict=True)
+    ]
+
+
+def frame(table: Table) -> pd.DataFrame:
+    """The table as a DataFrame."""
+    import pandas as pd
+
+    return pd.DataFrame({column.heading: list(column.values) for column in table.columns})
+
+
+def file_bytes(path: Path, table: Table) -> bytes:
+    """What a file of this name (.csv or .xlsx) holds."""
+    return excel(table) if path.suffix.lower() == ".xlsx" else csv(table)
+
+
+def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
+    """A CSV file: comment lines (with the version above them), columns, rows; numbers with all their digits.
+
+    A table without comments stays one that every program reads.
+    """
+    versioned = [f"schema_version = {SCHEMA_VERSION}", *comments] if comments else []
+    lines = [f"# {one_line(comment)}" for comment in versioned]
+    lines += [",".join(map(_csv_cell, row)) for row in (names, *rows)]
+    text = "\n".join([*lines, ""])
+    # Excel takes a file without the mark for its own 8-bit encoding; plain ASCII needs none.
+    return text.encode("utf-8" if text.isascii() else "utf-8-sig")
+
+
+def _csv_cell(value: Value) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    text = "" if value is None else guarded(value)
+    # any sign that could separate columns: a reader looks for one in the header
+    return '"' + text.replace('"', '""') + '"' if re.search('[,;\t"]|^#', text) else text
+
+
+def guarded(text: str) -> str:
+    """Text of one line that no spreadsheet takes for a formula; readers drop the blank before it."""
+    text = one_line(text)
+    return f" {text}" if text.startswith(("=", "+", "-", "@")) else text
+
+
+def one_line(text: str) -> str:
+    """Text with its spaces made single, refused where it has control characters."""
+    line = " ".join(text.split())
+    if re.search(r"[\x00-\x1f\x7f]", line):
+        raise ValueError(f"text with control characters cannot be written to a table: {text!r}")
+    return line
