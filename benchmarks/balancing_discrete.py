@@ -9,8 +9,9 @@ directions (less than 0.5 % below the norm), solved by HiGHS with 60 s at most; 
 where it does not end. Its published figure with its own solver is 505 s at 36 holes. Both errors are compared
 as norms; "difference" is by how much ours is larger, relative to the vector (0 where it is not).
 
-The joint problem (three planes of 24 holes, pieces of 10 and 20 g, 60 readings) has no peer: its longest time
-of search is set to 4.5 s, its time is told in calls of `numpy.linalg.lstsq`, and the "difference" is the proven gap.
+The joint problem (three planes of 24 holes, pieces of 10 and 20 g, 60 readings) has no peer: its
+longest time of search is 4.5 s, calls of `numpy.linalg.lstsq` stand beside it, and the "difference" is the
+proven gap.
 """
 
 from __future__ import annotations

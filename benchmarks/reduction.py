@@ -1,8 +1,9 @@
 """Reduced models of the reference rotor: all places for three masses, and Guyan's reduction against ROSS.
 
-Ranking all 2024 triples of the 24 nodes beside a loop as a user of NumPy would write it: for each triple `lstsq` of formula (50), `eigh` of the three masses, frequency errors and MAC;
-compliances and modes of the rotor are computed once, by the same `fem` calls. Compared are masses,
-frequencies and MAC of all triples with positive masses, after these are found to be the same ones.
+Ranking all 2024 triples of the 24 nodes beside a loop as a user of NumPy would write it: for each triple
+`lstsq` of formula (50), `eigh` of the three masses, frequency errors and MAC; compliances and modes of the
+rotor are computed once, by the same `fem` calls. Compared are masses, frequencies and MAC of all triples
+with positive masses, after these are found to be the same ones.
 
 Guyan's reduction of ROSS always keeps the nodes of bearings and discs, so these are kept in both programs.
 ROSS has six unknowns per node: one axial and one torsional unknown, without which it could not invert its
