@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact golden-mutations book lint house sure docs pages format bench build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact golden-mutations book lint house sure docs pages format bench bench-all build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -127,9 +127,13 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer $(ROTA_ORDER_VENV)/.peer
+# Five tasks beside ROSS, hsbalance and lmfit; bench-all: every row, CasADi and rota-order, too.
+bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer
+	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python $(BENCH_VENV)/bin/python -m benchmarks
+
+bench-all: $(BENCH_VENV)/.bench-all $(HSBALANCE_VENV)/.peer $(ROTA_ORDER_VENV)/.peer
 	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python ROTORID_ROTA_ORDER_PYTHON=$(ROTA_ORDER_VENV)/bin/python \
-	  $(BENCH_VENV)/bin/python -m benchmarks --json docs/benchmarks.json
+	  $(BENCH_VENV)/bin/python -m benchmarks --all --json docs/benchmarks.json
 
 # Wheel and sdist, the wheel made from the sdist.
 DIST ?= dist
@@ -157,7 +161,7 @@ constraints:
 	$(UV_VENV)/bin/python -m pip -q install uv
 	$(UV_VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --upgrade --no-config --no-annotate \
 	  --custom-compile-command 'make constraints' --output-file constraints.txt pyproject.toml \
-	  --extra fast --extra instruments --extra worksheet --extra fleet --extra cluster --group dev --group bench --group peer --group peer-vectors --group house > /dev/null
+	  --extra fast --extra instruments --extra worksheet --extra fleet --extra cluster --group dev --group bench --group bench-all --group peer --group peer-vectors --group house > /dev/null
 
 $(VENV)/.pip: $(CONSTRAINTS)
 	$(call environment,$(VENV))
@@ -174,6 +178,10 @@ $(VENV)/.dev: $(VENV)/.user
 $(BENCH_VENV)/.bench: pyproject.toml $(CONSTRAINTS)
 	$(call environment,$(BENCH_VENV))
 	$(BENCH_VENV)/bin/python -m pip -q install -e . --group bench
+	touch $@
+
+$(BENCH_VENV)/.bench-all: $(BENCH_VENV)/.bench
+	$(BENCH_VENV)/bin/python -m pip -q install --group bench-all
 	touch $@
 
 $(HOUSE_VENV)/.house: pyproject.toml $(CONSTRAINTS)

@@ -1,23 +1,26 @@
-"""Run benchmarks and print the table; exit status 1 if answers differ or a required ratio is missed."""
+"""Run benchmarks and print the table; exit status 1 if answers differ or a required ratio is missed.
+
+Without names: one row of each task that people choose a program by. `--all`: every row of every benchmark.
+"""
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import json
 import os
 import platform
-import sys
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-BENCHMARKS = (
+from benchmarks.timing import Row
+
+TASKS = ("critical_speeds", "unbalance_response", "campbell", "balancing_solvers", "time_fit")
+EVERYTHING = (
     "startup",
-    "critical_speeds",
-    "unbalance_response",
-    "campbell",
+    *TASKS,
     "identification",
-    "time_fit",
-    "balancing_solvers",
     "balancing_discrete",
     "reduction",
     "motion",
@@ -26,18 +29,32 @@ BENCHMARKS = (
 )
 
 
-def main(names: list[str]) -> int:
-    store = None
-    if "--json" in names:
-        at = names.index("--json")
-        if at + 1 == len(names):
-            print("--json takes the name of a file", file=sys.stderr)
-            return 2
-        store, names = Path(names[at + 1]), names[:at] + names[at + 2 :]
-    unknown = [name for name in names if name not in BENCHMARKS]
-    if unknown:
-        print(f"no benchmark is called {unknown[0]!r}; there are: {', '.join(BENCHMARKS)}", file=sys.stderr)
-        return 2
+def measured(names: list[str], every: bool) -> Iterator[Row]:
+    """The first row of each task, or all rows of the benchmarks named, one by one."""
+    for name in names or (EVERYTHING if every else TASKS):
+        module = importlib.import_module(f"benchmarks.{name}")
+        if names or every:
+            yield from module.run()
+        else:
+            yield module.task()
+
+
+def verdict(row: Row) -> str:
+    if not row.agrees:
+        return f"  ANSWERS DIFFER by more than {row.allowed:.0e}"
+    if not row.fast_enough:
+        return "  TOO SLOW"
+    return f"  below the goal of {row.goal:g}" if row.ratio < row.goal else ""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(EVERYTHING))
+    parser.add_argument("--all", action="store_true", help="every row")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="where the rows are stored")
+    options = parser.parse_args()
+    if unknown := set(options.names) - set(EVERYTHING):
+        parser.error(f"no benchmark is called {min(unknown)!r}; there are: {', '.join(EVERYTHING)}")
     import numpy
     import scipy
 
@@ -47,30 +64,21 @@ def main(names: list[str]) -> int:
         f"{os.cpu_count()} processors"
     )
     print(f"{machine}\n")
+    print(f"{'task':56}{'':16}{'ms':>9}  {'peer':29}{'ms':>10}{'ratio':>9}{'needed':>8}{'difference':>12}")
     rows = []
-    head = f"{'task':56}{'':16}{'ms':>9}  {'peer':29}{'ms':>10}{'ratio':>9}{'needed':>8}{'difference':>12}"
-    print(head)
-    failed = False
-    for name in names or BENCHMARKS:
-        for row in importlib.import_module(f"benchmarks.{name}").run():
-            rows.append(row)
-            verdict = ""
-            if not row.agrees:
-                verdict = f"  ANSWERS DIFFER by more than {row.allowed:.0e}"
-            elif not row.fast_enough:
-                verdict = "  TOO SLOW"
-            failed |= bool(verdict)
-            print(
-                f"{row.task:56}{row.ours:16}{1e3 * row.our_seconds:9.3f}  {row.peer:29}"
-                f"{1e3 * row.peer_seconds:10.2f}{row.ratio:9.3g}{row.required_ratio:8.0f}"
-                f"{row.difference:12.1e}{verdict}{'  ' if row.note else ''}{row.note}",
-                flush=True,
-            )
-    if store is not None:
+    for row in measured(options.names, options.all):
+        rows.append(row)
+        print(
+            f"{row.task:56}{row.ours:16}{1e3 * row.our_seconds:9.3f}  {row.peer:29}"
+            f"{1e3 * row.peer_seconds:10.2f}{row.ratio:9.3g}{row.required_ratio:8.3g}"
+            f"{row.difference:12.1e}{verdict(row)}{'  ' if row.note else ''}{row.note}",
+            flush=True,
+        )
+    if options.json is not None:
         document = {"machine": machine, "rows": [asdict(row) for row in rows]}
-        store.write_text(json.dumps(document, indent=1) + "\n")
-    return int(failed)
+        options.json.write_text(json.dumps(document, indent=1) + "\n")
+    return int(not all(row.agrees and row.fast_enough for row in rows))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    raise SystemExit(main())

@@ -1,10 +1,10 @@
-"""A 20-mass chain with 60 unknowns from 40 frequencies, against the project's limits."""
+"""A 20-mass chain with 60 unknowns from 40 frequencies, against calls of `numpy.linalg.lstsq`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.timing import Row, best_of, relative_difference
+from benchmarks.timing import Row, against_numpy, best_of, relative_difference
 from rotorid.harmonic import HarmonicModel, harmonic_model, identify
 from rotorid.harmonic.experiments import Experiments, experiments
 
@@ -42,6 +42,6 @@ def run() -> list[Row]:
     reading = best_of(lambda: None, lambda _: read(), 3)
     seconds = best_of(lambda: None, lambda _: identify(model, data), 5)
     return [
-        Row("reading a model of 20 masses, 60 unknowns", "rotorid", reading, "limit", 2.0, 0.0, 0.0, 1.0),
-        Row("60 unknowns from 40 frequencies", "rotorid", seconds, "limit", 1.0, difference, 1e-6, 1.0),
+        against_numpy("reading a model of 20 masses, 60 unknowns", reading, 1000, 0.0, 0.0),
+        against_numpy("60 unknowns from 40 frequencies", seconds, 500, difference, 1e-6),
     ]

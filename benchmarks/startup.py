@@ -1,22 +1,26 @@
-"""Start-up in a fresh process: what a person waits for before anything happens."""
+"""Start-up in a fresh process: what a person waits for before anything happens, beside NumPy's own import."""
 
 import subprocess
 import sys
 
 from benchmarks.timing import Row, best_of
 
-LIMITS = {
-    "import rotorid": (("-c", "import rotorid"), 0.3),
+PEER = ("-c", "import numpy, scipy.linalg")
+TASKS = {
+    "import rotorid": (("-c", "import rotorid"), 2.0),
     "rotorid --help": (("-m", "rotorid", "--help"), 0.5),
 }
+"""Words of each command line, and the ratio that it must reach."""
+
+
+def seconds(words: tuple[str, ...]) -> float:
+    command = [sys.executable, *words]
+    return best_of(lambda: None, lambda _: subprocess.run(command, check=True, capture_output=True), 9)
 
 
 def run() -> list[Row]:
-    rows = []
-    for name, (words, limit) in LIMITS.items():
-        command = [sys.executable, *words]
-        seconds = best_of(
-            lambda: None, lambda _, c=command: subprocess.run(c, check=True, capture_output=True), 5
-        )
-        rows.append(Row(f"{name}, whole process", "rotorid", seconds, "limit", limit, 0.0, 0.0, 1.0))
-    return rows
+    peer = seconds(PEER)
+    return [
+        Row(f"{name}, whole process", "rotorid", seconds(words), PEER[1], peer, 0.0, 0.0, required)
+        for name, (words, required) in TASKS.items()
+    ]

@@ -18,13 +18,13 @@ STORED = Path(__file__).parents[1] / "benchmarks.json"
 
 
 class BenchmarkTable(SphinxDirective):
-    """What the last `make bench` measured, from docs/benchmarks.json."""
+    """What the last `make bench-all` measured, from docs/benchmarks.json."""
 
     def run(self) -> list[nodes.Node]:
         """The machine and the table, or a sentence that nothing is stored."""
         self.env.note_dependency(str(STORED))
         if not STORED.exists():
-            return [paragraph("No measurement is stored here; `make bench` makes one on your machine.")]
+            return [paragraph("No measurement is stored here; `make bench-all` makes one on your machine.")]
         return benchmark_nodes(json.loads(STORED.read_text(encoding="utf-8")))
 
 
