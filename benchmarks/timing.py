@@ -71,7 +71,7 @@ def once(make: Callable[[], T], call: Callable[[T], R]) -> tuple[float, R]:
 
 @cache
 def numpy_lstsq() -> float:
-    """Duration of `numpy.linalg.lstsq`, 1,000 equations with 60 unknowns, s: the unit where there is no peer."""
+    """Duration of `numpy.linalg.lstsq`, 1,000 equations with 60 unknowns, s: a unit without a peer."""
     rng = np.random.default_rng(0)
     A, b = rng.standard_normal((1000, 60)), rng.standard_normal(1000)
     return best_of(lambda: None, lambda _: np.linalg.lstsq(A, b, rcond=None), 30)

@@ -7,8 +7,9 @@ relative to the peak. Times are those of the processor, in each one's own proces
 `python -m benchmarks.vectors [SEEDS]` prints rota-order's lines of docs/vectors_accuracy.md.
 
 The long record: eight channels of 10⁷ samples, a tacho and seven sensors, 16 bit, a run-up whose vectors are
-a formula, through the whole command `rotorid vectors`; calls of `numpy.linalg.lstsq` stand beside
-it, its memory stays below 1 GB, and the difference is the largest error relative to the peak. Making the record is not timed.
+a formula, through the whole command `rotorid vectors`; calls of `numpy.linalg.lstsq` stand beside it, its
+memory stays below 1 GB, and the difference is the largest error relative to the peak. Making the record is
+not timed.
 """
 
 from __future__ import annotations
