@@ -51,7 +51,9 @@ def _array(old: Any, new: Any, tolerances: Iterable[Tolerance]) -> str:
             return f"{place}: {before[place]!r} is now {after[place]!r}"
     pairs = {place: (before[place], after[place]) for place in before if place not in exact}
     largest = max((abs(a) for place, (a, _) in pairs.items() if place not in ("sum", "moment")), default=0.0)
-    allowed = max([RELATIVE * largest, *(max(t.relative * largest, t.absolute) for t in tolerances)])
+    allowed = max(
+        [RELATIVE * largest, *(_allowed(each, [a for a, _ in pairs.values()]) for each in tolerances)]
+    )
     wrong = {place: abs(a - b) for place, (a, b) in pairs.items() if not abs(a - b) <= allowed}
     if not wrong:
         return ""
@@ -59,6 +61,15 @@ def _array(old: Any, new: Any, tolerances: Iterable[Tolerance]) -> str:
     a, b = pairs[worst]
     share = f", {wrong[worst] / largest:.1e} of the largest" if largest else ""
     return f"{len(wrong)} of {len(pairs)} numbers, most {worst}: {a!r} is now {b!r}{share}"
+
+
+def _allowed(tolerance: Tolerance, numbers: Sequence[float]) -> float:
+    """How far a number of an array may be off."""
+    size = max(map(abs, numbers), default=0.0)
+    if tolerance.interval:
+        ends = zip(numbers[::2], numbers[1::2], strict=False)
+        size = max((abs(high - low) / 2 for low, high in ends), default=0.0)
+    return max(tolerance.relative * size, tolerance.absolute)
 
 
 def _count(values: Any) -> Any:

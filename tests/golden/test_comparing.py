@@ -123,6 +123,15 @@ def test_the_spread_may_differ_by_15_percent_between_trees_only():
     assert {each.relative for each in SPREAD} == {0.15}
 
 
+def test_an_interval_may_be_15_percent_wider_not_elsewhere():
+    def one(low, high):
+        return {"case": {"status": 0, "output": f'{{"ci95": [{low}, {high}]}}', "error": ""}}
+
+    assert apart(one(99.0, 101.0), one(98.9, 101.1)) == {}
+    assert apart(one(99.0, 101.0), one(98.8, 101.2))
+    assert apart(one(99.0, 101.0), one(99.5, 101.5))
+
+
 def test_every_tolerance_has_its_reason():
     for tolerance in (*TOLERANCES, *SPREAD):
         assert len(tolerance.reason) > 10

@@ -20,6 +20,8 @@ class Tolerance:
         Of the largest of the array.
     absolute
         In its unit.
+    interval
+        Whether the array holds intervals, low and high in turn: `relative` is of half the widest.
     """
 
     case: str
@@ -27,6 +29,7 @@ class Tolerance:
     reason: str
     relative: float = 0.0
     absolute: float = 0.0
+    interval: bool = False
 
     def holds(self, case: str, key: str) -> bool:
         """Whether it is about this key of this case."""
@@ -78,10 +81,9 @@ SPREAD = tuple(
             "*_std*",
             "*covariance*",
             "*correlation*",
-            "*interval*",
             "*uncertainty*",
         ),
-        *("*_low", "*_low[[]*", "*_high", "*_high[[]*", "*quantile*", "*probabilit*", "*95*", "*spread*"),
+        *("*_low", "*_low[[]*", "*_high", "*_high[[]*", "*quantile*", "*probabilit*", "*spread*"),
     )
-)
+) + tuple(Tolerance("*", key, _DRAWN, relative=0.15, interval=True) for key in ("*ci95*", "*interval*"))
 """For `make golden-near` only: standard deviations, covariances, intervals, probabilities."""
