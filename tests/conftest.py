@@ -51,7 +51,7 @@ def repeatable(words):
     """Whether a command line gives the same again, and nothing else."""
     if not words or words[0] in ("demo", "fleet", "study", "worksheet") or "--verbose" in words:
         return False
-    paths = [Path(word) for word in words if "/" in word or Path(word).suffix.lstrip(".").isalpha()]
+    paths = [Path(word) for word in words if "/" in word or Path(word).suffix[1:].isalpha()]
     return bool(paths) and all(path.exists() and SAMPLES in path.resolve().parents for path in paths)
 
 
@@ -62,7 +62,7 @@ def cli(capsys, monkeypatch):
     def run(*args):
         words = tuple(map(str, args))
         patched = [one for name in PATCHED for one in getattr(monkeypatch, name) if one[:2] != (sys, "argv")]
-        key = () if patched or not repeatable(words) else (os.getcwd(), *words)
+        key = () if patched or not repeatable(words) else (os.getcwd(), *words)  # paths may be relative
         if key not in REPEATED:
             monkeypatch.setattr(sys, "argv", ["rotorid", *words])
             capsys.readouterr()
