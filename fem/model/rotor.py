@@ -14,7 +14,7 @@ from fem.model.calibration import Calibration
 from fem.model.disc import STEEL_DENSITY, Disc
 from fem.model.node_forces import NodeForce, in_order
 from fem.model.supports import Pedestal, Support
-from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.arrays import BoolArray, FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
@@ -241,7 +241,15 @@ PER_ELEMENT = (
     "poisson_ratio",
     "material_damping",
 )
+SHORTEST = 3000
+"""A neighbour may be this many times as long as an element: float64 loses the stiffness of shorter ones."""
 _MAY_BE_ZERO = ("inner_diameter", "density", "material_damping")
+
+
+def too_short(length: FloatArray) -> BoolArray:
+    """Which elements are too short beside their longer neighbour, from lengths of shape (n,)."""
+    beside = np.concatenate(([0.0], length, [0.0]))
+    return np.asarray(SHORTEST * length < np.maximum(beside[:-2], beside[2:]))
 
 
 def _broadcast(rotor: Rotor) -> list[FloatArray]:
@@ -271,7 +279,14 @@ def _broadcast(rotor: Rotor) -> list[FloatArray]:
     # Copies: the caller's arrays stay his, ours stay read-only.
     arrays = [np.broadcast_to(array, (n,)).copy() for array in arrays]
     read_only(*arrays)
-    outer, inner = arrays[1], arrays[2]
+    length, outer, inner = arrays[:3]
+    short = too_short(length)
+    if short.any():
+        i = int(np.argmax(short))
+        raise ValueError(
+            f"element {i + 1}: its length, {length[i]:g} m, is less than 1/{SHORTEST} of its longer "
+            "neighbour's, too short for float64; join it with this neighbour"
+        )
     if (inner >= outer).any():
         i = int(np.argmax(inner >= outer))
         raise ValueError(
