@@ -160,8 +160,8 @@ def _by_work(
 ) -> ComplexArray:
     """Values whose small real parts have the digits of what damps and drives them, however little that is.
 
-    Of λ = σ + iω the imaginary part of xᴴ (λ² M + λ D + K) x = 0 is 2 σ ω m + ω Re d + σ Im d + Im k = 0: what
-    does no work over an orbit, however large, is not in it.
+    With λ = σ + iω the imaginary part of xᴴ (λ² M + λ D + K) x = 0 is 2 σ ω m + ω Re d + σ Im d + Im k = 0:
+    what does no work over an orbit, however large, is not in it.
     """
     values = values.copy()
     quiet = np.abs(values.real) < _QUIET * np.abs(values)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.text import listing
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 
     from fem import MeshCheck, Modes, Rotor, SpeedMap
     from rotorid.base.arrays import FloatArray
+
+
+_MATTERS = 0.01  # relative change of a critical speed by what the model leaves out
+_NAMED = 6  # critical speeds in one warning
 
 
 @dataclass(frozen=True)
@@ -123,6 +128,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         return found if other is model else critical_speeds_near(other, found)
 
     std, said = error_band(model, "the critical speeds", speeds)
+    left_out += _stubby(model, modes)
     log_rotor(model)
     return CriticalSpeeds(
         modes=dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *said)),
@@ -132,6 +138,44 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         more=int((modes.frequencies > 0).sum()) >= (options.number or 3),
         provenance=provenance(files, options),
     )
+
+
+def _stubby(model: Rotor, modes: Modes) -> list[str]:
+    """What is too high by more than 1 % because shear or tilting inertia of the shaft are left out.
+
+    Moments of inertia of discs that are left out have a warning of their own.
+    """
+    import numpy as np
+
+    import fem
+
+    names = {"shear": "shear", "rotary_inertia": "tilting inertia"}
+    missing = {key: name for key, name in names.items() if not getattr(model.model, key)}
+    if not missing:
+        return []
+    discs = model.discs
+    if "rotary_inertia" in missing:
+        discs = tuple(dataclasses.replace(disc, diametral_inertia=0.0) for disc in discs)
+    counted_in = dataclasses.replace(model.model, **dict.fromkeys(missing, True))
+    moving = np.flatnonzero(modes.frequencies > 0)
+    try:
+        full = fem.critical_speeds(dataclasses.replace(model, model=counted_in, discs=discs), moving.size)
+    except ValueError:  # none is left in the bearing tables
+        return []
+    other = full.frequencies[full.frequencies > 0]
+    if moving.size != other.size:
+        return []
+    excess = modes.frequencies[moving] / other - 1
+    large = np.flatnonzero(excess > _MATTERS)
+    if not large.size:
+        return []
+    listed = [f"mode {moving[k] + 1} by {100 * excess[k]:.1f} %" for k in large[:_NAMED]]
+    more = " …" if large.size > _NAMED else ""
+    return [
+        f"without {listing(list(missing.values()), 'and')} of the shaft these speeds are too high: "
+        f"{listing(listed, 'and')}{more}; [model] {', '.join(f'{key} = true' for key in missing)} in a "
+        f"rotor file counts {'it' if len(missing) == 1 else 'them'}"
+    ]
 
 
 def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:

@@ -320,8 +320,10 @@ def rotors(draw):
     outer = draw(st.lists(SIZE, min_size=n, max_size=n))
     inner = [D * draw(st.just(0.0) | st.floats(0.01, 0.99)) for D in outer]
     node = st.integers(1, n + 1)
+    longest = draw(SIZE)
+    parts = draw(st.lists(st.floats(0.01, 1.0), min_size=n, max_size=n))  # much shorter ones are refused
     return Rotor(
-        draw(per_element(n, SIZE)),
+        [max(longest * part, 1e-30) for part in parts],
         outer,
         [d if 1e-30 <= d < D else 0.0 for d, D in zip(inner, outer, strict=True)],
         draw(per_element(n, SIZE)),
