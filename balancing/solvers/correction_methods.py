@@ -162,7 +162,10 @@ def _plain(method: Criterion, stack: Stack) -> Fitted:
         covariance = symmetric(sum(parts[1:], parts[0]))
         if method != "least-squares" or bound:
             covariance, words = _sampled(
-                stack, lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights, stack.channels
+                stack,
+                lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights,
+                stack.channels,
+                found.weights if method == "least-squares" else None,
             )
     return Fitted(
         found.weights,
@@ -249,8 +252,8 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
         found = descend_all(given(W, Y, free.model_error), rivals, SETTLED_DRAWN)
         return min(found, key=lambda end: end.objective).weights
 
-    # drawn from the errors of the readings alone: what explains the residuals is the same in every job
-    covariance, words = _sampled(stack, again, _regular(channels, 0.0))
+    # with what explains the residuals, as the ± without limits are
+    covariance, words = _sampled(stack, again, _regular(channels, free.model_error), D)
     if free.inflation > 1:
         words += (
             "even without the limits, weights in these planes do not explain the vibration: what would be "
@@ -282,12 +285,18 @@ def _regular(channels: FloatArray, model_error: float) -> FloatArray:
 
 
 def _sampled(
-    stack: Stack, solver: Callable[[ComplexArray, ComplexArray], ComplexArray], channels: FloatArray
+    stack: Stack,
+    solver: Callable[[ComplexArray, ComplexArray], ComplexArray],
+    channels: FloatArray,
+    about: ComplexArray | None,
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
     """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
     common, known = stack.common, stack.parameters
     try:
-        return sampled_covariance(solver, stack.W, stack.Y, channels, common=common, parameters=known), ()
+        found = sampled_covariance(
+            solver, stack.W, stack.Y, channels, common=common, parameters=known, about=about
+        )
+        return found, ()
     except ValueError as error:
         return None, (str(error),)
 
