@@ -32,6 +32,7 @@ from balancing.solvers.weighted_limits import (
 )
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.registry import Method, find
+from rotorid.regression import stretch
 
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""
@@ -290,15 +291,25 @@ def _sampled(
     channels: FloatArray,
     about: ComplexArray | None,
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
-    """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
+    """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits.
+
+    Around weights (P,): a limit that barely binds moves half of the solutions to one side. None: their mean.
+    """
+    solutions: list[ComplexArray] = []
+
+    def noted(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
+        solutions.append(solver(W, Y))
+        return solutions[-1]
+
     common, known = stack.common, stack.parameters
     try:
-        found = sampled_covariance(
-            solver, stack.W, stack.Y, channels, common=common, parameters=known, about=about
-        )
-        return found, ()
+        covariance = sampled_covariance(noted, stack.W, stack.Y, channels, common=common, parameters=known)
     except ValueError as error:
         return None, (str(error),)
+    if about is not None and solutions:
+        moved = stretch(np.mean(solutions, axis=0) - about)
+        covariance = symmetric(covariance + np.outer(moved, moved))
+    return covariance, ()
 
 
 def _ridge(stack: Stack, strength: float | str) -> Fitted:

@@ -27,7 +27,6 @@ def sampled_covariance(
     seed: int = 0,
     common: ComplexArray | None = None,
     parameters: ComplexArray | None = None,
-    about: ComplexArray | None = None,
 ) -> FloatArray:
     """Covariance of the weights of any solver, from readings drawn at random from their errors.
 
@@ -46,14 +45,11 @@ def sampled_covariance(
         What else the readings have in common, and errors of parameters, as of `balancing.Influence`.
     seed
         The same seed gives the same draws.
-    about
-        Weights (P,) around which the solutions scatter: a limit that barely binds pushes half of them to one
-        side of those that are proposed. None: their mean.
 
     Returns
     -------
-    Of (Re D₁, Im D₁, …), shape (2P, 2P): the scatter of the solutions. A weight that a limit holds scatters
-    along the limit only.
+    Of (Re D₁, Im D₁, …), shape (2P, 2P): the scatter of the solutions around their mean. A weight that a
+    limit holds scatters along the limit only.
 
     Raises
     ------
@@ -93,8 +89,7 @@ def sampled_covariance(
             f"the errors of the weights cannot be stated: with readings changed within their errors, "
             f"{skipped} of {draws} problems have no solution{words}; widen the limits, or measure better"
         )
-    scatter = np.array(found) - (np.mean(found, axis=0) if about is None else stretch(about))
-    return symmetric(scatter.T @ scatter / (len(found) - (about is None)))
+    return symmetric(np.atleast_2d(np.cov(np.array(found).T)))
 
 
 def _shared(rng: np.random.Generator, common: ComplexArray) -> ComplexArray:
