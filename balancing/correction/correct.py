@@ -179,7 +179,10 @@ def correct(  # noqa: PLR0913
     )
     std, factor = result.mass_std, result.coverage_factor
     widths = None if std is None or factor is None else factor * std
-    result = replace(result, decision=decide_to_mount(inputs, D, widths, soft=soft, remove=remove))
+    decision = decide_to_mount(
+        inputs, D, widths, soft=soft, remove=remove, unclear=unclear, check_rms=result.check_rms
+    )
+    result = replace(result, decision=decision)
     warnings, words = influence.warnings + start.warnings, influence.notes
     if result.decision.word == "mount":
         warnings += unclear + unclear_regions + fitted.warnings + warnings_of(result, felt, alike=not unclear)

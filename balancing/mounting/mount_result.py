@@ -166,7 +166,7 @@ class Mounted(Answered):
         largest = largest_readings(labels, c.speeds, c.sensors, c.before, self.after)
         lines += ["", f"Largest predicted{largest}", self._proof()]
         return Answer(
-            f"{what} these pieces: {left} (with any weights {small(rms(free), old.max())}).",
+            f"{f'{what} these pieces:' if c.sound else 'These pieces would leave'} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),
             self.warnings,
             tables=(f"Hole by hole:\n{text(columns, left=2)}",) if used else (),
