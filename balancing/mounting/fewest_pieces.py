@@ -1,4 +1,4 @@
-"""The fewest pieces that leave little more than the least vibration.
+"""The fewest pieces that leave little more than the least vibration, or little enough.
 
 For one number of pieces after the other, the best choice of so many is searched: vectors of few pieces can be
 listed where all of them cannot. The first number of which a choice is good enough is the fewest.
@@ -16,10 +16,12 @@ from balancing.mounting.discrete_bounds import Form
 from balancing.mounting.discrete_search import Found, Squares, polish, rounded, search
 from balancing.mounting.mountable_vectors import MOST, Attainable
 
-__all__ = ["FEW", "Choice", "fewest"]
+__all__ = ["FEW", "LITTLE", "Choice", "fewest"]
 
 FEW = 1.2
 """So many times the least is good enough for fewer pieces."""
+LITTLE = 0.2
+"""So large a share of the present vibration, or of a given weight, is good enough for fewer pieces."""
 Choice = tuple[Found, Sequence[Attainable]]
 """What was found, in which sets."""
 

@@ -56,7 +56,7 @@ def test_good_jobs_are_not_warned_of(method, share):
 
 def test_where_weights_fight_what_is_proposed_is_better():
     rng = np.random.default_rng(2)
-    ours, theirs = [], []
+    ours, theirs, fight = [], [], []
     for i in range(120):
         trials, W, Y0 = simulated(rng, alike=(0.02, 0.1, 0.5)[i % 3])
         if W.shape[-1] == 1:
@@ -66,10 +66,12 @@ def test_where_weights_fight_what_is_proposed_is_better():
             continue
         ours.append(left(W, Y0, c.planes, c.decision.choices[0]))
         theirs.append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
+        fight.append("within the errors" not in c.decision.cause)
         assert c.decision.instead
-    assert len(ours) > 20
+    assert sum(fight) > 20
     assert np.mean(ours) < 0.4 * np.mean(theirs)
-    assert np.mean(np.array(ours) < theirs) > 0.9
+    # errors are smaller than assumed here, so that weights "within the errors" are better than they promise
+    assert np.mean((np.array(ours) < theirs)[fight]) > 0.9
     assert np.max(np.subtract(ours, theirs)) < 0.1
 
 
