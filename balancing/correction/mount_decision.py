@@ -13,9 +13,9 @@ mounting where the errors eat half of what is promised,
     (zᴴ F z − F₀₀)/N ≥ (B − |A z|²/N)/2,
 
 or where fewer planes with weights a third as large leave hardly more; nor where planes are not determined,
-where 95 of 100 check runs stay only below hardly less than B, or where a run that was read with its weights is
-below that already. In simulated jobs of one to four planes, with errors of up to 2 % and trial weights of 0.3
-to 1.5 times the correction, few are told so, and what is proposed then truly leaves less than the weights
+where 95 of 100 check runs stay only below hardly less than B, or where a run that was read with its weights
+is below that already. In simulated jobs of one to four planes, with errors of up to 2 % and trial weights of
+0.3 to 1.5 times the correction, few are told so, and what is proposed then truly leaves less than the weights
 (`test_mount_decision.py`). The weighted fit is told so more often than least squares: where planes act alike
 or readings are few, the most likely weights can be far larger than the true ones.
 """
