@@ -339,7 +339,7 @@ def _leave(inputs: Inputs, run: str, reads: float, promised: float) -> tuple[str
     strange = "; ".join(influence.contradictions)
     if not strange and influence.trials is not None and influence.error_source != "stated":
         strange = nonlinear(influence.trials, influence.W)
-    more = "Instead: make one more run with other weights near these, and balance with it, too."
+    more = "To promise less, add a run with other weights near these."
     return cause, (f"The runs do not fit one linear machine: {strange}.",) if strange else (more,)
 
 

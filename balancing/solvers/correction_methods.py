@@ -34,6 +34,8 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.regression import stretch
 
+HELD = 1e-4
+"""Relative; so little weights of drawn readings are moved by the solver alone."""
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""
 
@@ -308,6 +310,7 @@ def _sampled(
         return None, (str(error),)
     if about is not None and solutions:
         moved = stretch(np.mean(solutions, axis=0) - about)
+        moved[np.abs(moved) < HELD * np.abs(about).max()] = 0.0  # the solver stays a little inside
         covariance = symmetric(covariance + np.outer(moved, moved))
     return covariance, ()
 

@@ -1,12 +1,11 @@
 """`mount`: as few pieces as leave what a check run would not show, or a fifth of the present vibration."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from balancing_data import GRAM, complex_normal, job
 
-from balancing import Limits, ReadingErrors, correct, estimate_influence
+from balancing import Limits, correct, estimate_influence
+from balancing.mounting.discrete_weights import solve_discrete
 from balancing.mounting.holes import equal_holes, from_list
 from balancing.mounting.mount import mount
 from balancing.mounting.split import split_on_holes
@@ -44,15 +43,15 @@ def test_few_pieces_where_exact_weights_leave_nothing(seed):
     assert "--best" in few.answer.found
 
 
-def test_errors_that_hide_more_need_fewer_pieces():
-    numbers = []
-    for size in (0.005, 0.2):
-        trials = replace(drawn(3).trials, errors=ReadingErrors(size, size))
-        known = estimate_influence(trials)
-        c = correct(known, refuse=False)
-        assert (c.check_rms > 0.4 * rms(c.before)) == (size > 0.1)
-        numbers.append(mount(c, known, None, {"A": HOLES, "B": HOLES}).found.pieces)
-    assert numbers[1] < numbers[0]
+def test_the_larger_share_is_enough_for_fewer_pieces():
+    influence = drawn(3)
+    W, Y = influence.W.reshape(2, 2), influence.baseline.ravel()
+    found = [solve_discrete(W, Y, (HOLES, HOLES), within=1.2, share=share) for share in (0.02, 0.2, 0.6, 1.1)]
+    pieces = [one.pieces for one in found]
+    assert pieces[0] > pieces[1] > pieces[2] > pieces[3] == 0
+    for one, share in zip(found, (0.02, 0.2, 0.6, 1.1), strict=True):
+        assert one.objective <= share * np.linalg.norm(Y) * (1 + 1e-9)
+        assert one.proven
 
 
 def test_limits_of_readings_come_before_few_pieces():
