@@ -34,8 +34,8 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.regression import stretch
 
-HELD = 1e-4
-"""Relative; so little weights of drawn readings are moved by the solver alone."""
+HELD = 1e-3
+"""Relative; so little the mean of drawn weights is moved by the solver's tolerance and by chance."""
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""
 
@@ -309,8 +309,8 @@ def _sampled(
     except ValueError as error:
         return None, (str(error),)
     if about is not None and solutions:
-        moved = stretch(np.mean(solutions, axis=0) - about)
-        moved[np.abs(moved) < HELD * np.abs(about).max()] = 0.0  # the solver stays a little inside
+        shift = np.mean(solutions, axis=0) - about
+        moved = stretch(np.where(np.abs(shift) < HELD * np.abs(about), 0.0, shift))
         covariance = symmetric(covariance + np.outer(moved, moved))
     return covariance, ()
 
