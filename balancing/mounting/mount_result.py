@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _ANY = "any"
 """Hole of a plane that takes any weight at any angle."""
 _COUNTED = {"minmax": "the largest", "weighted": "every reading counted by its error"}
+FAR = 10.0
+"""Above it, how many times more fewer pieces leave tells nothing: the most would leave next to nothing."""
 AGAINST = 3.0
 """Pieces that weigh more than this times what they make are said to act against each other."""
 
@@ -157,7 +159,8 @@ class Mounted(Answered):
         used = columns[0].values
         old, new, free = (labels.vibration(z)[0] for z in (c.before, self.after, c.after))
         left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
-        what = "Mount or remove" if c.remove else "Mount"
+        first = "Mount or remove these pieces:" if c.remove else "Mount these pieces:"
+        first = first if c.sound else "These pieces would leave"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
         lines = [f"Pieces in {labels.weight_in}{stays}:", *self._in_planes(columns)]
         if labels.assumed:
@@ -166,7 +169,7 @@ class Mounted(Answered):
         largest = largest_readings(labels, c.speeds, c.sensors, c.before, self.after)
         lines += ["", f"Largest predicted{largest}", self._proof()]
         return Answer(
-            f"{what} these pieces: {left} (with any weights {small(rms(free), old.max())}).",
+            f"{first} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),
             self.warnings,
             tables=(f"Hole by hole:\n{text(columns, left=2)}",) if used else (),
@@ -189,10 +192,16 @@ class Mounted(Answered):
         said, best = [self._certificate()], self._best()
         if best:
             few, ratio = counted(self.found.pieces, "piece"), best["objective_ratio"]
-            times = "what" if ratio is None else f"{ratio:.3g} times what"
             how = _COUNTED.get(self.correction.method, "rms")
-            said.insert(0, f"{few}: {times} {best['pieces']} would leave (--best), {how}.")
-        if np.isfinite(self.plane_by_plane):
+            words = f"{few}: {ratio or 0:.3g} times what {best['pieces']} would leave (--best), {how}."
+            if ratio is None or ratio > FAR:
+                left = figures(best["rms_after"], 2)
+                words = (
+                    f"{few}: {best['pieces']} would leave rms {left} {self.correction.labels.vibration_in}"
+                )
+                words = f"{words.rstrip()} (--best)."
+            said.insert(0, words)
+        if np.isfinite(self.plane_by_plane) and (best is None or self.plane_by_plane >= 1):
             said.append(
                 f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
             )

@@ -98,7 +98,8 @@ class BalanceOptions:
         Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
     split
         Choose pieces in the holes of the job, all planes together: the fewest that leave at most 1.2 times
-        the least vibration (a picture of discs).
+        the least vibration, a fifth of the present one, or what a check run does not show (a picture of
+        discs).
     best
         The pieces that leave the least, however many they are.
     split_seconds : SECONDS
