@@ -67,6 +67,8 @@ class CheckComparison(Answered):
         Units and conventions to print in.
     warnings
         What the user should know.
+    taken
+        What is taken to have been mounted, and how to say otherwise, in words; empty: what is written.
     """
 
     runs: tuple[str, ...]
@@ -88,6 +90,7 @@ class CheckComparison(Answered):
     change: ComplexArray | None
     labels: Labels
     warnings: tuple[str, ...]
+    taken: str = ""
 
     @property
     def difference(self) -> ComplexArray:
@@ -160,6 +163,7 @@ class CheckComparison(Answered):
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
         left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
         judged = f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
+        judged += f" Taken to be mounted: {self.taken}." if self.taken else ""
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.achieved[-1])
         mounted = "the proposed corrections" if self.as_proposed else "what its weights table says"
         return Answer(

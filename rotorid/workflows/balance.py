@@ -304,7 +304,6 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     ValueError
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
-    from balancing import compare_check
     from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.calibration.one_shot import next_trial
 
@@ -312,7 +311,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     _check(options)
     source = _source(job, options)
     files = source if isinstance(source, JobSource) else None
-    read = with_contradiction(_read(source, options))
+    read = _with_pieces(with_contradiction(_read(source, options)), options)
     known, of_type = _choose(read, options)
     influence = known[0]
     planes, subsets = _planes(read, known, options)
@@ -330,7 +329,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         job=read,
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
-        check=None if checked is None else compare_check(result, checked, *known),
+        check=None if checked is None else _compared(result, read, known),
         verdict=_judge(result, influence, read, tolerance, mounted),
         tolerance=tolerance,
         subsets=subsets,
@@ -461,14 +460,40 @@ def _again(
     return _correct(job, _choose(job, options)[0], planes, options)
 
 
+def _with_pieces(job: Job, options: BalanceOptions) -> Job:
+    """The job with the pieces that these options propose without its check run, where they were mounted."""
+    from balancing.mounting.fewest_pieces import FEW
+    from rotorid.workflows.check_pieces import asked, with_pieces
+
+    if not asked(job) or options.ridge is not None or options.truncate is not None:
+        return job
+    before = replace(options, refine=False)
+    known, _ = _choose(job, before)
+    result = _correct(job, known, _planes(job, known, before)[0], before)
+    within = 1.0 if options.best else FEW
+    return with_pieces(job, result, *known, time_limit=options.split_seconds, within=within)
+
+
+def _compared(result: Correction, job: Job, known: Known) -> CheckComparison:
+    from balancing import compare_check
+    from rotorid.workflows.check_pieces import mounted_words
+
+    assert job.check is not None
+    found = compare_check(result, job.check, *known)
+    return replace(found, as_proposed=not job.check_mounted, taken=mounted_words(job))
+
+
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
     from balancing.mounting.fewest_pieces import FEW
     from balancing.mounting.mount import mount
+    from rotorid.workflows.check_pieces import free_holes
 
+    if job.check_pieces is not None and not options.refine:
+        return job.check_pieces
     return mount(
         result,
         *known,
-        job.holes,
+        free_holes(job) if options.refine else job.holes,
         row_weights=job.row_weights,
         time_limit=options.split_seconds,
         on_top=options.refine,
