@@ -173,8 +173,8 @@ class Mounted(Answered):
             more="hole by hole",
         )
 
-    def in_holes(self) -> str:
-        """What is in which hole, plane by plane: "4 g in hole 1 and 8 g in hole 6 of P1, 4 g in hole 3 of P2"."""
+    def in_holes(self, only: str = "") -> str:
+        """What is in which hole: "4 g in hole 1 and 8 g in hole 6 of P1, …"; or of one plane only."""
         unit, shown = self.correction.labels.weight_in, _columns(self)
         words = []
         for plane in self.correction.planes:
@@ -182,7 +182,8 @@ class Mounted(Answered):
             at = [f"{figures(row[4])} {unit} at {row[3]:.1f}°" for row in own if row[2] == _ANY]
             sizes = ((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
             at += equal_together((f"{_short(size)} {unit}", hole) for size, hole in sizes)
-            words += [f"{listing(at, 'and')} of {plane}"] if at else []
+            where = f" of {plane}" if not only else ""
+            words += [f"{listing(at, 'and')}{where}"] if at and only in ("", plane) else []
         return ", ".join(words) or "nothing"
 
     def _in_planes(self, columns: Sequence[Column]) -> list[str]:

@@ -92,7 +92,7 @@ def free_holes(job: Job) -> Mapping[str, Holes]:
 
 
 def mounted_words(job: Job) -> str:
-    """What is taken to have been mounted in the check runs, and how to say otherwise; empty: what is written."""
+    """What is taken to have been mounted in the check runs, and how to say otherwise; empty: as written."""
     other = 'check_weights = "weights" or a table says otherwise'
     if job.check_pieces is not None:
         return f"{job.check_pieces.in_holes()}, the pieces of --split ({other})"
