@@ -69,7 +69,10 @@ class LeftToDo(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's units."""
-        labels = self.correction.labels
+        c, labels, add = self.correction, self.correction.labels, self.trim
+        moves = weight_rows(labels, self.planes, add)
+        for row, at in zip(moves, c.places(self.planes, add).tolist(), strict=True):
+            row.update(action="remove" if row["plane"] in c.remove else "add", place_deg=at)
         return plain(
             {
                 "word": self.word,
@@ -77,7 +80,7 @@ class LeftToDo(Answered):
                 "run": self.run,
                 "rms_now": self.now * labels.vibration_scale,
                 "mounted": weight_rows(labels, self.planes, self.there),
-                "add": weight_rows(labels, self.planes, self.trim),
+                "add": moves,
                 "holes": [] if self.pieces is None else self.pieces.to_dict()["holes"],
             }
         )
@@ -114,7 +117,8 @@ class LeftToDo(Answered):
         c, words = self.correction, []
         if self.pieces is not None:
             held = self.pieces.in_holes()
-            return [f"add {held}"] if not nothing else [self.pieces.in_holes(p) for p in self.planes]
+            verb = "take away" if set(self.planes) <= set(c.remove) else "add"
+            return [f"{verb} {held}"] if not nothing else [self.pieces.in_holes(p) for p in self.planes]
         places = c.places(self.planes, self.add)
         for plane, there, add, at in zip(self.planes, self.there, self.add, places, strict=True):
             size = f"{figures(abs(add) * c.labels.weight_scale)} {c.labels.weight_in}"

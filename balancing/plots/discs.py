@@ -109,7 +109,7 @@ def disc(  # noqa: PLR0913
         ax.add_patch(Circle(centre, size, fc="0.85", ec="0.3", hatch="////", lw=0.9, zorder=3))
     _draw_forbidden(ax, forbidden, turn, clockwise)
     said = [f"{'−' * remove}{text}" for text in said]
-    mounted = [f"{labels.weight_words(abs(w))}\nmounted" for w in stay]
+    mounted = [f"{labels.weight_words(abs(w))} mounted" for w in stay]
     _write_weights(
         ax,
         where + [turn * w for w in stay],
