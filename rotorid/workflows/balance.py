@@ -350,7 +350,9 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         result = of_type.judged(result)
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
-    mounted = _mount(result, read, known, options) if options.split else None
+    mounted = None
+    with suppress(*[ValueError] * (options.refine and read.check_pieces is not None)):  # no piece is left
+        mounted = _mount(result, read, known, options) if options.split else None
     checked = None if options.refine else read.check
     tolerance = _tolerance(result.planes, options)
     check = None if checked is None else _compared(result, read, known)
@@ -526,8 +528,11 @@ def _left(
     mounted: Mounted | None,
 ) -> LeftToDo:
     """What is left to do after the check run, by all runs where the coefficients are measured."""
+    import numpy as np
+
     from balancing.correction.convention_assumptions import contradiction
     from balancing.correction.left_to_do import left_to_do
+    from balancing.correction.refine_coefficients import mounted_in
 
     assert job.check is not None
     words = () if result.convention_test is None else contradiction(result.convention_test, result.labels)
@@ -539,6 +544,9 @@ def _left(
             trimmed = _correct(job, known, result.planes, after)
         except ValueError as error:
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
+            there = mounted_in(job.check, result)
+            last = np.array([weights[-1] for weights in there.values()])
+            trimmed = replace(result, mounted=(job.check.runs[-1], tuple(there), last))
     if job.check_pieces is not None and pieces is None and not stop:
         with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
             pieces = _mount(trimmed, job, known, replace(options, refine=True))
