@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from balancing import Correction, Influence
-    from balancing.correction.left_to_do import LeftToDo
     from balancing.correction.verdict import Verdict
+    from balancing.mounting.left_to_do import LeftToDo
     from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
 

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import Correction
-    from balancing.correction.left_to_do import LeftToDo
     from balancing.mounting.holes import Holes
+    from balancing.mounting.left_to_do import LeftToDo
     from balancing.mounting.mount_result import Mounted
 
 _WIDTH, _REACH, _TALL = 3.4, (1.95, 2.15), 1.42

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         Trials,
         Verdict,
     )
-    from balancing.correction.left_to_do import LeftToDo
+    from balancing.mounting.left_to_do import LeftToDo
     from rotorid.base.registry import Method
     from rotorid.report.equations import Equations
     from rotorid.tables import Job
@@ -531,8 +531,8 @@ def _left(
     import numpy as np
 
     from balancing.correction.convention_assumptions import contradiction
-    from balancing.correction.left_to_do import left_to_do
     from balancing.correction.refine_coefficients import mounted_in
+    from balancing.mounting.left_to_do import left_to_do
 
     assert job.check is not None
     words = () if result.convention_test is None else contradiction(result.convention_test, result.labels)

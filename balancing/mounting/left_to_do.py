@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,14 +12,12 @@ from balancing.coefficients.repeatability import tail
 from balancing.correction.correction_result import Correction
 from balancing.data.result_columns import rms, small, three_figures, weight_rows
 from balancing.data.trials import Trials
+from balancing.mounting.mount_result import Mounted
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, text
 from rotorid.base.text import figures, listing
-
-if TYPE_CHECKING:
-    from balancing.mounting.mount_result import Mounted
 
 Word = Literal["done", "trim", "take off", "add nothing yet"]
 WORTH = 0.9
