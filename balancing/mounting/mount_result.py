@@ -25,7 +25,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import counted, figures
+from rotorid.base.text import counted, figures, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -176,6 +176,19 @@ class Mounted(Answered):
             more="hole by hole",
         )
 
+    def in_holes(self, only: str = "") -> str:
+        """What is in which hole: "4 g in hole 1 and 8 g in hole 6 of P1, …"; or of one plane only."""
+        unit, shown = self.correction.labels.weight_in, _columns(self)
+        words = []
+        for plane in self.correction.planes:
+            own = [row for row in zip(*(c.values for c in shown), strict=True) if row[0] == plane]
+            at = [f"{figures(row[4])} {unit} at {row[3]:.1f}°" for row in own if row[2] == _ANY]
+            sizes = ((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
+            at += equal_together((f"{_short(size)} {unit}", hole) for size, hole in sizes)
+            where = f" of {plane}" if not only else ""
+            words += [f"{listing(at, 'and')}{where}"] if at and only in ("", plane) else []
+        return ", ".join(words) or "nothing"
+
     def _in_planes(self, columns: Sequence[Column]) -> list[str]:
         shown = list(zip(*(column.values for column in columns), strict=True))
         lines = []
@@ -206,6 +219,11 @@ class Mounted(Answered):
                 f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
             )
         return "\n".join(said)
+
+
+def _short(size: str) -> str:
+    """A size without zeros behind the point: 4.000 → 4."""
+    return " ".join(part.rstrip("0").rstrip(".") if "." in part else part for part in size.split())
 
 
 def _action(correction: Correction, plane: str) -> str:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from balancing import Correction, Influence
     from balancing.correction.verdict import Verdict
+    from balancing.mounting.left_to_do import LeftToDo
     from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
 
@@ -53,7 +54,8 @@ def balance_report(
         only the sheet shows under the key "sheet".
     parts
         What the document is made of, by its keys: "" (the `Correction`), and, None where there is none,
-        "mounting" (`Mounted`), "verdict" (`Verdict`, whose tolerances are drawn), "trade_off" (`TradeOff`).
+        "mounting" (`Mounted`), "left_to_do" (`LeftToDo`), "verdict" (`Verdict`, whose tolerances are drawn),
+        "trade_off" (`TradeOff`).
     influence, job
         Coefficients and job of the correction.
     provenance
@@ -109,7 +111,7 @@ def balance_report(
             conventions_explained.phase_figure(labels),
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
-        discs=_discs(result, job, mounted, verdict, text["seen"]),
+        discs=_discs(result, job, mounted, verdict, text["seen"], parts["left_to_do"]),
         residual_figure=inline_svg(
             residual_figure(shown),
             "Vibration before and predicted after",
@@ -155,10 +157,17 @@ def _turn(result: Correction) -> str:
 
 
 def _discs(
-    result: Correction, job: Job, mounted: Mounted | None, verdict: Verdict | None, seen: str
+    result: Correction,
+    job: Job,
+    mounted: Mounted | None,
+    verdict: Verdict | None,
+    seen: str,
+    left: LeftToDo | None,
 ) -> list[tuple[str, Markup]]:
     """Each plane with its picture."""
     rows = () if verdict is None else verdict.rows
+    if left is not None:
+        mounted = left.pieces if left.word == "trim" else None
     tolerances = {row.name: row.limit for row in rows if row.kind == "plane"}
     return [
         (
@@ -169,7 +178,9 @@ def _discs(
                     plane,
                     holes=job.holes.get(plane),
                     mounted=mounted,
-                    tolerance=tolerances.get(plane),
+                    tolerance=None if left is not None else tolerances.get(plane),
+                    left=left,
+                    there=job.check_pieces,
                 ),
                 f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
             ),

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
+from balancing.data.result_columns import three_figures
 from rotorid.base.answer import Answer, together
+from rotorid.base.text import sentence
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.input_checks import check_choices, file_of
 from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
         Trials,
         Verdict,
     )
+    from balancing.mounting.left_to_do import LeftToDo
     from rotorid.base.registry import Method
     from rotorid.report.equations import Equations
     from rotorid.tables import Job
@@ -171,6 +175,8 @@ class Balance(Parts):
     mounted, check, verdict, tolerance, subsets, curve, history
         Pieces in holes, check runs beside their prediction, what limits and tolerances say, the tolerance
         itself, choices of planes, residual against total weight, all runs; None where there is nothing.
+    left
+        What is left to do after the check run.
     next_trial
         Of a calibrated rotor: the trial run that would tell most.
     of_type
@@ -188,6 +194,7 @@ class Balance(Parts):
     subsets: Subsets | None
     curve: TradeOff | None
     history: History | None
+    left: LeftToDo | None = None
     next_trial: NextTrial | None = None
     of_type: TypeKnowledge | None = None
 
@@ -198,6 +205,7 @@ class Balance(Parts):
             "": self.result,
             "mounting": self.mounted,
             "check": self.check,
+            "left_to_do": self.left,
             "verdict": self.verdict,
             "best_planes": self.subsets,
             "trade_off": self.curve,
@@ -214,24 +222,46 @@ class Balance(Parts):
         weights, sound = self.result.answer, self.result.sound
         if needs_trial_run(self.job, self.influence):
             weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-        if sound and (self.check or self.mounted):
+        if self.left is not None:
+            return self._after_check(weights, self.left)
+        if sound and self.mounted:
             weights = replace(weights, judgement="")
         if self.mounted:
             weights = replace(weights, found="", tables=(weights.found, *weights.tables))
-        elif self.check:
-            first, _, predicted = weights.found.partition("\n\n")
-            weights = replace(weights, found=first, tables=(predicted, *weights.tables))
-        judged = [part.answer for part in (self.verdict, self.check, self.mounted) if part]
+        judged = [part.answer for part in (self.verdict, self.mounted) if part]
         asked = [part.answer for part in (self.subsets, self.curve, self.history) if part]
         found = together([*judged, weights, *asked] if sound else [weights, *judged, *asked])
         notes = list(found.notes)
-        if self.check:
-            notes.insert(0, "--refine adds the check run, and gives the trim")
         if self.next_trial is not None:
             notes.insert(0, self.next_trial.words)
         if self.result.limits is not None and (self.subsets or self.curve):
             notes.append("the comparison of planes and the trade-off do not look at the limits")
         return replace(found, notes=tuple(notes))
+
+    def _after_check(self, weights: Answer, left: LeftToDo) -> Answer:
+        """The verdict and what is left to do; the weights of the bare rotor are tables."""
+        from rotorid.workflows.check_pieces import mounted_words
+
+        done, check = left.answer, None if self.check is None else self.check.answer
+        if self.check is not None:
+            head, cause = self.check.headline, sentence(self.check.verdict)
+        else:
+            scale, unit = self.result.labels.vibration_scale, self.result.labels.vibration_in
+            head = f"Run {left.run!r}: rms {three_figures(left.now * scale)} {unit}".rstrip() + "."
+            cause = ""
+        taken = mounted_words(self.job)
+        limits = [] if self.verdict is None else [self.verdict.answer]
+        first = [*(one.judgement for one in limits), head, done.judgement]
+        first += [f"Taken to be mounted: {taken}."] if taken else []
+        behind = [replace(weights, judgement="", found="", tables=(weights.found, *weights.tables))]
+        behind += [] if self.mounted is None else [replace(self.mounted.answer, judgement="", found="")]
+        behind += [part.answer for part in (self.subsets, self.curve, self.history) if part]
+        parts = [done, *limits, *([] if check is None else [check]), *behind]
+        found = together([replace(part, judgement="") for part in parts])
+        notes = found.notes
+        if self.job.holes and left.word == "trim" and left.pieces is None:
+            notes = ("--refine --split chooses pieces of the trim", *notes)
+        return replace(found, judgement="\n".join(filter(None, (" ".join(first), cause))), notes=notes)
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""
@@ -248,7 +278,7 @@ class Balance(Parts):
         """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""
         from balancing.plots import correction_polar, discs, tolerances, trade_off_curve
 
-        if self.mounted is not None:
+        if self.mounted is not None and self.left is None:
             return discs.mounted_discs(self.mounted)
         below, verdict = None, self.verdict
         if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
@@ -305,7 +335,6 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     ValueError
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
-    from balancing import compare_check
     from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.calibration.one_shot import next_trial
 
@@ -313,7 +342,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     _check(options)
     source = _source(job, options)
     files = source if isinstance(source, JobSource) else None
-    read = with_contradiction(_read(source, options))
+    read = _with_pieces(with_contradiction(_read(source, options)), options)
     known, of_type = _choose(read, options)
     influence = known[0]
     planes, subsets = _planes(read, known, options)
@@ -322,17 +351,22 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         result = of_type.judged(result)
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
-    mounted = _mount(result, read, known, options) if options.split else None
+    mounted = None
+    with suppress(*[ValueError] * (options.refine and read.check_pieces is not None)):  # no piece is left
+        mounted = _mount(result, read, known, options) if options.split else None
     checked = None if options.refine else read.check
     tolerance = _tolerance(result.planes, options)
+    check = None if checked is None else _compared(result, read, known)
+    verdict = _judge(result, influence, read, tolerance, mounted)
     return Balance(
         result=result,
         influence=influence,
         job=read,
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
-        check=None if checked is None else compare_check(result, checked, *known),
-        verdict=_judge(result, influence, read, tolerance, mounted),
+        check=check,
+        verdict=verdict,
+        left=None if read.check is None else _left(result, read, known, options, check, verdict, mounted),
         tolerance=tolerance,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
@@ -462,14 +496,102 @@ def _again(
     return _correct(job, _choose(job, options)[0], planes, options)
 
 
+def _with_pieces(job: Job, options: BalanceOptions) -> Job:
+    """The job with the pieces that these options propose without its check run, where they were mounted."""
+    from balancing.mounting.fewest_pieces import FEW
+    from rotorid.workflows.check_pieces import asked, with_pieces
+
+    if not asked(job) or options.ridge is not None or options.truncate is not None:
+        return job
+    before = replace(options, refine=False)
+    known, _ = _choose(job, before)
+    result = _correct(job, known, _planes(job, known, before)[0], before)
+    within = 1.0 if options.best else FEW
+    return with_pieces(job, result, *known, time_limit=options.split_seconds, within=within)
+
+
+def _compared(result: Correction, job: Job, known: Known) -> CheckComparison:
+    from balancing import compare_check
+    from rotorid.workflows.check_pieces import mounted_words
+
+    assert job.check is not None
+    found = compare_check(result, job.check, *known)
+    return replace(found, as_proposed=not job.check_mounted, taken=mounted_words(job))
+
+
+def _left(
+    result: Correction,
+    job: Job,
+    known: Known,
+    options: BalanceOptions,
+    check: CheckComparison | None,
+    verdict: Verdict | None,
+    mounted: Mounted | None,
+) -> LeftToDo:
+    """What is left to do after the check run, by all runs where the coefficients are measured."""
+    import numpy as np
+
+    from balancing.correction.convention_assumptions import contradiction
+    from balancing.correction.refine_coefficients import mounted_in
+    from balancing.mounting.left_to_do import left_to_do
+
+    assert job.check is not None
+    words = () if result.convention_test is None else contradiction(result.convention_test, result.labels)
+    stop, trimmed, pieces = "; ".join(words), result, mounted if options.refine else None
+    if not options.refine:
+        after = replace(options, refine=True, best_planes=None)
+        try:
+            known = _counted(job, known, result, after)
+            trimmed = _correct(job, known, result.planes, after)
+        except ValueError as error:
+            stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
+            there = mounted_in(job.check, result)
+            last = np.array([weights[-1] for weights in there.values()])
+            trimmed = replace(result, mounted=(job.check.runs[-1], tuple(there), last))
+    if job.check_pieces is not None and pieces is None and not stop:
+        with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
+            pieces = _mount(trimmed, job, known, replace(options, refine=True))
+    explained = None if check is None else check.explained
+    judged = "" if verdict is None else verdict.overall
+    return left_to_do(trimmed, job.check, explained=explained, judged=judged, stop=stop, pieces=pieces)
+
+
+def _counted(job: Job, known: Known, result: Correction, options: BalanceOptions) -> Known:
+    """Coefficients and vibration with the check run counted; those that it cannot refine stay."""
+    import numpy as np
+
+    from balancing.correction.refine_coefficients import mounted_in
+
+    influence, baseline = known
+    if baseline is None and influence.trials is not None and options.machine_type is None:
+        return _choose(job, options)[0]
+    check = job.check
+    assert check is not None
+    there = mounted_in(check, result)
+    last = [len(check.runs) - 1]
+    run = replace(
+        check,
+        runs=check.runs[-1:],
+        planes=tuple(there),
+        weights=np.array([[weights[-1] for weights in there.values()]]),
+        readings=check.readings[:, last],
+        steps=None if check.steps is None else check.steps[:, :, last],
+        covariance=None if check.covariance is None else check.covariance[:, :, :, last],
+    )
+    return influence, run
+
+
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
     from balancing.mounting.fewest_pieces import FEW
     from balancing.mounting.mount import mount
+    from rotorid.workflows.check_pieces import free_holes
 
+    if job.check_pieces is not None and not options.refine:
+        return job.check_pieces
     return mount(
         result,
         *known,
-        job.holes,
+        free_holes(job) if options.refine else job.holes,
         row_weights=job.row_weights,
         time_limit=options.split_seconds,
         on_top=options.refine,

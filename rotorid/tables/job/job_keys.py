@@ -22,6 +22,8 @@ from rotorid.tables.runs.stated_conventions import (
     StatedErrors,
 )
 
+EXACT = "weights"
+"""As `check_weights`, in place of a table: the weights as proposed, whatever holes there are."""
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""
 READINGS = ("runs", "check", "slow_roll")
@@ -387,7 +389,12 @@ JOB = (
     Key("influence", FILE, "stored coefficients instead of trial runs, or beside them"),
     Key("rotor", FILE, "a rotor table or file: coefficients are computed"),
     Key("check", FILE, "runs table of a check run, with the proposed weights mounted"),
-    Key("check_weights", FILE, "weights table of the check run, where others were mounted than proposed"),
+    Key(
+        "check_weights",
+        FILE,
+        "weights table of the check run, where others were mounted than proposed; without it the pieces of "
+        '`--split` where there are holes, else the weights; `"weights"`: the weights',
+    ),
     Key(
         "slow_roll",
         Kind(_slow_roll, {"anyOf": [FILE.schema, _VECTORS.schema]}, cell="name"),

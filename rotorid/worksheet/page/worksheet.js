@@ -323,20 +323,23 @@ function listing(doc, path, columns, size = () => 0, count = Infinity) {
   }))));
 }
 
-const judged = (text) => h("p", { class: /^(do not|measure|fail)/im.test(text) ? "why" : "judgement" }, text);
+const judged = (text) => h("p", { class: /^(do not|measure|fail|not as)|Take off what|Add nothing yet/im.test(text) ? "why" : "judgement" }, text);
 
 function answer(name, title, { document: doc, judgement, warnings, notes }) {
-  const { conventions: said, mounting: pieces, mounted_in_last_run: last } = doc;
+  const { conventions: said, left_to_do: left, mounted_in_last_run: last } = doc;
+  const pieces = left ? null : doc.mounting; // after a check run these are not what is to be done
   const [weight, unit] = [said.weight_unit, said.vibration_unit].map(unitOf);
   const columns = [["if"], ["plane"], ["action", ""], ["hole"], ["pieces"], ["mass", weight, "mass_std"],
     ["angle_deg", "at °", "angle_std_deg"]];
   const place = [["sensor", "largest"], ["speed_rpm", "rpm"], ["before"], ["after", `after, ${unit}`]];
   const limits = [["name", "limit of"], ["speed_rpm", "rpm"], ["size"], ["limit"], ["verdict", ""]];
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), judged(judgement),
-    listing(doc, pieces ? "mounting.holes" : "corrections", columns),
-    h("p", {}, pieces?.on_top_of ? `Beside those of ${pieces.on_top_of}. ` : `For ${doc.corrections_refer_to}. `,
+    left ? [h("b", {}, `Mounted in ${left.run}:`), listing(doc, "left_to_do.mounted", columns),
+      left.word === "trim" && [h("b", {}, "To add:"), listing(doc, "left_to_do.add", columns)]]
+      : listing(doc, pieces ? "mounting.holes" : "corrections", columns),
+    h("p", {}, left ? "" : pieces?.on_top_of ? `Beside those of ${pieces.on_top_of}. ` : `For ${doc.corrections_refer_to}. `,
       `Angles count ${said.angles}, phase ${said.phase}. ± is one standard deviation.`),
-    !pieces && last?.weights.some(({ mass }) => mass) && [
+    !left && !pieces && last?.weights.some(({ mass }) => mass) && [
       h("b", {}, `If the weights of ${last.run} stay, instead:`), listing(doc, "add_to_mounted", columns)],
     !pieces && doc.other_readings.length > 0 && listing(doc, "other_readings", columns),
     doc.verdict && listing(doc, "verdict.rows", limits, (row) => row.size / row.limit, 5),

@@ -127,15 +127,14 @@ def test_the_judgement_is_that_of_the_check_run_where_there_is_one(cli):
     text = cli("balance", TURBO / "checked.toml").out
     assert text.startswith("As predicted: with the weights rms 28.4 → 0.413 µm pp (0.382 predicted). ")
     assert "Mount these weights" not in text
-    assert "Note: --refine adds the check run" in text
-    assert "left      423.0  168.9°" in text
-    first, second, *_ = cli("balance", TURBO / "checked.toml", "--limit", "0.7").out.splitlines()
-    assert first == "Fail (check run check): 3 of 20 limits not kept."
-    assert second.startswith("As predicted: ")
+    assert "Trim: add 13.59 g·mm at" in text.partition("\n\n")[0]
+    assert "left      423.0  168.9°" not in text
+    assert "left      423.0  168.9°" in cli("balance", TURBO / "checked.toml", "--table").out
+    first = cli("balance", TURBO / "checked.toml", "--limit", "0.7").out
+    assert first.startswith("Fail (check run check): 3 of 20 limits not kept. As predicted: ")
     refined = cli("balance", TURBO / "checked.toml", "--refine").out
-    assert refined.startswith("Mount these weights: ")
-    assert "  add if 'check' stays\n" in refined
-    assert "--refine" not in refined
+    assert refined.startswith("Run 'check': rms 0.413 µm pp. Trim: add 13.59 g·mm at")
+    assert "Mount" not in refined
 
 
 def test_limits_lead_the_prediction(cli):
