@@ -231,7 +231,7 @@ def _plan(
         raise ValueError(f"--design takes at most {MOST_CANDIDATES} times, not {len(candidates)}")
     if sigma is None:
         raise ValueError("--design needs the errors of the samples: --sigma 0.01, or y1=0.01,y2=0.02")
-    if found and (len(found.records) > 1 or not found.reliable):
+    if found and (len(found.records) > 1 or not found.described):
         raise ValueError("--design needs one record that the model describes, or none")
     guess = dict(zip(model.parameters, model.start.tolist(), strict=True)) | dict(begin)
     if found:
