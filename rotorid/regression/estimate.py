@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -185,18 +185,6 @@ class Estimate(Answered, Uncertain):
             return self.curved
         basis = echelon(self.row_space)
         return tuple(self._combination(row) for row in basis if np.count_nonzero(row) > 1)
-
-    def widened(self, factor: float) -> Estimate:
-        """The same with standard deviations so many times as large."""
-        return replace(
-            self,
-            covariance=None if self.covariance is None else self.covariance * factor**2,
-            solution_covariance=None
-            if self.solution_covariance is None
-            else self.solution_covariance * factor**2,
-            curved=self.curved
-            and tuple(replace(one, std=one.std and one.std * factor) for one in self.curved),
-        )
 
     @property
     def undetermined(self) -> tuple[str, ...]:

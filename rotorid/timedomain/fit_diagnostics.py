@@ -85,15 +85,22 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     if draft.reliable:
         draft.note(*_pulses(problem, found.solution), spoils=True)
     draft.note(*_begins_later(problem))
-    if not draft.reliable:
-        curved = found.curved and tuple(replace(c, std=None) for c in found.curved)
-        found = replace(found, covariance=None, solution_covariance=None, curved=curved)
-    elif widening > 1:
-        found = found.widened(widening)
+    if not draft.reliable or widening > 1:
+        found = _widened(found, widening if draft.reliable else None)
     neighbours = None if seen is None else seen.neighbours
     change, warnings = draft.integration_change, tuple(draft.warnings)
     reliable = draft.reliable and widening == 1
     return Judgement(found, reliable, warnings, change, neighbours, draft.prior, draft.normal_matrix)
+
+
+def _widened(found: Estimate, factor: float | None) -> Estimate:
+    """With standard deviations so many times as large, or without any."""
+    kept = {name: getattr(found, name) for name in ("covariance", "solution_covariance")}
+    known = {
+        name: None if factor is None or part is None else part * factor**2 for name, part in kept.items()
+    }
+    curved = found.curved and tuple(replace(c, std=c.std and factor and c.std * factor) for c in found.curved)
+    return replace(found, **known, curved=curved)
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:

@@ -1,6 +1,6 @@
 """Taylor integration of a model with its sensitivities by heyoka, with the extra `rotorid[fast]`.
 
-Compiling takes a second or two, and so it is done for a model that has cost that much the ordinary way.
+Compiling takes a second or two, and so it is done in a fit that has cost that much the ordinary way.
 States and parameters are scaled by their sizes there, and what is compiled has to repeat the last ordinary
 solution. Source: Biscani and Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics", MNRAS 504 (2021) 2614.
@@ -8,6 +8,8 @@ mechanics", MNRAS 504 (2021) 2614.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +31,19 @@ STEPS = 20_000
 """At most; more leave it to the ordinary way to say why."""
 
 
+@contextmanager
+def learning(models: Sequence[OdeModel]) -> Iterator[None]:
+    """Compile models within a fit; outside, and in the next fit, nothing depends on what went before."""
+    for model in models:
+        model.machine["steps"] = 0
+    try:
+        yield
+    finally:
+        for model in models:
+            for key in ("steps", "taylor"):
+                model.machine.pop(key, None)
+
+
 def integrate(system: Augmented, x0: FloatArray, s0: FloatArray, longest: float) -> FloatArray | None:
     """States and sensitivities (n, size); None where the model is not compiled, or has no finite solution."""
     taylor = system.model.machine.get("taylor")
@@ -36,15 +51,19 @@ def integrate(system: Augmented, x0: FloatArray, s0: FloatArray, longest: float)
 
 
 def learn(system: Augmented, table: FloatArray, steps: int, longest: float) -> None:
-    """Count the steps of an ordinary solution (n, size), and compile the model when they are many."""
+    """Count the steps of a fit's ordinary solutions (n, size), and compile the model when they are many."""
     machine = system.model.machine
-    machine["steps"] = machine.get("steps", 0) + steps
+    if "steps" not in machine:
+        return
+    machine["steps"] += steps
     if machine["steps"] < WORK or "taylor" in machine or not system.np or not system.model.rates_alone:
         return
     machine["taylor"] = None
     x, s = system.unpack(table)
+    sizes = np.abs(x).max(axis=0), np.abs(system.theta[: system.np])
+    key = tuple(part.tobytes() for part in sizes)
     try:
-        made = _Taylor(system.model, np.abs(x).max(axis=0), np.abs(system.theta[: system.np]))
+        made = machine[key] = machine.get(key) or _Taylor(system.model, *sizes)
     except (ImportError, TypeError, ValueError, RuntimeError):
         return  # not installed, or a function it does not know
     again = made(system, x[0], s[0], longest)
