@@ -95,12 +95,15 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
 
 def _widened(found: Estimate, factor: float | None) -> Estimate:
     """With standard deviations so many times as large, or without any."""
-    kept = {name: getattr(found, name) for name in ("covariance", "solution_covariance")}
-    known = {
-        name: None if factor is None or part is None else part * factor**2 for name, part in kept.items()
-    }
-    curved = found.curved and tuple(replace(c, std=c.std and factor and c.std * factor) for c in found.curved)
-    return replace(found, **known, curved=curved)
+    if factor is None or found.covariance is None or found.solution_covariance is None:
+        curved = found.curved and tuple(replace(one, std=None) for one in found.curved)
+        return replace(found, covariance=None, solution_covariance=None, curved=curved)
+    return replace(
+        found,
+        covariance=found.covariance * factor**2,
+        solution_covariance=found.solution_covariance * factor**2,
+        curved=found.curved and tuple(replace(one, std=one.std and one.std * factor) for one in found.curved),
+    )
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:
