@@ -1,6 +1,6 @@
 """Taylor integration of a model with its sensitivities by heyoka, with the extra `rotorid[fast]`.
 
-Compiling takes a second or two, and so it is done in a fit that has cost that much the ordinary way.
+Compiling takes a second or two, and so it is done for a model whose fits have cost that much the ordinary way.
 States and parameters are scaled by their sizes there, and what is compiled has to repeat the last ordinary
 solution. Source: Biscani and Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics", MNRAS 504 (2021) 2614.
@@ -33,37 +33,35 @@ STEPS = 20_000
 
 @contextmanager
 def learning(models: Sequence[OdeModel]) -> Iterator[None]:
-    """Compile models within a fit; outside, and in the next fit, nothing depends on what went before."""
+    """Count and compile within fits alone: a single simulation does not depend on what went before."""
     for model in models:
-        model.machine["steps"] = 0
+        model.machine["fitted"] = True
     try:
         yield
     finally:
         for model in models:
-            for key in ("steps", "taylor"):
-                model.machine.pop(key, None)
+            model.machine["fitted"] = False
 
 
 def integrate(system: Augmented, x0: FloatArray, s0: FloatArray, longest: float) -> FloatArray | None:
     """States and sensitivities (n, size); None where the model is not compiled, or has no finite solution."""
-    taylor = system.model.machine.get("taylor")
+    machine = system.model.machine
+    taylor = machine.get("taylor") if machine.get("fitted") else None
     return None if taylor is None or not system.np else taylor(system, x0, s0, longest)
 
 
 def learn(system: Augmented, table: FloatArray, steps: int, longest: float) -> None:
     """Count the steps of a fit's ordinary solutions (n, size), and compile the model when they are many."""
     machine = system.model.machine
-    if "steps" not in machine:
+    if not machine.get("fitted"):
         return
-    machine["steps"] += steps
+    machine["steps"] = machine.get("steps", 0) + steps
     if machine["steps"] < WORK or "taylor" in machine or not system.np or not system.model.rates_alone:
         return
     machine["taylor"] = None
     x, s = system.unpack(table)
-    sizes = np.abs(x).max(axis=0), np.abs(system.theta[: system.np])
-    key = tuple(part.tobytes() for part in sizes)
     try:
-        made = machine[key] = machine.get(key) or _Taylor(system.model, *sizes)
+        made = _Taylor(system.model, np.abs(x).max(axis=0), np.abs(system.theta[: system.np]))
     except (ImportError, TypeError, ValueError, RuntimeError):
         return  # not installed, or a function it does not know
     again = made(system, x[0], s[0], longest)

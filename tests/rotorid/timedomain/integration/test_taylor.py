@@ -106,16 +106,14 @@ def test_a_pulse_is_not_stepped_over(monkeypatch):
     np.testing.assert_allclose(found.x, slow.x, atol=1e-9)
 
 
-def test_the_same_input_gives_the_same_bytes_however_often(monkeypatch):
-    """Simulations are never compiled; a fit is, but begins anew, with the code that it would compile."""
+def test_a_simulation_gives_the_same_bytes_however_often(monkeypatch):
+    """Also after fits that have compiled the model."""
     monkeypatch.setattr(taylor, "WORK", 100)
     t = np.linspace(0.0, 10.0, 101)
     model = model_of({"x": "v", "v": "-a*x - b*x**3 - 0.1*v"})
     first = simulate(model, [1.0, 0.5, 0.2], t)
     noise = 1e-3 * np.random.default_rng(0).standard_normal(first.x.shape)
     record = Record(t, dict(zip(("x", "v"), (first.x + noise).T, strict=True)))
-    fits = [fit(model, record) for _ in range(2)]
-    assert [one.integrator for one in fits] == ["taylor", "taylor"]
-    assert fits[0].values.tobytes() == fits[1].values.tobytes()
+    assert fit(model, record).integrator == "taylor"
     again = [simulate(model, [1.0, 0.5, 0.2], t) for _ in range(4)]
     assert {(one.method, one.S.tobytes()) for one in again} == {(first.method, first.S.tobytes())}
