@@ -1,6 +1,6 @@
 """Taylor integration of a model with its sensitivities by heyoka, with the extra `rotorid[fast]`.
 
-Compiling takes a second or two, and so it is done for a model whose fits have cost that much the ordinary way.
+Compiling takes a second or two, and so a model is compiled whose fits have cost that much the ordinary way.
 States and parameters are scaled by their sizes there, and what is compiled has to repeat the last ordinary
 solution. Source: Biscani and Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics", MNRAS 504 (2021) 2614.
