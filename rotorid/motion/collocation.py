@@ -16,6 +16,7 @@ Doedel, H. B. Keller, J. P. Kernévez, Int. J. Bifurcation Chaos 1 (1991) 745.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -43,6 +44,10 @@ _HIGHEST = np.linalg.inv(np.polynomial.legendre.legvander(2 * POINTS - 1, _S - 1
 _NEWTON = 14
 _SMALL, _ROUNDED = 1e-9, 1e-6
 """Last change of Newton's method by the size of the motion; below what it may be that of rounding."""
+
+
+class OutOfTime(np.linalg.LinAlgError):
+    """The limit of time has come."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +148,13 @@ class Periodic:
         What moves.
     turns
         Revolutions in one period; 0 for a period of its own, of a rotor without unbalance and bow.
+    until
+        When the search has to end, by `time.monotonic`.
     """
 
     system: MotionSystem
     turns: int
+    until: float = np.inf
 
     @property
     def free(self) -> int:
@@ -197,7 +205,11 @@ class Periodic:
         ------
         numpy.linalg.LinAlgError
             Where they have no solution, or a force none (a wall).
+        OutOfTime
+            The limit of time has come.
         """
+        if time.monotonic() > self.until:
+            raise OutOfTime("time is up")
         V, h, n = orbit.velocities, orbit.step, orbit.start.size
         N = len(V)
         angles = self.angles(N)
