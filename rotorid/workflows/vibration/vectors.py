@@ -98,7 +98,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions) -> VectorsOf
         phase=options.phase,
         orders=_orders(options.orders),
         rate=options.rate,
-        speeds=None if options.speeds is None else [*speeds(options.speeds, "--speeds")],
+        speeds=None if options.speeds is None else speeds(options.speeds),
     )
     with phase("reading"):
         waveforms = read_waveforms(records, given)
