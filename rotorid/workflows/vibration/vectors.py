@@ -45,8 +45,8 @@ class VectorsOptions:
     orders : LIST
         Default: 1.
     speeds : LIST
-        Vectors at these, rad/s or 900,1200rpm, where a run-up passes them first; default: one for a steady speed,
-        else as many as are independent.
+        Vectors at these (rad/s, or 900,1200rpm), where a run-up passes them first; default: one for a steady
+        speed, else as many as are independent.
     picture : tacho | orbit | waterfall
         What --plot draws of the first record; default: tacho.
     """
