@@ -55,7 +55,7 @@ subprocess.run(sys.argv[1:], check=True)
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
 print(used.ru_utime + used.ru_stime, used.ru_maxrss, file=sys.stderr)
 """
-"""Runs a command from a small process: the peak of a child begins with that of who starts it, of all benchmarks."""
+"""Runs a command from a small process: the peak of a child begins with that of the process that starts it."""
 LIMIT_SECONDS, LIMIT_BYTES = 10.0, 1e9
 
 
