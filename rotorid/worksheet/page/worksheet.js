@@ -108,7 +108,7 @@ function save(changes) {
 const number = (text) => Number(String(text).trim().replace(",", "."));
 const near = (a, b) => Math.abs(number(a) - number(b)) <= 0.005 * number(a);
 const each = (values) => [...new Set(values)].filter((value) => value);
-const listOf = (text, by = /[,;]/) => each(text.split(by).map((one) => one.trim()));
+const partsOf = (text, by) => text.split(by).map((one) => one.trim()).filter((one) => one);
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
 const unitOf = (column) => (column || "").replace(/^(amplitude|speed|mass|unbalance)_?/, "")
   .replace("um", "µm").replace(/_(pp|rms)$/, " $1").replace(/(m|in)_s/, "$1/s").replace("_", "·");
@@ -154,7 +154,7 @@ const textOf = (value) => value === null || typeof value !== "object" ? String(v
 function jsonOf(path, text) {
   const now = at(state.settings, path);
   const one = (word) => (Number.isNaN(number(word)) ? word.trim() : number(word));
-  const parts = listOf(text, /;/);
+  const parts = partsOf(text, ";");
   if (text === textOf(now)) return now ?? null;
   if (text.includes(":")) return Object.fromEntries(parts.map((part) => part.split(":").map(one)));
   if (parts.length > 1 || (text && /^(available|stock|holes_)/.test(path.at(-1)))) return parts.map(one);
@@ -470,7 +470,7 @@ async function take({ files: [file], dataset: { import: run } }) {
 const submitted = {
   "setup-form"() {
     const [speedName, amplitude] = ["setup-speed-unit", "setup-amplitude-unit"].map((id) => $(id).value);
-    const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => listOf($(id).value));
+    const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => each(partsOf($(id).value, /[,;]/)));
     const header = ["run", speedName, "sensor", amplitude, "phase_deg"];
     const places = speeds.flatMap((speed) => names.map((sensor) => ({ speed, sensor })));
     if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));
