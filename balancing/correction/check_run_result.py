@@ -67,8 +67,6 @@ class CheckComparison(Answered):
         Units and conventions to print in.
     warnings
         What the user should know.
-    taken
-        What is taken to have been mounted, and how to say otherwise, in words; empty: what is written.
     """
 
     runs: tuple[str, ...]
@@ -90,7 +88,6 @@ class CheckComparison(Answered):
     change: ComplexArray | None
     labels: Labels
     warnings: tuple[str, ...]
-    taken: str = ""
 
     @property
     def difference(self) -> ComplexArray:
@@ -168,8 +165,7 @@ class CheckComparison(Answered):
         """Whether the rotor does what was predicted, what is left, and all readings beside the prediction."""
         labels = self.labels
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.achieved[-1])
-        proposed = "the proposed corrections" if self.as_proposed else "what its weights table says"
-        mounted = self.taken or proposed
+        mounted = "the proposed corrections" if self.as_proposed else "what its weights table says"
         return Answer(
             f"{self.headline} {sentence(self.verdict)}",
             f"Largest in run {self.runs[-1]!r}{largest}",

@@ -25,7 +25,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import counted, figures, listing
+from rotorid.base.text import counted, figures
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 _ANY = "any"
 """Hole of a plane that takes any weight at any angle."""
 _COUNTED = {"minmax": "the largest", "weighted": "every reading counted by its error"}
-FAR = 10.0
-"""Above it, how many times more fewer pieces leave tells nothing: the most would leave next to nothing."""
 AGAINST = 3.0
 """Pieces that weigh more than this times what they make are said to act against each other."""
 
@@ -176,18 +174,10 @@ class Mounted(Answered):
             more="hole by hole",
         )
 
-    def in_holes(self, only: str = "") -> str:
-        """What is in which hole: "4 g in hole 1 and 8 g in hole 6 of P1, …"; or of one plane only."""
-        unit, shown = self.correction.labels.weight_in, _columns(self)
-        words = []
-        for plane in self.correction.planes:
-            own = [row for row in zip(*(c.values for c in shown), strict=True) if row[0] == plane]
-            at = [f"{figures(row[4])} {unit} at {row[3]:.1f}°" for row in own if row[2] == _ANY]
-            sizes = ((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
-            at += equal_together((f"{_short(size)} {unit}", hole) for size, hole in sizes)
-            where = f" of {plane}" if not only else ""
-            words += [f"{listing(at, 'and')}{where}"] if at and only in ("", plane) else []
-        return ", ".join(words) or "nothing"
+    def in_holes(self) -> str:
+        """What is in which hole of each plane, in a line."""
+        planes = map(str.strip, self._in_planes(_columns(self)))
+        return f"{' · '.join(planes)}, in {self.correction.labels.weight_in}"
 
     def _in_planes(self, columns: Sequence[Column]) -> list[str]:
         shown = list(zip(*(column.values for column in columns), strict=True))
@@ -205,25 +195,14 @@ class Mounted(Answered):
         said, best = [self._certificate()], self._best()
         if best:
             few, ratio = counted(self.found.pieces, "piece"), best["objective_ratio"]
+            times = "what" if ratio is None else f"{ratio:.3g} times what"
             how = _COUNTED.get(self.correction.method, "rms")
-            words = f"{few}: {ratio or 0:.3g} times what {best['pieces']} would leave (--best), {how}."
-            if ratio is None or ratio > FAR:
-                left = figures(best["rms_after"], 2)
-                words = (
-                    f"{few}: {best['pieces']} would leave rms {left} {self.correction.labels.vibration_in}"
-                )
-                words = f"{words.rstrip()} (--best)."
-            said.insert(0, words)
-        if np.isfinite(self.plane_by_plane) and (best is None or self.plane_by_plane >= 1):
+            said.insert(0, f"{few}: {times} {best['pieces']} would leave (--best), {how}.")
+        if 1 <= self.plane_by_plane < np.inf:
             said.append(
                 f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
             )
         return "\n".join(said)
-
-
-def _short(size: str) -> str:
-    """A size without zeros behind the point: 4.000 → 4."""
-    return " ".join(part.rstrip("0").rstrip(".") if "." in part else part for part in size.split())
 
 
 def _action(correction: Correction, plane: str) -> str:

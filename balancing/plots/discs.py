@@ -49,7 +49,6 @@ def disc(  # noqa: PLR0913
     loose: Sequence[complex] = (),
     words: Sequence[str] = (),
     forbidden: Sequence[tuple[float, float]] = (),
-    there: Sequence[complex] | None = None,
 ) -> Axes:
     """Draw one plane: rotation, mark, numbered holes, weights (area by mass), and what they are to make.
 
@@ -77,8 +76,6 @@ def disc(  # noqa: PLR0913
         What they are; default: how heavy, and at which angle.
     forbidden
         First angle and width, rad with the rotation, of arcs where no weight can stand (hatched).
-    there
-        Weights that are mounted and stay, in one place each (hatched); None: it is not known.
     """
     from matplotlib.patches import Circle
 
@@ -90,39 +87,25 @@ def disc(  # noqa: PLR0913
             said.append(_pieces(holes, mounting, int(h), labels))
     put += [complex(w) for w in loose]
     said += words or [labels.weight_words(abs(w)) for w in loose]
-    stay = list(there or ())
-    largest = (
-        max([abs(w) for w in put + stay] + ([] if holes is None else list(holes.taken)), default=0.0) or 1.0
-    )
+    largest = max([abs(w) for w in put] + ([] if holes is None else list(holes.taken)), default=0.0) or 1.0
     _prepare(ax, clockwise)
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
     ax.plot(0, 0, "+", color="black", ms=7, mew=0.9)
     where = [turn * w for w in put]
-    _dial(ax, labels, clockwise, where + [turn * w for w in stay])
-    reach = _room(where + [turn * w for w in stay])
+    _dial(ax, labels, clockwise, where)
+    reach = _room(where)
     if holes is not None:
         _draw_holes(ax, holes, mounting, turn, reach / np.sqrt(largest), clockwise)
     for w in where:
         _draw_weight(ax, w, reach * np.sqrt(abs(w) / largest), clockwise, remove)
-    for w in stay:
-        centre, size = _at(_HOLES * turn * w / abs(w), clockwise), reach * np.sqrt(abs(w) / largest)
-        ax.add_patch(Circle(centre, size, fc="0.85", ec="0.3", hatch="////", lw=0.9, zorder=3))
     _draw_forbidden(ax, forbidden, turn, clockwise)
     said = [f"{'−' * remove}{text}" for text in said]
-    mounted = [f"{labels.weight_words(abs(w))} mounted" for w in stay]
-    _write_weights(
-        ax,
-        where + [turn * w for w in stay],
-        said + mounted,
-        labels if len(loose) > len(words) else None,
-        clockwise,
-    )
+    _write_weights(ax, where, said, labels if len(loose) > len(words) else None, clockwise)
     made = sum(put, 0j) if put else None
     if weight is not None and made is not None and abs(weight - made) <= _NOTHING * abs(weight):
         made = None  # one arrow says it all
     _vectors(ax, weight, made, tolerance, clockwise)
-    work = "take away" if remove else "add"
-    title = textwrap.fill(f"{plane}: {'as it is' if there is not None and not put else work}", 34)
+    title = textwrap.fill(f"{plane}: {'take away' if remove else 'add'}", 34)
     ax.set_title(title, fontsize="medium", fontweight="bold")
     lines = _words(weight, made, tolerance, labels, remove)
     lines += ["hatched arcs: nothing goes there"] if forbidden else []

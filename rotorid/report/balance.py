@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from balancing.correction.correction_words import method_words
 from rotorid.base.rpm import RPM
 from rotorid.base.text import sentence
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
 
     from balancing import Correction, Influence
     from balancing.correction.verdict import Verdict
-    from balancing.mounting.left_to_do import LeftToDo
     from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
 
@@ -78,7 +79,7 @@ def balance_report(
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
-    shown = result
+    shown, left = result, parts["left_to_do"]
     if mounted is not None:
         shown = replace(result, after=mounted.after, after_covariance=mounted.after_covariance)
     text: dict[str, Any] = {
@@ -93,6 +94,11 @@ def balance_report(
         "speed": labels.speed_in,
         "speed_scale": 1.0 if labels.speed_unit == "rpm" else units.SPEED[labels.speed_unit].scale / RPM,
     }
+    discs = [] if left is not None else _discs(result, job, mounted, verdict, text["seen"])
+    if left is not None and left.word == "trim":
+        add = dict(zip(left.planes, left.trim.tolist(), strict=True))
+        trim = replace(left.correction, weights=np.array([add[plane] for plane in left.correction.planes]))
+        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, None, text["seen"])
     return render_report(
         "balance.html",
         whole,
@@ -111,7 +117,7 @@ def balance_report(
             conventions_explained.phase_figure(labels),
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
-        discs=_discs(result, job, mounted, verdict, text["seen"], parts["left_to_do"]),
+        discs=discs,
         residual_figure=inline_svg(
             residual_figure(shown),
             "Vibration before and predicted after",
@@ -120,7 +126,7 @@ def balance_report(
         influence_planes=influence.planes,
         several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
         forbidden=result.limits is not None and any(result.limits.forbidden),
-        unsplit=[p for p in result.planes if p in job.holes] if mounted is None else [],
+        unsplit=[p for p in result.planes if p in job.holes] if mounted is None and left is None else [],
     )
 
 
@@ -157,17 +163,10 @@ def _turn(result: Correction) -> str:
 
 
 def _discs(
-    result: Correction,
-    job: Job,
-    mounted: Mounted | None,
-    verdict: Verdict | None,
-    seen: str,
-    left: LeftToDo | None,
+    result: Correction, job: Job, mounted: Mounted | None, verdict: Verdict | None, seen: str
 ) -> list[tuple[str, Markup]]:
     """Each plane with its picture."""
     rows = () if verdict is None else verdict.rows
-    if left is not None:
-        mounted = left.pieces if left.word == "trim" else None
     tolerances = {row.name: row.limit for row in rows if row.kind == "plane"}
     return [
         (
@@ -178,9 +177,7 @@ def _discs(
                     plane,
                     holes=job.holes.get(plane),
                     mounted=mounted,
-                    tolerance=None if left is not None else tolerances.get(plane),
-                    left=left,
-                    there=job.check_pieces,
+                    tolerance=tolerances.get(plane),
                 ),
                 f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
             ),

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
     from balancing import Correction
     from balancing.mounting.holes import Holes
-    from balancing.mounting.left_to_do import LeftToDo
     from balancing.mounting.mount_result import Mounted
 
 _WIDTH, _REACH, _TALL = 3.4, (1.95, 2.15), 1.42
@@ -25,8 +24,6 @@ def plane_figure(
     holes: Holes | None = None,
     mounted: Mounted | None = None,
     tolerance: float | None = None,
-    left: LeftToDo | None = None,
-    there: Mounted | None = None,
 ) -> Figure:
     """Draw one plane with what goes into it; material to remove is drawn as a crossed circle.
 
@@ -42,11 +39,8 @@ def plane_figure(
         Pieces in the holes of all planes, or None: the weight is drawn where it stands.
     tolerance
         Permissible residual, kg or kg·m.
-    left, there
-        What is left to do after a check run, in place of all that, and the pieces that are mounted in it.
     """
     import matplotlib as mpl
-    import numpy as np
     from matplotlib.figure import Figure
 
     from balancing.plots.discs import disc
@@ -58,14 +52,6 @@ def plane_figure(
         holes, mounting = mounted.holes[p], mounted.found.mountings[p]
         if mounted.on_top_of is not None and result.to_add is not None and result.mounted is not None:
             wanted = complex(result.to_add[result.mounted[1].index(plane)])
-    stay: list[complex] | None = None
-    if left is not None:
-        at = left.planes.index(plane)
-        wanted = complex(left.trim[at])
-        stay = [complex(left.there[at])] if left.there[at] else []
-        if there is not None and (standing := there.found.mountings[p]) and (own := there.holes[p]):
-            amounts = standing.amounts
-            stay = [complex(amounts[h] * np.exp(1j * own.angles[h])) for h in np.flatnonzero(amounts)]
     loose = (wanted,) if mounting is None and wanted != 0 else ()
     if mounted is not None and mounting is None and mounted.weights[p] != 0:
         loose = (complex(mounted.weights[p]),)
@@ -84,8 +70,7 @@ def plane_figure(
             mounting,
             labels,
             remove=plane in result.remove,
-            weight=wanted if left is None or wanted else None,
-            there=stay,
+            weight=wanted,
             tolerance=tolerance,
             loose=loose,
             forbidden=arcs,

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
-from balancing.data.result_columns import three_figures
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import sentence
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
@@ -223,7 +222,7 @@ class Balance(Parts):
         if needs_trial_run(self.job, self.influence):
             weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
         if self.left is not None:
-            return self._after_check(weights, self.left)
+            return self._after_check(self.left)
         if sound and self.mounted:
             weights = replace(weights, judgement="")
         if self.mounted:
@@ -238,30 +237,21 @@ class Balance(Parts):
             notes.append("the comparison of planes and the trade-off do not look at the limits")
         return replace(found, notes=tuple(notes))
 
-    def _after_check(self, weights: Answer, left: LeftToDo) -> Answer:
+    def _after_check(self, left: LeftToDo) -> Answer:
         """The verdict and what is left to do; the weights of the bare rotor are tables."""
-        from rotorid.workflows.check_pieces import mounted_words
-
-        done, check = left.answer, None if self.check is None else self.check.answer
-        if self.check is not None:
-            head, cause = self.check.headline, sentence(self.check.verdict)
-        else:
-            scale, unit = self.result.labels.vibration_scale, self.result.labels.vibration_in
-            head = f"Run {left.run!r}: rms {three_figures(left.now * scale)} {unit}".rstrip() + "."
-            cause = ""
-        taken = mounted_words(self.job)
         limits = [] if self.verdict is None else [self.verdict.answer]
-        first = [*(one.judgement for one in limits), head, done.judgement]
-        first += [f"Taken to be mounted: {taken}."] if taken else []
-        behind = [replace(weights, judgement="", found="", tables=(weights.found, *weights.tables))]
-        behind += [] if self.mounted is None else [replace(self.mounted.answer, judgement="", found="")]
-        behind += [part.answer for part in (self.subsets, self.curve, self.history) if part]
-        parts = [done, *limits, *([] if check is None else [check]), *behind]
-        found = together([replace(part, judgement="") for part in parts])
-        notes = found.notes
-        if self.job.holes and left.word == "trim" and left.pieces is None:
-            notes = ("--refine --split chooses pieces of the trim", *notes)
-        return replace(found, judgement="\n".join(filter(None, (" ".join(first), cause))), notes=notes)
+        first = [one.judgement for one in (*limits, left.answer)]
+        cause, pieces = [], self.job.check_pieces
+        if self.check is not None:
+            first.insert(-1, self.check.headline)
+            cause.append(sentence(self.check.verdict))
+        if pieces is not None:
+            first.append(f"Taken to be mounted, by --split: {pieces.in_holes()}; else state check_weights.")
+        behind = [part.answer for part in (self.mounted, self.result) if part]
+        tables = [replace(one, found="", tables=(one.found, *one.tables)) for one in behind]
+        asked = [part.answer for part in (self.check, self.subsets, self.curve, self.history) if part]
+        found = together([left.answer, *limits, *asked, *tables])
+        return replace(found, judgement="\n".join([" ".join(first), *cause]))
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""
@@ -278,8 +268,9 @@ class Balance(Parts):
         """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""
         from balancing.plots import correction_polar, discs, tolerances, trade_off_curve
 
-        if self.mounted is not None and self.left is None:
-            return discs.mounted_discs(self.mounted)
+        pieces = self.mounted if self.left is None else self.left.pieces
+        if pieces is not None:
+            return discs.mounted_discs(pieces)
         below, verdict = None, self.verdict
         if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
             below = partial(tolerances.residuals, verdict, t=self.tolerance)
@@ -335,6 +326,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     ValueError
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
+    from balancing import compare_check
     from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.calibration.one_shot import next_trial
 
@@ -351,12 +343,13 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         result = of_type.judged(result)
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
-    mounted = None
-    with suppress(*[ValueError] * (options.refine and read.check_pieces is not None)):  # no piece is left
-        mounted = _mount(result, read, known, options) if options.split else None
+    room = bool(read.holes) or read.check_pieces is None or not options.refine
+    mounted = _mount(result, read, known, options) if options.split and room else None
     checked = None if options.refine else read.check
     tolerance = _tolerance(result.planes, options)
-    check = None if checked is None else _compared(result, read, known)
+    check = None if checked is None else compare_check(result, checked, *known)
+    if check is not None:
+        check = replace(check, as_proposed=not read.check_mounted)
     verdict = _judge(result, influence, read, tolerance, mounted)
     return Balance(
         result=result,
@@ -366,7 +359,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         mounted=mounted,
         check=check,
         verdict=verdict,
-        left=None if read.check is None else _left(result, read, known, options, check, verdict, mounted),
+        left=None if read.check is None else _left(result, read, known, options, check, verdict),
         tolerance=tolerance,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
@@ -497,26 +490,16 @@ def _again(
 
 
 def _with_pieces(job: Job, options: BalanceOptions) -> Job:
-    """The job with the pieces that these options propose without its check run, where they were mounted."""
-    from balancing.mounting.fewest_pieces import FEW
-    from rotorid.workflows.check_pieces import asked, with_pieces
+    """The job with the pieces in its check runs that these options propose without them."""
+    from rotorid.workflows.check_pieces import pieces_mounted, with_pieces
 
-    if not asked(job) or options.ridge is not None or options.truncate is not None:
+    if job.check is None or job.check_mounted or not job.holes:
         return job
     before = replace(options, refine=False)
     known, _ = _choose(job, before)
     result = _correct(job, known, _planes(job, known, before)[0], before)
-    within = 1.0 if options.best else FEW
-    return with_pieces(job, result, *known, time_limit=options.split_seconds, within=within)
-
-
-def _compared(result: Correction, job: Job, known: Known) -> CheckComparison:
-    from balancing import compare_check
-    from rotorid.workflows.check_pieces import mounted_words
-
-    assert job.check is not None
-    found = compare_check(result, job.check, *known)
-    return replace(found, as_proposed=not job.check_mounted, taken=mounted_words(job))
+    pieces = pieces_mounted(job, result, *known, time_limit=options.split_seconds)
+    return job if pieces is None else with_pieces(job, pieces)
 
 
 def _left(
@@ -526,7 +509,6 @@ def _left(
     options: BalanceOptions,
     check: CheckComparison | None,
     verdict: Verdict | None,
-    mounted: Mounted | None,
 ) -> LeftToDo:
     """What is left to do after the check run, by all runs where the coefficients are measured."""
     import numpy as np
@@ -537,61 +519,37 @@ def _left(
 
     assert job.check is not None
     words = () if result.convention_test is None else contradiction(result.convention_test, result.labels)
-    stop, trimmed, pieces = "; ".join(words), result, mounted if options.refine else None
+    stop, pieces = "; ".join(words), None
     if not options.refine:
-        after = replace(options, refine=True, best_planes=None)
+        there = mounted_in(job.check, result)
+        weights = np.column_stack(list(there.values()))
+        runs = replace(job.check, planes=tuple(there), weights=weights)
+        refined = replace(options, refine=True, best_planes=None)
         try:
-            known = _counted(job, known, result, after)
-            trimmed = _correct(job, known, result.planes, after)
+            measured = known[1] is None and known[0].trials is not None and options.machine_type is None
+            known = _choose(job, refined)[0] if measured else (known[0], runs)
+            result = _correct(job, known, result.planes, refined)
         except ValueError as error:
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
-            there = mounted_in(job.check, result)
-            last = np.array([weights[-1] for weights in there.values()])
-            trimmed = replace(result, mounted=(job.check.runs[-1], tuple(there), last))
-    if job.check_pieces is not None and pieces is None and not stop:
+            result = replace(result, mounted=(runs.runs[-1], runs.planes, weights[-1]))
+    if job.check_pieces is not None and not stop:
         with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
-            pieces = _mount(trimmed, job, known, replace(options, refine=True))
+            pieces = _mount(result, job, known, replace(options, refine=True))
     explained = None if check is None else check.explained
     judged = "" if verdict is None else verdict.overall
-    return left_to_do(trimmed, job.check, explained=explained, judged=judged, stop=stop, pieces=pieces)
-
-
-def _counted(job: Job, known: Known, result: Correction, options: BalanceOptions) -> Known:
-    """Coefficients and vibration with the check run counted; those that it cannot refine stay."""
-    import numpy as np
-
-    from balancing.correction.refine_coefficients import mounted_in
-
-    influence, baseline = known
-    if baseline is None and influence.trials is not None and options.machine_type is None:
-        return _choose(job, options)[0]
-    check = job.check
-    assert check is not None
-    there = mounted_in(check, result)
-    last = [len(check.runs) - 1]
-    run = replace(
-        check,
-        runs=check.runs[-1:],
-        planes=tuple(there),
-        weights=np.array([[weights[-1] for weights in there.values()]]),
-        readings=check.readings[:, last],
-        steps=None if check.steps is None else check.steps[:, :, last],
-        covariance=None if check.covariance is None else check.covariance[:, :, :, last],
-    )
-    return influence, run
+    return left_to_do(result, job.check, explained=explained, judged=judged, stop=stop, pieces=pieces)
 
 
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
     from balancing.mounting.fewest_pieces import FEW
     from balancing.mounting.mount import mount
-    from rotorid.workflows.check_pieces import free_holes
 
     if job.check_pieces is not None and not options.refine:
         return job.check_pieces
     return mount(
         result,
         *known,
-        free_holes(job) if options.refine else job.holes,
+        job.holes,
         row_weights=job.row_weights,
         time_limit=options.split_seconds,
         on_top=options.refine,

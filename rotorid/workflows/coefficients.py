@@ -115,19 +115,13 @@ def _refined(job: Job, kind: str) -> Influence:
     """From trial runs and check runs together."""
     from balancing import estimate_influence
     from balancing.correction.refine_coefficients import refine
-    from rotorid.workflows.check_pieces import with_pieces
 
     if job.check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if kind != "measured" or job.influence is not None:
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
-    if job.check_mounted or job.check.planes:
-        return refine(job.trials, job.check)
-    trials_alone = estimate_influence(job.trials)
-    correction = proposed(job, trials_alone)
-    check = with_pieces(job, correction, trials_alone, None).check
-    assert check is not None
-    return refine(job.trials, check, corrections=correction)
+    mounted = None if job.check_mounted else proposed(job, estimate_influence(job.trials))
+    return refine(job.trials, job.check, corrections=mounted)
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorid.base.text import listing
-from rotorid.tables.job.job_keys import EXACT, TABLES
+from rotorid.tables.job.job_keys import TABLES
 from rotorid.tables.reader.excel_workbook import SUFFIXES, is_workbook
 from rotorid.tables.reader.grid import clean
 from rotorid.tables.reader.input_file import MOST_BYTES, file_content, first_bytes
@@ -69,7 +69,7 @@ class FilesVersion:
         except ValueError as error:
             self.read_only = f"{job.name} cannot be read, correct it there: {error}"
         for key in (*TABLES, "rotor"):
-            name = self.settings.get(key) if self.settings.get(key) != EXACT else None
+            name = self.settings.get(key)
             if isinstance(name, str) and name.isprintable():
                 self._open(key, job.parent / name)
 

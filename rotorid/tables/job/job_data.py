@@ -74,10 +74,8 @@ class Job:
         Check runs, in the units and at the speeds of the job, or None.
     check_mounted
         Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
-    check_exact
-        Whether the job says that it was the weights, `check_weights = "weights"`; else pieces in its holes.
     check_pieces
-        The pieces that `check.weights` are then, chosen by `rotorid.workflows.check_pieces`; None: others.
+        The pieces that `check.weights` are then, by `rotorid.workflows.check_pieces`; None: others.
     rotor
         The model that the job names, or None.
     plane_nodes
@@ -115,7 +113,6 @@ class Job:
     left_out: tuple[str, ...] = ()
     check: Trials | None = None
     check_mounted: bool = False
-    check_exact: bool = False
     check_pieces: Mounted | None = None
     rotor: Rotor | None = None
     plane_nodes: Mapping[str, int] = field(default_factory=dict)

@@ -22,8 +22,6 @@ from rotorid.tables.runs.stated_conventions import (
     StatedErrors,
 )
 
-EXACT = "weights"
-"""As `check_weights`, in place of a table: the weights as proposed, whatever holes there are."""
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""
 READINGS = ("runs", "check", "slow_roll")
@@ -392,8 +390,8 @@ JOB = (
     Key(
         "check_weights",
         FILE,
-        "weights table of the check run, where others were mounted than proposed; without it the pieces of "
-        '`--split` where there are holes, else the weights; `"weights"`: the weights',
+        "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
+        "where there are holes, else the weights",
     ),
     Key(
         "slow_roll",

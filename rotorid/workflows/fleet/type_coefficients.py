@@ -15,7 +15,6 @@ from balancing.correction.refine_coefficients import together
 from balancing.correction.update_coefficients import update
 from balancing.data.trials import Trials
 from rotorid.base.text import counted
-from rotorid.workflows.check_pieces import with_pieces
 from rotorid.workflows.coefficients import proposed
 from rotorid.workflows.fleet.type_records import Grid, KnownType, known_type
 from rotorid.workflows.result_provenance import hash_of
@@ -103,11 +102,8 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     if refined:
         if job.check is None:
             raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
-        check, mounted = job.check, None
-        if not (job.check_mounted or check.planes):
-            mounted = proposed(job, found, refuse=False)
-            check = with_pieces(job, mounted, found, None).check or check
-        trials = together(trials, check, corrections=mounted)
+        mounted = None if job.check_mounted else proposed(job, found, refuse=False)
+        trials = together(trials, job.check, corrections=mounted)
         found, chance = update(prior, trials)
     kind, warnings = known.kind, list(found.warnings)
     if any(record.machine == machine for record, _ in kind.odd):

@@ -337,7 +337,7 @@ function answer(name, title, { document: doc, judgement, warnings, notes }) {
     left ? [h("b", {}, `Mounted in ${left.run}:`), listing(doc, "left_to_do.mounted", columns),
       left.word === "trim" && [h("b", {}, "To add:"), listing(doc, "left_to_do.add", columns)]]
       : listing(doc, pieces ? "mounting.holes" : "corrections", columns),
-    h("p", {}, left ? "" : pieces?.on_top_of ? `Beside those of ${pieces.on_top_of}. ` : `For ${doc.corrections_refer_to}. `,
+    h("p", {}, left ? "" : `For ${doc.corrections_refer_to}. `,
       `Angles count ${said.angles}, phase ${said.phase}. ± is one standard deviation.`),
     !left && !pieces && last?.weights.some(({ mass }) => mass) && [
       h("b", {}, `If the weights of ${last.run} stay, instead:`), listing(doc, "add_to_mounted", columns)],

@@ -359,7 +359,6 @@ def test_pieces_on_top_of_a_check_run_say_what_stays(tmp_path):
     words = re.sub(r"\s+", " ", text)
     assert report.mounted.on_top_of == "check"
     assert "Leave everything mounted that was mounted in run “check”." in words
-    assert "Wanted in addition to the weights of run “check”" in words
     assert "Remove every trial weight" not in words
     drawn = plane_figure(report.result, "left", mounted=report.mounted).axes[0]
     want = sheet.document["add_to_mounted"][0]
@@ -424,7 +423,7 @@ def test_after_a_check_run_nothing_is_mounted_twice():
     text, _, _, _ = sheet_of(DATA / "turbo_job" / "checked.toml")
     words = re.sub(r"\s+", " ", text)
     assert "Check run: predicted and achieved" in words
-    assert "Do not mount the weights below again" in words
+    assert "not to be mounted now" in words
     assert "Remove every trial weight and every weight of the runs" not in words
     before, _, _, _ = sheet_of(DATA / "turbo_job" / "job.toml")
     assert "Remove every trial weight and every weight of the runs" in re.sub(r"\s+", " ", before)

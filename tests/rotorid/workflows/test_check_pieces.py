@@ -95,7 +95,9 @@ def test_the_first_line_says_what_is_mounted_and_what_is_left(tmp_path: Path, op
 def test_the_job_says_otherwise(tmp_path: Path) -> None:
     machine = Machine(tmp_path, 5)
     weights = balance(machine.job()).result.weights
-    found = balance(machine.checked(1e3 * weights, 'check_weights = "weights"\n'))
+    rows = zip(("P1", "P2"), 1e3 * np.abs(weights), np.degrees(np.angle(weights)) % 360, strict=True)
+    (tmp_path / "exact.csv").write_text(WEIGHTS + "".join(f"check,{p},{m},{a}\n" for p, m, a in rows))
+    found = balance(machine.checked(1e3 * weights, 'check_weights = "exact.csv"\n'))
     assert found.check is not None
     np.testing.assert_allclose(found.check.weights, [weights], rtol=1e-12)
     assert found.check.explained
@@ -114,9 +116,9 @@ def test_the_job_says_otherwise(tmp_path: Path) -> None:
 
 def test_worse_than_the_bare_rotor_is_taken_off(tmp_path: Path) -> None:
     machine = Machine(tmp_path, 7)
-    found = balance(machine.checked(-1.5 * machine.D, 'check_weights = "weights"\n'))
+    found = balance(machine.checked(-1.5 * machine.D))
     assert found.left is not None
-    assert found.left.word == "take off"
+    assert found.left.word == "take off what is mounted"
     assert not found.left.trim.any()
     assert "Take off what is mounted" in found.answer.judgement.splitlines()[0]
 
