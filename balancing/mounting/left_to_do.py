@@ -133,7 +133,8 @@ def left_to_do(
         return LeftToDo("add nothing yet", stop or c.decision.cause, c, run, planes, there, nothing)
     trim = c.to_add if pieces is None else _in_planes(pieces, planes)
     if trim is None or not trim.any() or left >= WORTH * now:
-        why = f"{'a trim' if pieces is None else 'pieces beside these'} would not make it clearly better ({change})"
+        added = "a trim" if pieces is None else "pieces beside these"
+        why = f"{added} would not make it clearly better ({change})"
         open_ = judged == "fail" or explained is False
         return LeftToDo("add nothing yet" if open_ else "done", why, c, run, planes, there, nothing)
     return LeftToDo("trim", change, c, run, planes, there, trim, pieces)

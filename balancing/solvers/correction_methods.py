@@ -32,10 +32,7 @@ from balancing.solvers.weighted_limits import (
 )
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.registry import Method, find
-from rotorid.regression import stretch
 
-HELD = 1e-3
-"""Relative; so little the mean of drawn weights is moved by the solver's tolerance and by chance."""
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""
 
@@ -165,10 +162,7 @@ def _plain(method: Criterion, stack: Stack) -> Fitted:
         covariance = symmetric(sum(parts[1:], parts[0]))
         if method != "least-squares" or bound:
             covariance, words = _sampled(
-                stack,
-                lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights,
-                stack.channels,
-                found.weights if method == "least-squares" else None,
+                stack, lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights, stack.channels
             )
     return Fitted(
         found.weights,
@@ -256,7 +250,7 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
         return min(found, key=lambda end: end.objective).weights
 
     # with what explains the residuals, as the ± without limits are
-    covariance, words = _sampled(stack, again, _regular(channels, free.model_error), D)
+    covariance, words = _sampled(stack, again, _regular(channels, free.model_error))
     if free.inflation > 1:
         words += (
             "even without the limits, weights in these planes do not explain the vibration: what would be "
@@ -288,31 +282,14 @@ def _regular(channels: FloatArray, model_error: float) -> FloatArray:
 
 
 def _sampled(
-    stack: Stack,
-    solver: Callable[[ComplexArray, ComplexArray], ComplexArray],
-    channels: FloatArray,
-    about: ComplexArray | None,
+    stack: Stack, solver: Callable[[ComplexArray, ComplexArray], ComplexArray], channels: FloatArray
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
-    """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits.
-
-    Around weights (P,): a limit that barely binds moves half of the solutions to one side. None: their mean.
-    """
-    solutions: list[ComplexArray] = []
-
-    def noted(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
-        solutions.append(solver(W, Y))
-        return solutions[-1]
-
+    """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
     common, known = stack.common, stack.parameters
     try:
-        covariance = sampled_covariance(noted, stack.W, stack.Y, channels, common=common, parameters=known)
+        return sampled_covariance(solver, stack.W, stack.Y, channels, common=common, parameters=known), ()
     except ValueError as error:
         return None, (str(error),)
-    if about is not None and solutions:
-        shift = np.mean(solutions, axis=0) - about
-        moved = stretch(np.where(np.abs(shift) < HELD * np.abs(about), 0.0, shift))
-        covariance = symmetric(covariance + np.outer(moved, moved))
-    return covariance, ()
 
 
 def _ridge(stack: Stack, strength: float | str) -> Fitted:

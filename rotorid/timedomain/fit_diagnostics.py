@@ -75,35 +75,32 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     draft.note(*_integration_words(found, draft.integration_change, problem.model.parameters))
     r = found.residuals if draft.prior is None else draft.prior.best  # of the data alone
     seen = correlation(problem, r)
-    poor, widening = misfit(problem, found.dof, r, loss), 1.0
+    poor = misfit(problem, found.dof, r, loss)
+    widening = 1.0 if poor or seen is None else seen.widening
     draft.note(poor, spoils=True)
     if not poor:
-        widening = 1.0 if seen is None else seen.widening(found.rank, found.errors_stated)
-        draft.note("" if seen is None else seen.words(widening), spoils=np.isinf(widening))
-        draft.note(*_chi_words(found))
+        draft.note("" if seen is None else seen.words(), *_chi_words(found))
     draft.note(*_aliases(problem, found.solution))
     if draft.reliable:
         draft.note(*_pulses(problem, found.solution), spoils=True)
     draft.note(*_begins_later(problem))
     if not draft.reliable or widening > 1:
-        found = _widened(found, widening if draft.reliable else None)
+        found = _widened(found, widening if draft.reliable else np.nan)
     neighbours = None if seen is None else seen.neighbours
     change, warnings = draft.integration_change, tuple(draft.warnings)
     reliable = draft.reliable and widening == 1
     return Judgement(found, reliable, warnings, change, neighbours, draft.prior, draft.normal_matrix)
 
 
-def _widened(found: Estimate, factor: float | None) -> Estimate:
-    """With standard deviations so many times as large, or without any."""
-    if factor is None or found.covariance is None or found.solution_covariance is None:
-        curved = found.curved and tuple(replace(one, std=None) for one in found.curved)
-        return replace(found, covariance=None, solution_covariance=None, curved=curved)
-    return replace(
-        found,
-        covariance=found.covariance * factor**2,
-        solution_covariance=found.solution_covariance * factor**2,
-        curved=found.curved and tuple(replace(one, std=one.std and one.std * factor) for one in found.curved),
+def _widened(found: Estimate, factor: float) -> Estimate:
+    """With standard deviations so many times as large; NaN: without any."""
+    parts = [found.covariance, found.solution_covariance]
+    covariances = [None if np.isnan(factor) or C is None else C * factor**2 for C in parts]
+    curved = found.curved and tuple(
+        replace(one, std=None if np.isnan(factor) or one.std is None else one.std * factor)
+        for one in found.curved
     )
+    return replace(found, covariance=covariances[0], solution_covariance=covariances[1], curved=curved)
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.regression.estimate import coverage_factor
 from rotorid.timedomain.methods.least_squares_problem import Problem
 
 UNEXPLAINED = 0.05
@@ -21,8 +20,6 @@ MISFIT = 4.0
 FEWEST = 20
 """Samples below which nothing can be said of correlations."""
 LAGS = 10
-FOLLOWS, LONGER = 3.3, 1.2
-"""Correlation of neighbours, in standard errors, that is no chance; a factor that does not matter."""
 UNEQUAL = 1.5
 """Ratio of the errors of two outputs above which they are called different."""
 FEW_UNEXPLAINED = 0.2
@@ -47,47 +44,22 @@ class Correlation:
         Of such correlations up to the tenth neighbour in white residuals (Box and Pierce 1970).
     factor
         How many times too narrow intervals are, about; 1 where the correlations do not widen them.
-    samples
-        How many residuals.
     """
 
     neighbours: float
     probability: float
     factor: float
-    samples: int
 
     @property
-    def random(self) -> bool:
-        """Whether the residuals may be white."""
-        return self.probability >= 1e-4 and self.neighbours * np.sqrt(self.samples) < FOLLOWS
+    def widening(self) -> float:
+        """By what intervals are multiplied; 1 where the residuals may be white, or it does not matter."""
+        return self.factor if self.probability < 1e-4 and self.factor > 1.2 else 1.0
 
-    def widening(self, rank: int, stated: bool) -> float:
-        """By what intervals of so many parameters are multiplied, for sensitivities that change slowly.
-
-        These take f² = (1 + ρ)/(1 − ρ) of the residuals' variance each, not 1, and hide so much of ρ: the
-        measured one is (n ρ − p f²)/(n − p f²). Infinite where that leaves no independent sample.
-        """
-        n, p, ρ = self.samples, rank, self.neighbours
-        if self.random or self.factor <= LONGER:
-            return 1.0
-        c = p * (1 - ρ) / n
-        root = (1 + ρ - c) ** 2 - 4 * (ρ + c)
-        ρ = (1 + ρ - c - np.sqrt(max(root, 0.0))) / 2
-        square = (1 + ρ) / (1 - ρ)
-        free = n / square - p
-        if root < 0 or free < 1:
-            return np.inf
-        if stated:
-            return float(np.sqrt(square))
-        few, many = (coverage_factor(dof) or np.inf for dof in (free, n - p))
-        return float(np.sqrt((n - p) / free) * few / many)
-
-    def words(self, widening: float) -> str:
+    def words(self) -> str:
         """A warning, or nothing."""
-        if self.random:
+        if not self.probability < 1e-4:
             return ""
-        longer = f": intervals were made {widening:.2g} times as wide" if widening > 1 else ""
-        longer = longer if np.isfinite(widening) else ", in too few samples for intervals"
+        longer = f": intervals were made {self.widening:.2g} times as wide" if self.widening > 1 else ""
         return (
             "the residuals are not random: those of neighbouring samples are correlated "
             f"({self.neighbours:.2f}, Durbin–Watson {2 - 2 * self.neighbours:.2f}){longer}. Either the noise "
@@ -200,13 +172,13 @@ def _correlation(parts: Sequence[FloatArray]) -> Correlation:
     total = sum(float(part @ part) for part in parts)
     lags = range(1, 1 + min(LAGS, max(1, min(len(part) for part in parts) // 5)))
     if total == 0:
-        return Correlation(0.0, 1.0, 1.0, 0)
+        return Correlation(0.0, 1.0, 1.0)
     rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) / total for k in lags])
     size = sum(len(part) for part in parts)
     first = float(rho[0])
     # of correlations that fade as fast as the first one says
     factor = float(np.sqrt((1 + first) / (1 - first))) if 0 < first < 1 else 1.0
-    return Correlation(first, chance(size * float(rho @ rho), len(rho)), factor, size)
+    return Correlation(first, chance(size * float(rho @ rho), len(rho)), factor)
 
 
 def _line(part: FloatArray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,10 +20,6 @@ if TYPE_CHECKING:
 
     from fem import MeshCheck, Modes, Rotor, SpeedMap
     from rotorid.base.arrays import FloatArray
-
-
-_MATTERS = 0.01  # relative change of a critical speed by what the model leaves out
-_NAMED = 6  # critical speeds in one warning
 
 
 @dataclass(frozen=True)
@@ -141,41 +138,25 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
 
 
 def _stubby(model: Rotor, modes: Modes) -> list[str]:
-    """What is too high by more than 1 % because shear or tilting inertia of the shaft are left out.
-
-    Moments of inertia of discs that are left out have a warning of their own.
-    """
-    import numpy as np
-
+    """What shear and rotary inertia of the shaft, where left out, would change by more than 1 %."""
     import fem
 
-    names = {"shear": "shear", "rotary_inertia": "tilting inertia"}
-    missing = {key: name for key, name in names.items() if not getattr(model.model, key)}
-    if not missing:
-        return []
-    discs = model.discs
-    if "rotary_inertia" in missing:
-        discs = tuple(dataclasses.replace(disc, diametral_inertia=0.0) for disc in discs)
+    missing = [key for key in ("shear", "rotary_inertia") if not getattr(model.model, key)]
     counted_in = dataclasses.replace(model.model, **dict.fromkeys(missing, True))
-    moving = np.flatnonzero(modes.frequencies > 0)
-    try:
-        full = fem.critical_speeds(dataclasses.replace(model, model=counted_in, discs=discs), moving.size)
-    except ValueError:  # none is left in the bearing tables
-        return []
-    other = full.frequencies[full.frequencies > 0]
-    if moving.size != other.size:
-        return []
-    excess = modes.frequencies[moving] / other - 1
-    large = np.flatnonzero(excess > _MATTERS)
-    if not large.size:
-        return []
-    listed = [f"mode {moving[k] + 1} by {100 * excess[k]:.1f} %" for k in large[:_NAMED]]
-    more = " …" if large.size > _NAMED else ""
-    return [
-        f"without {listing(list(missing.values()), 'and')} of the shaft these speeds are too high: "
-        f"{listing(listed, 'and')}{more}; [model] {', '.join(f'{key} = true' for key in missing)} in a "
-        f"rotor file counts {'it' if len(missing) == 1 else 'them'}"
-    ]
+    discs = model.discs
+    if "rotary_inertia" in missing:  # of discs it has a warning of its own
+        discs = tuple(dataclasses.replace(disc, diametral_inertia=0.0) for disc in discs)
+    with suppress(ValueError):  # none is left in the bearing tables
+        other = dataclasses.replace(model, model=counted_in, discs=discs)
+        full = fem.critical_speeds(other, modes.frequencies.size) if missing else modes
+        high, low = (each.frequencies[each.frequencies > 0] for each in (modes, full))
+        first = 1 + modes.frequencies.size - high.size
+        excess = [(k, 100 * (f / g - 1)) for k, (f, g) in enumerate(zip(high, low, strict=False), first)]
+        large = [f"mode {k} by {percent:.1f} %" for k, percent in excess if percent > 1]
+        if large:
+            keys = ", ".join(f"{key} = true" for key in missing)
+            return [f"these speeds are too high, {listing(large, 'and')}: [model] {keys} in a rotor file"]
+    return []
 
 
 def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:

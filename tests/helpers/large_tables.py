@@ -1,7 +1,7 @@
 """Runs and weights of many rows: `python tests/helpers/large_tables.py FOLDER CHANNELS AGAIN REPEATS`.
 
-CHANNELS readings (ten sensors at each speed) of a bare run, of two trial runs and of the bare run AGAIN times,
-each read REPEATS times.
+CHANNELS readings (ten sensors at each speed) of a bare run, of two trial runs and of the bare run AGAIN
+times, each read REPEATS times.
 """
 
 import sys

@@ -10,17 +10,7 @@ from typing import Any
 import numpy as np
 
 from fem.model.node_forces import NodeForce
-from fem.model.rotor import (
-    SHORTEST,
-    STEEL_DENSITY,
-    STEEL_MODULUS,
-    STEEL_POISSON,
-    Disc,
-    Model,
-    Rotor,
-    Support,
-    too_short,
-)
+from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
@@ -29,21 +19,15 @@ from rotorid.tables.reader.units import one_of
 from rotorid.tables.rotor.rotor_plausibility import warn_of_rotor, warn_of_table
 
 _LENGTH = one_of(units.LENGTH)
-_INERTIA = one_of(units.INERTIA)
-ATTACHED = (
-    Column("mass", one_of(units.MASS), ("mass_kg",), required=False, blank=True),
-    Column("polar_inertia", _INERTIA, ("polar_inertia_kg_m2",), required=False, blank=True),
-    Column("diametral_inertia", _INERTIA, ("diametral_inertia_kg_m2",), required=False, blank=True),
-    Column(
-        "support_stiffness",
-        one_of(units.STIFFNESS),
-        ("support_stiffness_N_per_m",),
-        required=False,
-        blank=True,
-    ),
-    Column(
-        "support_damping", one_of(units.DAMPING), ("support_damping_N_s_per_m",), required=False, blank=True
-    ),
+ATTACHED = tuple(
+    Column(stem, one_of(unit), (name,), required=False, blank=True)
+    for stem, unit, name in (
+        ("mass", units.MASS, "mass_kg"),
+        ("polar_inertia", units.INERTIA, "polar_inertia_kg_m2"),
+        ("diametral_inertia", units.INERTIA, "diametral_inertia_kg_m2"),
+        ("support_stiffness", units.STIFFNESS, "support_stiffness_N_per_m"),
+        ("support_damping", units.DAMPING, "support_damping_N_s_per_m"),
+    )
 )
 OF_ELEMENTS = (
     Column("youngs_modulus", one_of(units.MODULUS), ("youngs_modulus_Pa",), required=False, blank=True),
@@ -103,11 +87,6 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
         "length",
         (length > 0) | ~elements,
         "a length above 0 (0 only in the last row, which then attaches to the right end)",
-    )
-    short = elements & (length > 0)
-    short[short] = too_short(length[short])
-    table.complain_where(
-        short, "length", f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
     )
     if not elements.any():
         expected = "at least one row with a length above 0"

@@ -151,7 +151,7 @@ def test_a_limit_that_barely_binds_keeps_the_errors_of_what_is_not_bound(method,
     unlimited = np.concatenate((free.mass_std, free.angle_std))
     np.testing.assert_allclose(widths(1.001), unlimited, rtol=1e-6)
     barely = widths(0.9999) / unlimited
-    assert 0.6 < barely[0] < 0.95  # half of the machines need less than the limit
+    assert 0.5 < barely[0] < 0.7  # half of the machines need less than the limit: sqrt(1/2 - 1/(2 pi)) = 0.58
     np.testing.assert_allclose(barely[1:], 1, atol=0.15)
 
 

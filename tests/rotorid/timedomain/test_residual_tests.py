@@ -249,14 +249,3 @@ def test_intervals_hold_where_residuals_follow_each_other(rho):
         reliable += found.reliable
     assert (hits >= 0.87 * count).all()  # three standard deviations less than 95 %
     assert reliable == (count if rho == 0 else 0)
-
-
-def test_too_few_samples_that_follow_each_other_have_no_intervals():
-    """Samples that leave no independent one, by what the smooth sensitivities take."""
-    from rotorid.timedomain.residual_tests import Correlation
-
-    assert Correlation(0.9, 0.0, 4.4, 40).widening(3, stated=False) == np.inf
-    assert Correlation(0.0, 0.5, 1.0, 40).widening(3, stated=False) == 1.0
-    # without parameters sqrt((1 + ρ)/(1 − ρ)), and Student's factor of the independent samples
-    assert Correlation(0.6, 0.0, 2.0, 10**6).widening(0, stated=True) == pytest.approx(2.0)
-    assert Correlation(0.6, 0.0, 2.0, 10**6).widening(0, stated=False) == pytest.approx(2.0, rel=0.01)
