@@ -46,10 +46,6 @@ _SMALL, _ROUNDED = 1e-9, 1e-6
 """Last change of Newton's method by the size of the motion; below what it may be that of rounding."""
 
 
-class OutOfTime(np.linalg.LinAlgError):
-    """The limit of time has come."""
-
-
 @dataclass(frozen=True, eq=False)
 class Orbit:
     """A periodic motion, or the guess of one.
@@ -204,12 +200,10 @@ class Periodic:
         Raises
         ------
         numpy.linalg.LinAlgError
-            Where they have no solution, or a force none (a wall).
-        OutOfTime
-            The limit of time has come.
+            Where they have no solution, or a force none (a wall), or the limit of time has come.
         """
         if time.monotonic() > self.until:
-            raise OutOfTime("time is up")
+            raise np.linalg.LinAlgError("time is up")
         V, h, n = orbit.velocities, orbit.step, orbit.start.size
         N = len(V)
         angles = self.angles(N)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.motion.collocation import Linearised, Orbit, OutOfTime, Periodic, wall_met
+from rotorid.motion.collocation import Linearised, Orbit, Periodic, wall_met
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
@@ -137,9 +137,6 @@ def follow(problem: Periodic, start: Start, low: float, high: float, kind: str) 
         try:
             new, new_tangent, iterations, length = walk.step(at, tangent, length)
             passed = walk.passed(at, tangent, new, new_tangent, length, len(points))
-        except OutOfTime:
-            ended = "stopped for lack of time"
-            continue
         except np.linalg.LinAlgError as problem_met:
             length /= 2
             ended = f"stopped: {problem_met}" if length < _SHORTEST else ""

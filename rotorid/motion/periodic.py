@@ -37,7 +37,6 @@ _STILL, _FADES = 1e-4, 0.95  # of its size at the beginning, and half the time a
 _NEAR = 0.3  # of its size: the periodic motion that a motion in time comes to
 _TURNS, _BLOCKS = 100, 8  # revolutions of motion in time, and how often so many more
 _ASKED = 12
-_LATE = "was not sought: time was up"
 _NOT_AGAIN = "comes to a periodic motion that Newton's method does not find again"
 _NOTHING = f"comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
 
@@ -124,7 +123,6 @@ def periodic_motion(
     warnings += _doubts(branches)
     if search.late:
         warnings.insert(0, f"the search was stopped after {max_seconds:.6g} s (--max-seconds)")
-        warnings.sort(key=lambda one: one.startswith("motion in time"))
     return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings), search.tried)
 
 
@@ -137,7 +135,6 @@ class _Search:
     high: float
     forced: bool
     until: float
-    begun_at: list[float] = field(default_factory=list)
     in_time_at: list[float] = field(default_factory=list)
 
     def problem(self, turns: int) -> Periodic:
@@ -154,7 +151,7 @@ class _Search:
         """Where motions were sought, in sentences."""
         at, in_time = (
             f"{listing([f'{speed * RPM:.6g}' for speed in speeds], 'and')} rpm"
-            for speeds in (self.begun_at, self.in_time_at)
+            for speeds in ((self.low, self.high), self.in_time_at)
         )
         start = "at rest" if self.forced else "with a large whirl"
         words = f"Motions were followed from rest at {at}"
@@ -173,7 +170,6 @@ class _Search:
         """From rest at the lowest speed upwards and, if that is another branch, at the highest downwards."""
         problem, found, said = self.problem(1), list[Branch](), list[str]()
         for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
-            self.begun_at.extend([] if self.late else [speed])
             try:
                 start = at_speed(problem, self.linear(speed))
                 orbit = problem.solve(start.guess, start.rows, start.values)[0].orbit
@@ -215,7 +211,9 @@ class _Search:
                 end = self.reached(speed)
             except ValueError as problem_met:
                 end = f"is not known: {problem_met}"
-            self.in_time_at.extend([] if end == _LATE else [speed])
+            if self.late:
+                break
+            self.in_time_at.append(speed)
             if isinstance(end, Orbit):
                 own = round(end.period * speed / (2 * np.pi)) if self.forced else 0
                 if _known(own, end, branches):
@@ -230,8 +228,6 @@ class _Search:
                     end = f"comes again after {own} revolutions only (--subsynchronous {own})"
                 else:
                     end = "comes to a whirl with a period of its own (--limit-cycle)"
-            if end in (_NOTHING, _NOT_AGAIN) and self.late:
-                end = _LATE
             if end:
                 said.setdefault(end, []).append(f"{speed * RPM:.6g}")
         return [f"motion in time {end}, at {listing(at, 'and')} rpm" for end, at in said.items()]
@@ -256,7 +252,7 @@ class _Search:
         sizes, turn, period = list[float](), 2 * np.pi / speed, 0.0
         for _ in range(_BLOCKS):
             if self.late:
-                return _LATE
+                return _NOTHING
             motion = run(self.system, (speed, speed), _TURNS * turn, (q, v))
             if motion.stopped:
                 return f"from rest ends: {motion.stopped.split(' after ')[0]}"
