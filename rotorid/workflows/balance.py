@@ -359,7 +359,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         mounted=mounted,
         check=check,
         verdict=verdict,
-        left=None if read.check is None else _left(result, read, known, options, check, verdict),
+        left=None if read.check is None else _left(result, read, known, options, check, verdict, mounted),
         tolerance=tolerance,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
@@ -509,6 +509,7 @@ def _left(
     options: BalanceOptions,
     check: CheckComparison | None,
     verdict: Verdict | None,
+    mounted: Mounted | None,
 ) -> LeftToDo:
     """What is left to do after the check run, by all runs where the coefficients are measured."""
     import numpy as np
@@ -519,7 +520,7 @@ def _left(
 
     assert job.check is not None
     words = () if result.convention_test is None else contradiction(result.convention_test, result.labels)
-    stop, pieces = "; ".join(words), None
+    stop, pieces = "; ".join(words), mounted if options.refine else None
     if not options.refine:
         there = mounted_in(job.check, result)
         weights = np.column_stack(list(there.values()))
@@ -532,7 +533,7 @@ def _left(
         except ValueError as error:
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
             result = replace(result, mounted=(runs.runs[-1], runs.planes, weights[-1]))
-    if job.check_pieces is not None and not stop:
+    if job.check_pieces is not None and pieces is None and not stop:
         with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
             pieces = _mount(result, job, known, replace(options, refine=True))
     explained = None if check is None else check.explained

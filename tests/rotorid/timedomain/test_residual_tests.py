@@ -248,4 +248,4 @@ def test_intervals_hold_where_residuals_follow_each_other(rho):
         hits += (low < [0.8, 1.0]) & (high > [0.8, 1.0])
         reliable += found.reliable
     assert (hits >= 0.87 * count).all()  # three standard deviations less than 95 %
-    assert reliable == (count if rho == 0 else 0)
+    assert reliable == count if rho == 0 else reliable <= 0.05 * count
