@@ -7,8 +7,9 @@ listed where all of them cannot. The first number of which a choice is good enou
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -57,13 +58,25 @@ def fewest(
         left = search(form, few, squares, found, now + (until - now) / 3, chunk, number)
         sure &= left >= found.square and all(one.complete for one in few)
         if not sure and found.square == enough:
-            few = [one.few(own + spare // len(sets)) for one, own in zip(sets, least, strict=True)]
-            with suppress(ValueError):  # where so few are too heavy for a plane
-                found = rounded(few, squares, form.D0[np.argsort(form.order)])
-                polish(few, squares, found, until)
+            now = time.perf_counter()
+            for more in _shares(spare, len(sets)):
+                some = [one.few(own + each) for one, own, each in zip(sets, least, more, strict=True)]
+                with suppress(ValueError):  # where so few are too heavy for a plane
+                    tried = rounded(some, squares, form.D0[np.argsort(form.order)])
+                    polish(some, squares, tried, until)
+                    found, few = (tried, some) if tried.square < found.square else (found, few)
+                if time.perf_counter() > now + (until - now) / 3:
+                    break
         if found.square < enough:
             return (found, few), sure
     return None, sure
+
+
+def _shares(pieces: int, planes: int) -> Iterator[tuple[int, ...]]:
+    """Every way to share pieces among planes, the most even first."""
+    ends = combinations(range(pieces + planes - 1), planes - 1)
+    each = ((b - a - 1 for a, b in pairwise((-1, *bars, pieces + planes - 1))) for bars in ends)
+    return iter(sorted(map(tuple, each), key=lambda share: sum(n * n for n in share)))
 
 
 def _least(form: Form, sets: Sequence[Attainable], enough: float, most: int) -> list[int]:
