@@ -78,8 +78,8 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     )
 
 
-def judged(rotor: Rotor, speeds: FloatArray, level: float = GROWTH) -> tuple[Bases | None, BoolArray]:
-    """At which speeds, ascending, shape (S,), a mode grows beyond a level, and the equations that tell it.
+def judged(rotor: Rotor, speeds: FloatArray) -> tuple[Bases | None, BoolArray]:
+    """At which speeds, ascending, shape (S,), a mode grows, and the equations that tell it.
 
     These are None where no mode can grow: `growth_bound` says so.
     """
@@ -89,7 +89,7 @@ def judged(rotor: Rotor, speeds: FloatArray, level: float = GROWTH) -> tuple[Bas
     if not doubtful.any():
         return None, grows
     found = bases(both_planes(rotor), speeds[doubtful], float(bound.max()))
-    grows[doubtful] = growing_at(found, speeds[doubtful], level)
+    grows[doubtful] = growing_at(found, speeds[doubtful])
     return found, grows
 
 
@@ -114,7 +114,7 @@ def _window(found: Bases, known: FloatArray, i: int, j: int) -> Window:
     return Window(first, last, begins, ends, *mode)
 
 
-def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) -> tuple[float, complex]:
+def loss(found: Bases, unstable: float, stable: float) -> tuple[float, complex]:
     """Where growth at one speed, rad/s, ends on the way to another: the edge next to the first.
 
     Sought is the root of the largest growth of all modes, which needs no mode to be followed. Of a motion
@@ -133,8 +133,7 @@ def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) ->
     trials = np.unique(np.concatenate((np.linspace(unstable, stable, _PARTS + 1), between)))
     trials = trials if stable > unstable else trials[::-1]
     growth = largest_growth(found, trials)
-    if growth[-1] < -level:
-        level = 0.0
+    level = 0.0 if growth[-1] < -GROWTH else GROWTH
     over = growth > level
     k = int(np.argmin(over))
     if over.all() or k == 0:

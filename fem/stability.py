@@ -19,9 +19,6 @@ from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
 
-SMALLEST = 1e-9
-"""Re λ / |λ| above which a mode grows here: an undamped one has rounding there."""
-
 Status = Literal["stable", "threshold", "unstable"]
 
 
@@ -133,7 +130,7 @@ def stability_threshold(
     """
     speeds = range_of_speeds(lowest, highest, steps)
     n = checked_number(rotor, min(n, available_modes(rotor)))
-    found, grows = judged(rotor, speeds, SMALLEST)
+    found, grows = judged(rotor, speeds)
     return searched(found, grows, solve_whirl(both_planes(rotor), speeds, n))
 
 
@@ -186,7 +183,7 @@ def searched(found: Bases | None, grows: BoolArray, whirl: Whirl) -> Stability:
     if upto == 0:
         mode, frequency, direction = growing_mode(found, speeds[0])
         return replace(stable, status="unstable", mode=mode, frequency=frequency, direction=direction)
-    speed, value = loss(found, speeds[upto], speeds[upto - 1], SMALLEST)
+    speed, value = loss(found, speeds[upto], speeds[upto - 1])
     mode, frequency, direction = growing_mode(found, speed, value)
     return replace(
         stable, status="threshold", threshold=speed, mode=mode, frequency=frequency, direction=direction

@@ -8,6 +8,8 @@ the corrected reading, Y₀ + W D, free of D. For a complex normal error of cova
 taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of kinds (own
 alone, common at a speed, to a run, to both: each as likely; see `balancing.coefficients.run_errors`). The
 grid keeps what the data leave open: few spare runs, or errors common to all sensors, which count once.
+Of more than `MOST` readings of a run evenly chosen ones take part: they tell a few sizes as well, and the
+covariance of all would grow with the square of their number.
 
 Source: restricted maximum likelihood (Patterson and Thompson 1971).
 """
@@ -23,7 +25,7 @@ import numpy as np
 from balancing.coefficients.run_errors import Origin, RunErrors, Runs, assumed
 from balancing.data.reading_errors import error_model
 from balancing.data.trials import Trials
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorid.regression import gain, stretch
 
 SIZES = np.geomspace(3e-4, 1.0, 12)
@@ -36,6 +38,7 @@ SHARES = (0.04, 0.3, 0.6)
 EXPLAINED = 0.95
 """Level of the test by which the corrected reading takes part."""
 FINE = 20
+MOST = 64
 _TOGETHER = 64
 _LIKELY, _UNLIKELY, _POSSIBLE = 1e-5, 1e-3, 0.05
 
@@ -75,7 +78,9 @@ def spare_rows(A: ComplexArray, Y: ComplexArray, known: FloatArray) -> Rows:
     # in an order of their own, whatever that of the runs
     basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] ** 2 * basis))[1]
     m = basis.conj().T / size
-    return Rows(np.einsum("kr,rsc->ksc", m, Y), m, known, np.zeros((*Y.shape[1:], 0), dtype=complex))
+    at = few(*Y.shape[1:])
+    free = np.zeros((*Y.shape[1:], 0), dtype=complex)[at]
+    return Rows(np.einsum("kr,rsc->ksc", m, Y[..., *at]), m, known[..., *at], free)
 
 
 def corrected_row(
@@ -98,7 +103,15 @@ def corrected_row(
     size = np.maximum(size, 0.1 * size.max())
     D = -gain(W / size[:, None]) @ (Y0 / size)
     m = (np.concatenate(([1.0], D)) @ gain(A))[None]
-    return (Rows(np.einsum("kr,rsc->ksc", m, Y), m, known, theta[..., 1:]),)
+    at = few(S, C)
+    return (Rows(np.einsum("kr,rsc->ksc", m, Y[..., *at]), m, known[..., *at], theta[at][..., 1:]),)
+
+
+def few(S: int, C: int) -> tuple[IntArray, IntArray]:
+    """Index of at most `MOST` of S × C readings: all sensors where possible, speeds evenly chosen."""
+    sensors = np.linspace(0, C - 1, min(C, MOST)).round().astype(np.int64)
+    speeds = np.linspace(0, S - 1, min(S, MOST // len(sensors))).round().astype(np.int64)
+    return speeds[:, None], sensors
 
 
 class Grid(NamedTuple):
@@ -157,6 +170,8 @@ class Spectrum(NamedTuple):
 def spectrum(rows: Rows, runs: Runs, grid: Grid) -> Spectrum:
     """Of all rows, at every mixture and share of a grid; rows of many readings as if independent."""
     step = max(1, _TOGETHER // rows.e[0].size)
+    at = few(*runs.Y.shape[1:])
+    runs = Runs(*(part[..., *at] for part in runs))
     blocks = [slice(k, k + step) for k in range(0, len(rows.e), step)]
     found = [_of_block(rows.e[part], rows.m[part], rows, runs, grid) for part in blocks]
     return Spectrum(

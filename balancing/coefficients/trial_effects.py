@@ -6,8 +6,10 @@ import numpy as np
 
 from balancing.coefficients.identifiability import LEVEL, UndeterminedError, significant
 from balancing.coefficients.run_error_estimate import scatter, spare_rows
-from balancing.coefficients.run_errors import Runs
-from balancing.data.reading_errors import mean_variance
+from balancing.coefficients.run_errors import ASSUMED as USUAL_RUN
+from balancing.coefficients.run_errors import Runs, runs_of
+from balancing.data.reading_errors import ASSUMED as USUAL_READING
+from balancing.data.reading_errors import ErrorModel, mean_covariance, mean_variance
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import solution, stretch
@@ -109,6 +111,18 @@ def weak_trials(trials: Trials, W: ComplexArray) -> tuple[str, ...]:
                 "the corrections more certain"
             )
     return tuple(warnings)
+
+
+def nonlinear(trials: Trials, W: ComplexArray) -> str:
+    """Say that runs differ from a linear machine by more than usual errors explain (95 %); else empty."""
+    A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
+    usual = mean_covariance(trials, ErrorModel(USUAL_READING))
+    spare = spare_rows(A, trials.mean, mean_variance(usual))
+    if not spare.dof:
+        return ""
+    floor = USUAL_RUN * float(np.sqrt(np.mean(np.abs(trials.mean) ** 2)))
+    ratio, chance = scatter([spare], runs_of(trials.mean, trials.weights, W), USUAL_RUN, floor)
+    return "" if chance > 1 - LEVEL else f"they differ from it by {ratio:.2g} times what usual errors explain"
 
 
 def check_consistency(trials: Trials, A: ComplexArray, reading: FloatArray, runs: Runs) -> tuple[str, ...]:

@@ -152,18 +152,22 @@ class CheckComparison(Answered):
         return frame([column for column in self._columns() if column.name != "covariance"])
 
     @property
-    def answer(self) -> Answer:
-        """Whether the rotor does what was predicted, what is left, and all readings beside the prediction."""
-        labels = self.labels
-        scale, unit = labels.vibration_scale, labels.vibration_in
+    def headline(self) -> str:
+        """Whether the rotor does what was predicted, and what is left, in a sentence."""
+        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
         before, predicted, achieved = (rms(z) * scale for z in (self.before, self.predicted, self.achieved))
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
         left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
-        judged = f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
+        return f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the rotor does what was predicted, what is left, and all readings beside the prediction."""
+        labels = self.labels
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.achieved[-1])
         mounted = "the proposed corrections" if self.as_proposed else "what its weights table says"
         return Answer(
-            f"{judged} {sentence(self.verdict)}",
+            f"{self.headline} {sentence(self.verdict)}",
             f"Largest in run {self.runs[-1]!r}{largest}",
             self.warnings,
             tables=(f"Check run, mounted: {mounted}.\n{self._readings_text()}",),

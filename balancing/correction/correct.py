@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
-from balancing.coefficients.identifiability import UndeterminedError, check_planes
+from balancing.coefficients.identifiability import REMEDY, UndeterminedError, check_planes
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.unresolved_planes import check_resolution
 from balancing.correction.correction_errors import stack_errors
@@ -32,6 +32,8 @@ from balancing.solvers.conditioning import conditioning
 from balancing.solvers.correction_methods import Fitted, Stack, fit_weights
 from balancing.solvers.error_propagation import region_radius as region_radius
 from rotorid.base.arrays import ComplexArray
+
+TOGETHER = "; each weight alone is uncertain, what they leave together is not"
 
 
 def correct(  # noqa: PLR0913
@@ -179,10 +181,20 @@ def correct(  # noqa: PLR0913
     )
     std, factor = result.mass_std, result.coverage_factor
     widths = None if std is None or factor is None else factor * std
-    result = replace(result, decision=decide_to_mount(inputs, D, widths, soft=soft, remove=remove))
+    result = replace(
+        result,
+        decision=decide_to_mount(
+            inputs, D, widths, soft=soft, remove=remove, unclear=unclear, check_rms=result.check_rms
+        ),
+    )
     warnings, words = influence.warnings + start.warnings, influence.notes
     if result.decision.word == "mount":
-        warnings += unclear + unclear_regions + fitted.warnings + warnings_of(result, felt, alike=not unclear)
+        warnings += (
+            tuple(words.removesuffix(REMEDY) + TOGETHER for words in unclear)
+            + unclear_regions
+            + fitted.warnings
+            + warnings_of(result, felt, alike=not unclear)
+        )
         warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
         words += notes(result) + coarse(influence)
     else:  # the decision says what these would

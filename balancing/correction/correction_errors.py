@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_error_estimate import seen_in
+from balancing.coefficients.run_error_estimate import few, seen_in
 from balancing.coefficients.run_errors import (
     RunErrors,
     run_columns,
@@ -81,18 +81,38 @@ class StackErrors:
         """
         from scipy.special import gammaincinv
 
-        each = self.check_run(D, after).reshape(-1, 2, 2)
+        S, C = after.shape
+        each = self.check_run(D, after)
         further = run_columns(self.run, runs_of(after[None], D[None], self.W)).common
-        joint = sum(self._shared(D, further.reshape(2, -1, *after.shape)), np.zeros((2 * after.size,) * 2))
-        n = np.arange(after.size)
-        joint.reshape(len(n), 2, len(n), 2)[n, :, n] = each
-        a = stretch(after.ravel())
-        mean = float(a @ a + np.trace(joint))
-        variance = 2 * float(np.sum(joint**2)) + 4 * float(a @ joint @ a)
+        speed, run, moved = (F.reshape(S, 2 * C, -1) for F in self._columns(D, further.reshape(2, -1, S, C)))
+        # C is columns that all readings have in common, but for its blocks at a speed
+        wide = np.concatenate((run, moved), axis=2)
+        block = speed @ speed.swapaxes(1, 2) + wide @ wide.swapaxes(1, 2)
+        n = np.arange(C)
+        block.reshape(S, C, 2, C, 2)[:, n, :, n] = each.swapaxes(0, 1)
+        a = stretch(after.ravel()).reshape(S, 2 * C)
+        square, along = wide.swapaxes(1, 2) @ wide, np.einsum("si,sik->sk", a, wide)
+        mean = float(np.sum(a**2) + np.trace(each, axis1=2, axis2=3).sum())
+        squares = np.sum(block**2) - np.sum(square**2) + np.sum(square.sum(axis=0) ** 2)
+        moved_a = np.einsum("si,sij,sj", a, block, a) - np.sum(along**2) + np.sum(along.sum(axis=0) ** 2)
+        variance = 2 * float(squares) + 4 * float(moved_a)
         shape = 1 / (variance / mean**2 + (0 if dof is None else 2 / dof))
         return float(np.sqrt(mean * gammaincinv(shape, 0.95) / shape / after.size))
 
     def _after(self, D: ComplexArray) -> tuple[float, RunErrors]:
+        at = few(*self.Y.shape)
+        each = self.channels.reshape(*self.Y.shape, *self.channels.shape[1:])[at]
+        some = replace(
+            self,
+            W=self.W[at],
+            Y=self.Y[at],
+            channels=each.reshape(-1, *self.channels.shape[1:]),
+            common=None if self.common is None else self.common[:, :, *at],
+            parameters=None if self.parameters is None else self.parameters[:, *at],
+        )
+        return some._seen(D)
+
+    def _seen(self, D: ComplexArray) -> tuple[float, RunErrors]:
         own = np.trace(prediction_covariance(D, self.channels), axis1=1, axis2=2) / 2
         parts = self._parts(np.diag(np.repeat(own, 2)), *self._shared(D, np.zeros((2, 0, *self.Y.shape))))
         return seen_in(self.run, self.Y + self.W @ D, parts, self.W)
@@ -103,13 +123,19 @@ class StackErrors:
 
     def _shared(self, D: ComplexArray, further: AnyArray) -> tuple[FloatArray, ...]:
         """Of Y₀ + W D what is common at a speed, to the run (`further` too), of parameters, (2N, 2N) each."""
+        S, C = self.Y.shape
+        speed, run, moved = (F @ F.T for F in self._columns(D, further))
+        return speed * np.kron(np.eye(S), np.ones((2 * C,) * 2)), run, moved
+
+    def _columns(self, D: ComplexArray, further: AnyArray) -> tuple[FloatArray, ...]:
+        """Columns F of covariances F Fᵀ, (2N, …) each: as `_shared`, at a speed as if common to all."""
         z = np.concatenate(([1.0], D))
         S, C = self.Y.shape
         common = further if self.common is None else np.concatenate((self.common @ z, further), axis=1)
-        run, speed = (stretch(F.T @ F.conj()) for F in common.reshape(2, -1, S * C))
+        run, speed = (stretch(F.T) for F in common.reshape(2, -1, S * C))
         moved = np.zeros((0, S, C)) if self.parameters is None else self.parameters @ z
         columns = stretch(moved.reshape(-1, S * C).T)[:, ::2]
-        return speed * np.kron(np.eye(S), np.ones((2 * C,) * 2)), run, columns @ columns.T
+        return speed, run, columns
 
 
 def stack_errors(

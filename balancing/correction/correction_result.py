@@ -359,16 +359,20 @@ class Correction(Answered):
         if self.mounted is None or self.to_add is None:
             return {"mounted_in_last_run": None, "add_to_mounted": None}
         run, planes, weights = self.mounted
-        added = weight_rows(self.labels, planes, self.to_add)
-        for row, at in zip(added, self.places(planes, self.to_add).tolist(), strict=True):
+        return {
+            "mounted_in_last_run": {"run": run, "weights": weight_rows(self.labels, planes, weights)},
+            "add_to_mounted": self.work_rows(planes, self.to_add),
+        }
+
+    def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
+        """Weights of planes as JSON types, and where to take material away from some."""
+        added = weight_rows(self.labels, planes, weights)
+        for row, at in zip(added, self.places(planes, weights).tolist(), strict=True):
             if row["plane"] in self.remove:
                 row.update(action="remove", remove_at_deg=at)
             elif self.remove:
                 row.update(action="add", remove_at_deg=None)
-        return {
-            "mounted_in_last_run": {"run": run, "weights": weight_rows(self.labels, planes, weights)},
-            "add_to_mounted": added,
-        }
+        return added
 
     def _limits(self) -> dict[str, Any] | None:
         """Of the weights, and of each reading in the order of `residuals`; None where there is none."""

@@ -12,11 +12,12 @@ mounting where the errors eat half of what is promised,
 
     (zᴴ F z − F₀₀)/N ≥ (B − |A z|²/N)/2,
 
-or where fewer planes with weights a third as large leave hardly more. In simulated jobs of one to four
-planes, with errors of up to 2 % and trial weights of 0.3 to 1.5 times the correction, few are told so, and
-what is proposed then truly leaves less than the weights (`test_mount_decision.py`). The
-weighted fit is told so more often than least squares: where planes act alike or readings are few, the most
-likely weights can be far larger than the true ones.
+or where fewer planes with weights a third as large leave hardly more; nor where planes are not determined,
+where 95 of 100 check runs stay only below hardly less than B, or where a run that was read with its weights
+is below that already. In simulated jobs of one to four planes, with errors of up to 2 % and trial weights of
+0.3 to 1.5 times the correction, few are told so, and what is proposed then truly leaves less than the weights
+(`test_mount_decision.py`). The weighted fit is told so more often than least squares: where planes act alike
+or readings are few, the most likely weights can be far larger than the true ones.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from typing import Any, Literal
 import numpy as np
 
 from balancing.coefficients.baseline import Start
-from balancing.coefficients.identifiability import acting_alike, resolution
+from balancing.coefficients.identifiability import REMEDY, acting_alike, resolution
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.trial_effects import CLEAR
+from balancing.coefficients.trial_effects import CLEAR, nonlinear
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.result_columns import rms
@@ -48,6 +49,10 @@ EATEN = 0.5
 """Share of the promised gain (mean square) that errors may eat."""
 FIGHTING, HARDLY = 3.0, 0.1
 """Weights so many times larger than those of fewer planes, which leave hardly more (of the rms before)."""
+HARDLY_BELOW = 0.9
+"""Of the rms before: what 95 of 100 check runs must stay below."""
+GOOD = 1 / 3
+"""Of the rms before: what a run reads that may stay as it is."""
 WORTH = 1.25
 """Of the rms before: what something else may leave at most (95 %) to be proposed."""
 WEAK = 3.0
@@ -91,8 +96,8 @@ class MountDecision:
     Attributes
     ----------
     word
-        "mount", "do not mount" (errors eat what the weights promise), or "measure again" (they do, and runs
-        contradict each other).
+        "mount", "do not mount" (errors eat what the weights promise, planes are not determined, or a run was
+        better), or "measure again" (runs contradict each other besides).
     cause
         A clause; empty: nothing is wrong.
     instead
@@ -170,6 +175,29 @@ class Inputs:
         """Whether errors leave most of what the weights promise."""
         more = choice.error**2 - float(self.forms[1][0, 0].real)
         return more <= 0 or more < EATEN * (self.before**2 - choice.rms**2)
+
+    def better_run(self, promised: float | None, predicted: float) -> tuple[str, float] | None:
+        """Of the runs within the limits the best, and its rms, if that is less than promised (95 %).
+
+        And less than predicted, or `GOOD`: bounds are wide where errors are assumed.
+        """
+        trials, S = self.influence.trials, len(self.influence.speeds)
+        if promised is None or self.start.fresh or trials is None or len(trials.speeds) != S:
+            return None
+        if trials.sensors != self.influence.sensors:
+            return None
+        read, weights = np.abs(trials.mean[:, self.used]), np.abs(trials.weights)
+        inside = np.array([plane in self.names for plane in trials.planes])
+        kept = weights[:, inside].any(axis=1) & ~weights[:, ~inside].any(axis=1)
+        if self.limits is not None:
+            most = dict(zip(self.names, self.limits.max_weight * (1 + 1e-9), strict=True))
+            kept &= (weights <= [most.get(plane, np.inf) for plane in trials.planes]).all(axis=1)
+            kept &= (read <= self.limits.residual).all(axis=(1, 2))
+        sizes = np.where(kept, np.sqrt(np.mean(read**2, axis=(1, 2))), np.inf)
+        best = int(np.argmin(sizes))
+        if sizes[best] >= min(promised, max(predicted, GOOD * rms(self.Y))):
+            return None
+        return trials.runs[best], float(sizes[best])
 
     def most(self, choice: Choice) -> float:
         """Root mean square that these weights leave at most with 95 %."""
@@ -249,6 +277,8 @@ def decide_to_mount(
     *,
     soft: bool = False,
     remove: Sequence[str] = (),
+    unclear: Sequence[str] = (),
+    check_rms: float | None = None,
 ) -> MountDecision:
     """Whether to mount a correction, and what to do instead.
 
@@ -262,13 +292,26 @@ def decide_to_mount(
         Whether they are those of a ridge or truncated.
     remove
         Planes where material is taken away.
+    unclear
+        Clauses that planes are not determined.
+    check_rms
+        Root mean square below which 95 of 100 check runs stay; None: unknown.
     """
     before = inputs.before
     whole = inputs.choice(range(len(weights)), weights)
     fewer = inputs.fewer()
     calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * before]
     fighting = any(_effect(whole, inputs) >= FIGHTING * _effect(c, inputs) for c in calm)
-    if not weights.any() or (inputs.sound(whole) and not fighting):
+    sound = inputs.sound(whole) and not fighting
+    good = inputs.better_run(check_rms, whole.rms) if sound and weights.any() else None
+    if good is not None and check_rms is not None:
+        words = _leave(inputs, *good, check_rms)
+        return MountDecision("do not mount", *words, before, whole.expected, fewer)
+    sure = None if check_rms is None else check_rms / rms(inputs.Y)
+    hardly = sure is not None and sure > HARDLY_BELOW
+    if sure is not None and sure**2 < 1 - EATEN:
+        unclear = ()  # what the weights leave together is well enough known
+    if not weights.any() or (sound and not unclear and not hardly):
         return MountDecision("mount", before=before, expected=whole.expected, choices=fewer)
     contradictions = inputs.influence.contradictions
     instead: tuple[str, ...]
@@ -276,9 +319,28 @@ def decide_to_mount(
         instead = ("Instead: mend the table, or measure these runs again until they agree.",)
         cause = "; ".join((*contradictions, _outlook(whole, inputs)))
         return MountDecision("measure again", cause, instead, before, whole.expected, fewer)
-    cause = "; ".join((*_causes(inputs, weights, widths, remove), _outlook(whole, inputs)))
+    causes = [words.removesuffix(REMEDY) + "; their weights are not determined" for words in unclear]
+    if not sound:
+        causes = _causes(inputs, weights, widths, remove)
+    elif hardly and check_rms is not None:
+        causes.append(f"a check run may still show rms {_shown(inputs.start.labels, check_rms)} (95 %)")
+    cause = "; ".join((*causes, _outlook(whole, inputs)))
     instead = remedies(inputs, fewer, soft=soft)
     return MountDecision("do not mount", cause, instead, before, whole.expected, fewer)
+
+
+def _leave(inputs: Inputs, run: str, reads: float, promised: float) -> tuple[str, tuple[str, ...]]:
+    """Cause and what to do instead where the weights of a run are better than what is promised."""
+    labels, influence = inputs.start.labels, inputs.influence
+    cause = (
+        f"leave those of run {run!r} where they are, with which it reads rms {_shown(labels, reads)}; these "
+        f"promise only below {_shown(labels, promised, 2)} in 95 of 100 check runs"
+    )
+    strange = "; ".join(influence.contradictions)
+    if not strange and influence.trials is not None and influence.error_source != "stated":
+        strange = nonlinear(influence.trials, influence.W)
+    more = "To promise less, add a run with other weights near these."
+    return cause, (f"The runs do not fit one linear machine: {strange}.",) if strange else (more,)
 
 
 def remedies(inputs: Inputs, fewer: Sequence[Choice] | None = None, *, soft: bool = False) -> tuple[str, ...]:

@@ -80,7 +80,7 @@ class Discrete:
         return sum(int(one.counts.sum()) for one in self.mountings if one is not None)
 
 
-def solve_discrete(
+def solve_discrete(  # noqa: PLR0913
     W: ArrayLike,
     Y: ArrayLike,
     planes: Mapping[str, Holes | None] | Sequence[Holes | None],
@@ -90,6 +90,7 @@ def solve_discrete(
     limits: Limits | None = None,
     time_limit: float = 5.0,
     within: float = 1.0,
+    share: float = 0.0,
 ) -> Discrete:
     """The mounting of all planes that leaves the least vibration, or little more with fewer pieces.
 
@@ -111,6 +112,8 @@ def solve_discrete(
     within
         So many times the least objective is good enough for fewer pieces: of the choices within it the one
         of the fewest pieces, and of these the best; 1: the best of all.
+    share
+        Of the objective without weights that is good enough as well, where `within` is above 1.
 
     Raises
     ------
@@ -135,7 +138,7 @@ def solve_discrete(
         raise ValueError(f"there must be holes, or None, for each of the {P} planes")
     arcs = limits.forbidden if limits is not None else ((),) * P
     usable = [_usable(h, a, name) for (name, h), a in zip(named.items(), arcs, strict=True)]
-    return _Joint(task, tuple(named.values()), usable, tuple(named)).best(start, time_limit, within)
+    return _Joint(task, tuple(named.values()), usable, tuple(named)).best(start, time_limit, within, share)
 
 
 def _usable(holes: Holes | None, arcs: Sequence[tuple[float, float]], name: str) -> BoolArray:
@@ -206,7 +209,7 @@ class _Joint:
         amounts = FreeAmounts(holes, usable, heaviest, needed)
         return None if not holes.step and amounts.surround and np.isinf(heaviest) else amounts
 
-    def best(self, start: float, limit: float, within: float = 1.0) -> Discrete:
+    def best(self, start: float, limit: float, within: float = 1.0, share: float = 0.0) -> Discrete:
         """Solve; `solve_discrete` says what it raises."""
         continuous = self._continuous()
         if not self.own:
@@ -239,9 +242,10 @@ class _Joint:
         result = self._placed(found, self.own, near, unexplored)
         if within == 1 or not result.pieces:
             return result
-        enough = max(within * result.objective, _SAME * float(np.linalg.norm(self.y))) ** 2 * _KEPT
+        present = self.task.objective(np.zeros_like(result.weights))
+        enough = max(within * result.objective, share * present, _SAME * float(np.linalg.norm(self.y)))
         until = max(start + limit, time.perf_counter()) + limit
-        few, sure = fewest(q, self.own, self._squares, enough, result.pieces, until, chunk)
+        few, sure = fewest(q, self.own, self._squares, enough**2 * _KEPT, result.pieces, until, chunk)
         if few is None:
             return replace(result, proven=result.proven and sure)
         chosen = self._placed(*few, near, unexplored)

@@ -11,9 +11,10 @@ from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.influence import Influence
 from balancing.correction.correction_errors import stack_errors
 from balancing.correction.correction_result import Correction
+from balancing.data.result_columns import rms
 from balancing.data.trials import Trials
 from balancing.mounting.discrete_weights import solve_discrete
-from balancing.mounting.fewest_pieces import FEW
+from balancing.mounting.fewest_pieces import FEW, LITTLE
 from balancing.mounting.holes import Holes
 from balancing.mounting.mount_result import Mounted
 from balancing.solvers.error_propagation import prediction_covariance
@@ -45,7 +46,8 @@ def mount(
     time_limit
         s, for the proof of the optimum.
     within
-        So many times the least vibration (what the method minimises) is good enough; 1: the least.
+        So many times the least vibration (what the method minimises) is good enough, and so is what a check
+        run with the exact weights hides (95 %), or a fifth of the present vibration; 1: the least.
     on_top
         Whether what is mounted in the last run stays, and pieces are added to it; otherwise it is removed.
 
@@ -93,6 +95,7 @@ def mount(
         limits=correction.limits,
         time_limit=time_limit,
         within=within,
+        share=max(LITTLE, (correction.check_rms or 0.0) / rms(Y)) if Y.any() else 0.0,
     )
     after = Y + (W @ found.weights).reshape(Y.shape)
     after_covariance = None if errors is None else errors.check_run(total + found.weights, after)

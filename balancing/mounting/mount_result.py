@@ -157,7 +157,8 @@ class Mounted(Answered):
         used = columns[0].values
         old, new, free = (labels.vibration(z)[0] for z in (c.before, self.after, c.after))
         left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
-        what = "Mount or remove" if c.remove else "Mount"
+        first = "Mount or remove these pieces:" if c.remove else "Mount these pieces:"
+        first = first if c.sound else "These pieces would leave"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
         lines = [f"Pieces in {labels.weight_in}{stays}:", *self._in_planes(columns)]
         if labels.assumed:
@@ -166,12 +167,17 @@ class Mounted(Answered):
         largest = largest_readings(labels, c.speeds, c.sensors, c.before, self.after)
         lines += ["", f"Largest predicted{largest}", self._proof()]
         return Answer(
-            f"{what} these pieces: {left} (with any weights {small(rms(free), old.max())}).",
+            f"{first} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),
             self.warnings,
             tables=(f"Hole by hole:\n{text(columns, left=2)}",) if used else (),
             more="hole by hole",
         )
+
+    def in_holes(self) -> str:
+        """What is in which hole of each plane, in a line."""
+        planes = map(str.strip, self._in_planes(_columns(self)))
+        return f"{' · '.join(planes)}, in {self.correction.labels.weight_in}"
 
     def _in_planes(self, columns: Sequence[Column]) -> list[str]:
         shown = list(zip(*(column.values for column in columns), strict=True))
@@ -192,7 +198,7 @@ class Mounted(Answered):
             times = "what" if ratio is None else f"{ratio:.3g} times what"
             how = _COUNTED.get(self.correction.method, "rms")
             said.insert(0, f"{few}: {times} {best['pieces']} would leave (--best), {how}.")
-        if np.isfinite(self.plane_by_plane):
+        if 1 <= self.plane_by_plane < np.inf:
             said.append(
                 f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
             )

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from balancing.data.conventions import Labels
-from balancing.mounting.fewest_pieces import FEW
+from balancing.mounting.fewest_pieces import FEW, LITTLE
 from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting, equal_together, mounting
 from balancing.mounting.mountable_vectors import MOST, Attainable, nearest
@@ -203,7 +203,8 @@ def split_on_holes(
     good_enough: float = 0.0,
     within: float = FEW,
 ) -> OnHoles:
-    """`split` and `fewer_pieces` together."""
+    """`split` and `fewer_pieces` together; where `within` is above 1 a fifth of the target is good enough."""
+    good_enough = max(good_enough, LITTLE if within > 1 else 0.0)
     found = split(target, holes, most_pieces=most_pieces, good_enough=good_enough, within=within)
     return OnHoles(found, tuple(fewer_pieces(found)))
 

@@ -249,8 +249,8 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
         found = descend_all(given(W, Y, free.model_error), rivals, SETTLED_DRAWN)
         return min(found, key=lambda end: end.objective).weights
 
-    # drawn from the errors of the readings alone: what explains the residuals is the same in every job
-    covariance, words = _sampled(stack, again, _regular(channels, 0.0))
+    # with what explains the residuals, as the ± without limits are
+    covariance, words = _sampled(stack, again, _regular(channels, free.model_error))
     if free.inflation > 1:
         words += (
             "even without the limits, weights in these planes do not explain the vibration: what would be "

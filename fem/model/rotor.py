@@ -241,6 +241,8 @@ PER_ELEMENT = (
     "poisson_ratio",
     "material_damping",
 )
+SHORTEST = 3000
+"""A neighbour may be this many times as long as an element: float64 loses the stiffness of shorter ones."""
 _MAY_BE_ZERO = ("inner_diameter", "density", "material_damping")
 
 
@@ -271,7 +273,15 @@ def _broadcast(rotor: Rotor) -> list[FloatArray]:
     # Copies: the caller's arrays stay his, ours stay read-only.
     arrays = [np.broadcast_to(array, (n,)).copy() for array in arrays]
     read_only(*arrays)
-    outer, inner = arrays[1], arrays[2]
+    length, outer, inner = arrays[:3]
+    beside = np.concatenate(([0.0], length, [0.0]))
+    short = SHORTEST * length < np.maximum(beside[:-2], beside[2:])
+    if short.any():
+        i = int(np.argmax(short))
+        raise ValueError(
+            f"element {i + 1}: its length, {length[i]:g} m, is less than 1/{SHORTEST} of its longer "
+            "neighbour's, too short for float64; join it with this neighbour"
+        )
     if (inner >= outer).any():
         i = int(np.argmax(inner >= outer))
         raise ValueError(

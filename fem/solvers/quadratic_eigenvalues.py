@@ -20,6 +20,7 @@ _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
 _REAL = 0.1  # |Im λ| below this part of |λ| is no oscillation: log decrement above 62
 _INFINITE = 1e-6  # |μ| below this part of the largest: no mass moves, or too little to be of interest
+_QUIET = 1e-6  # |Re λ| below this part of |λ| comes from work, not from the eigenvalue, which has rounding
 _CLOSE = 1e-6  # relative gap of eigenvalues whose vectors inverse iteration would mix
 
 
@@ -80,6 +81,7 @@ def solve(Q: Quadratic, speeds: FloatArray, m: int, scale: float, *, left: bool 
         others[there] = _inverse_iteration(Q.M, np.swapaxes(D, 1, 2), np.swapaxes(K, 1, 2), values, there)
     for k in _degenerate(values):
         vectors[k] = _by_elimination(A[k], values[k], scale, Q.size)
+    values[there] = _by_work(Q.M, D, K, np.nonzero(there)[0], values[there], vectors[there])
     return Solutions(values, vectors, others, real, still)
 
 
@@ -92,7 +94,15 @@ def all_values(Q: Quadratic, speeds: FloatArray, scale: float) -> tuple[ComplexA
     lam, finite = _values(np.asarray(np.linalg.eigvals(_companion(Q.M, D, K, scale)), dtype=complex), scale)
     size = np.abs(lam)
     moving = finite & (size >= _STILL * scale)
-    return np.where(moving, lam, -scale), moving & (np.abs(lam.imag) > _REAL * size)
+    oscillates = moving & (np.abs(lam.imag) > _REAL * size)
+    quiet = oscillates & (np.abs(lam.real) < _QUIET * size)
+    for k in np.flatnonzero(quiet.any(axis=1)):
+        one = slice(k, k + 1)
+        vectors = _inverse_iteration(Q.M, D[one], K[one], lam[one], quiet[one])
+        lam[k, quiet[k]] = _by_work(
+            Q.M, D[one], K[one], np.zeros(len(vectors), int), lam[k, quiet[k]], vectors
+        )
+    return np.where(moving, lam, -scale), oscillates
 
 
 def polish(
@@ -142,7 +152,30 @@ def polish(
         step = np.einsum("br,br->b", test, vectors) / np.einsum("br,br->b", test, new)
         values = values - step
         vectors = new / np.linalg.norm(new, axis=1)[:, None]
-    return values, vectors, np.abs(step) / np.abs(values)
+    return _by_work(Q.M, D, K, at, values, vectors), vectors, np.abs(step) / np.abs(values)
+
+
+def _by_work(
+    M: FloatArray, D: AnyArray, K: AnyArray, at: IndexArray, values: ComplexArray, vectors: ComplexArray
+) -> ComplexArray:
+    """Values whose small real parts have the digits of what damps and drives them, however little that is.
+
+    With λ = σ + iω the imaginary part of xᴴ (λ² M + λ D + K) x = 0 is 2 σ ω m + ω Re d + σ Im d + Im k = 0:
+    what does no work over an orbit, however large, is not in it.
+    """
+    values = values.copy()
+    quiet = np.abs(values.real) < _QUIET * np.abs(values)
+    for k in np.unique(at[quiet]):
+        mine = np.flatnonzero(quiet & (at == k))
+        X, omega = vectors[mine], values[mine].imag
+
+        def form(A: AnyArray, X: ComplexArray = X) -> ComplexArray:
+            return np.asarray(np.einsum("br,br->b", X.conj(), X @ A.T))
+
+        damping, driving = form((D[k] + D[k].conj().T) / 2).real, form((K[k] - K[k].conj().T) / 2).imag
+        inertia = 2 * omega * form(M).real + form((D[k] - D[k].conj().T) / 2).imag
+        values[mine] = -(omega * damping + driving) / inertia + 1j * omega
+    return values
 
 
 def _dynamic(M: FloatArray, D: AnyArray, K: AnyArray, at: IndexArray, values: ComplexArray) -> ComplexArray:

@@ -20,8 +20,10 @@ from fem.solvers.quadratic_eigenvalues import all_values
 from fem.solvers.whirl_basis import reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
-GROWTH = 1e-7  # Re λ / |λ| above which a mode is said to grow: an undamped one has rounding there
-AWAY = 1e-6  # a real eigenvalue above this part of the reference frequency runs away
+GROWTH = 1e-14  # Re λ / |λ| above which a mode is said to grow: rounding of what damps and drives it
+_DOUBT = 1e-7  # the same within which ranges are not decided as a whole
+_AWAY = 1e-6  # a real eigenvalue above this part of the reference frequency runs away
+_BESIDE = 0.1  # weight of such an eigenvalue beside the growth of motions that oscillate
 _FREE = 1e-3  # part of the lowest bending frequency of a free rotor below which motions are rigid
 _COMPLETE = 40  # unknowns per plane up to which the basis is the whole space
 _LEAST = 8  # modes of the reference rotor
@@ -82,7 +84,7 @@ def bases(P: Planes, speeds: FloatArray, highest: float) -> Bases:
 
 
 def largest_growth(found: Bases, speeds: FloatArray) -> FloatArray:
-    """Largest Re λ / |λ|, shape (S,); of motions that do not oscillate Re λ by the scale."""
+    """Largest Re λ / |λ|, shape (S,); of motions that do not oscillate Re λ by the scale, weighted."""
     out = np.empty(speeds.size)
     for start in range(0, speeds.size, _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -90,7 +92,7 @@ def largest_growth(found: Bases, speeds: FloatArray) -> FloatArray:
     return out
 
 
-def growing_at(found: Bases, speeds: FloatArray, level: float = GROWTH) -> BoolArray:
+def growing_at(found: Bases, speeds: FloatArray) -> BoolArray:
     """At which speeds a mode grows, shape (S,).
 
     Parameters
@@ -99,8 +101,6 @@ def growing_at(found: Bases, speeds: FloatArray, level: float = GROWTH) -> BoolA
         The equations.
     speeds
         rad/s, ascending, shape (S,).
-    level
-        Re λ / |λ| above which it does.
     """
     out = np.zeros(speeds.size, dtype=np.intp)
     if speeds.size > _FEW:
@@ -117,20 +117,24 @@ def growing_at(found: Bases, speeds: FloatArray, level: float = GROWTH) -> BoolA
             np.concatenate(([0.0], np.abs(lam.imag[near])[order])),
             np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))),
         )
-        out = _certified(found.coarse, speeds, cuts, margins, found.low, level)
+        out = _certified(found.coarse, speeds, cuts, margins, found.low, -_DOUBT)
+        rest = np.flatnonzero(out >= 0)
+        if rest.size:
+            surely = _certified(found.coarse, speeds[rest], cuts, margins, found.low, _DOUBT)
+            out[rest] = np.maximum(surely, 0)
         # The forces that drive a mode are linear in speed between the cuts, and so, nearly, is its growth.
-        high = np.asarray((np.where(low, -1.0, rates(found, lam, oscillates)) > level).any(axis=1))
+        high = np.asarray((np.where(low, -1.0, rates(found, lam, oscillates)) > -_DOUBT).any(axis=1))
         at = np.searchsorted(cuts, speeds)
         out[high[at] | high[np.maximum(at - 1, 0)]] = 0
     left = np.flatnonzero(out == 0)
     if left.size:
-        out[left] = np.where(largest_growth(found, speeds[left]) > level, 1, -1)
+        out[left] = np.where(largest_growth(found, speeds[left]) > GROWTH, 1, -1)
     return np.asarray(out > 0)
 
 
 def rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
     """Growth of motions as `largest_growth` counts it; −1 where the basis does not know them."""
-    rate = np.where(oscillates, lam.real / np.abs(lam), lam.real / found.scale * (GROWTH / AWAY))
+    rate = np.where(oscillates, lam.real / np.abs(lam), _BESIDE * (lam.real / found.scale - _AWAY))
     # What rounding makes of the motions of a free rotor, which nothing drives, does not count.
     known = np.abs(lam) > (0.0 if found.fine.P.rotor.supports else _FREE * found.scale)
     return np.where(known & (np.abs(lam.imag) <= found.highest), rate, -1.0)

@@ -33,6 +33,8 @@ from rotorid.base.text import capital, counted, cut
 LINES, COLUMNS = 24, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 """What differs between two remarks of a kind: names and numbers."""
+_QUANTITY = re.compile(r"(only |at most )?([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?= ?%| (?!rpm|Hz|rad/s)[^\W\d])")
+"""A number with a unit, and words that make a small one worse; a speed only says where."""
 _SIGN, _KEPT = re.compile(r"(?<=[±→]) "), "\u00a0"
 
 
@@ -112,8 +114,10 @@ def together(answers: Iterable[Answer]) -> Answer:
 
 
 def kinds(clauses: Iterable[str]) -> list[str]:
-    """One clause of each kind, and how many more there are.
+    """The worst clause of each kind, by its quantities (else the first), and how many more there are.
 
+    >>> kinds(["plane 'A': 3 g over", "plane 'B': 300 g over"])
+    ["plane 'B': 300 g over (and 1 more of this kind)"]
     >>> kinds(["line 3: no mass", "line 5: no mass", "no weight", "line 3: no mass"])
     ['line 3: no mass (and 1 more of this kind)', 'no weight']
     """
@@ -121,9 +125,20 @@ def kinds(clauses: Iterable[str]) -> list[str]:
     for clause in dict.fromkeys(clauses):
         found.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
     return [
-        same[0].rstrip(".") + (f" (and {len(same) - 1} more of this kind)" if same[1:] else "")
+        _worst(same).rstrip(".") + (f" (and {len(same) - 1} more of this kind)" if same[1:] else "")
         for same in found.values()
     ]
+
+
+def _worst(same: list[str]) -> str:
+    """The clause whose quantity that differs most, in ratio, is the largest (after "only" the smallest)."""
+    each = [_QUANTITY.findall(re.sub(r"'[^']*'", "", clause)) for clause in same]
+    worst, most = same[0], 1.0
+    for column in zip(*each, strict=False):
+        sizes = [max(abs(float(number)), 1e-300) ** (-1 if less else 1) for less, number in column]
+        if max(sizes) / min(sizes) > most:
+            worst, most = same[sizes.index(max(sizes))], max(sizes) / min(sizes)
+    return worst
 
 
 def _remark(word: str, clause: str) -> list[str]:

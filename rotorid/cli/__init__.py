@@ -37,6 +37,7 @@ from rotorid.cli.commands import (
     unbalance,
     vectors,
 )
+from rotorid.cli.common_options import written_help
 from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
 from rotorid.cli.terminal import markup_mode
@@ -118,6 +119,9 @@ def _rotorid(
     """
     if ctx.invoked_subcommand is None:
         typer.echo(_overview())
+
+
+_rotorid.__doc__ = written_help(_rotorid)
 
 
 def _overview() -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import functools
 import inspect
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin, get_type_hints
@@ -72,6 +74,7 @@ def command(
             given["to"] = _taken(Destination, given)
             function(**given)
 
+        wrapper.__doc__ = written_help(function)
         only = inspect.Parameter.KEYWORD_ONLY
         told = _in_panels([parameter.replace(kind=only) for parameter in told], panels or {}, to)
         wrapper.__signature__ = inspect.Signature(told)  # type: ignore[attr-defined]
@@ -133,11 +136,20 @@ def _type(kind: type, annotation: str) -> Any:  # noqa: ANN401 - a type, for typ
     return known if get_origin(known) is Literal else str
 
 
+def written_help(of: Any) -> str:  # noqa: ANN401 - a function or a class
+    """The docstring, which is the help; `python -OO` drops it, the file has it still."""
+    if sys.flags.optimize < 2:
+        return of.__doc__ or ""
+    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(of))).body
+    assert isinstance(definition, ast.FunctionDef | ast.ClassDef)
+    return ast.get_docstring(definition) or ""
+
+
 def _documentation(kind: type) -> dict[str, tuple[str | None, str]]:
     """Metavar and text of each attribute, from lines `name : METAVAR` and the indented ones below."""
     found: dict[str, tuple[str | None, str]] = {}
     name = ""
-    for line in (inspect.getdoc(kind) or "").partition("----------\n")[2].splitlines():
+    for line in inspect.cleandoc(written_help(kind)).partition("----------\n")[2].splitlines():
         if line.startswith(" "):
             metavar, text = found[name]
             found[name] = metavar, f"{text} {line.strip()}".strip()

@@ -16,6 +16,7 @@ Doedel, H. B. Keller, J. P. Kernévez, Int. J. Bifurcation Chaos 1 (1991) 745.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -143,10 +144,13 @@ class Periodic:
         What moves.
     turns
         Revolutions in one period; 0 for a period of its own, of a rotor without unbalance and bow.
+    until
+        When the search has to end, by `time.monotonic`.
     """
 
     system: MotionSystem
     turns: int
+    until: float = np.inf
 
     @property
     def free(self) -> int:
@@ -196,8 +200,10 @@ class Periodic:
         Raises
         ------
         numpy.linalg.LinAlgError
-            Where they have no solution, or a force none (a wall).
+            Where they have no solution, or a force none (a wall), or the limit of time has come.
         """
+        if time.monotonic() > self.until:
+            raise np.linalg.LinAlgError("time is up")
         V, h, n = orbit.velocities, orbit.step, orbit.start.size
         N = len(V)
         angles = self.angles(N)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
@@ -54,6 +55,8 @@ class PeriodicMotion:
         The first is synchronous, or, without unbalance and bow, at rest.
     warnings
         Clauses.
+    tried
+        Where motions were sought, in sentences.
     """
 
     system: MotionSystem
@@ -61,6 +64,7 @@ class PeriodicMotion:
     high: float
     branches: tuple[Branch, ...]
     warnings: tuple[str, ...]
+    tried: str
 
 
 def periodic_motion(
@@ -70,6 +74,7 @@ def periodic_motion(
     *,
     subsynchronous: int | None = None,
     limit_cycle: bool = False,
+    max_seconds: float = np.inf,
 ) -> PeriodicMotion:
     """Periodic motions over a range of speeds, their stability and bifurcations.
 
@@ -84,6 +89,8 @@ def periodic_motion(
         the motion in time comes to at a speed of the range.
     limit_cycle
         Self-excited motions from the Hopf points of the rotor at rest.
+    max_seconds
+        Limit of time; what is known by then is given, with a warning.
 
     Raises
     ------
@@ -97,13 +104,15 @@ def periodic_motion(
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
-    search = _Search(system, low, high, forced)
+    search = _Search(system, low, high, forced, time.monotonic() + max_seconds)
     branches, problems = search.main()
     warnings = [] if forced else ["there is no unbalance and no bow: what is synchronous is rest"]
     turns = 0 if limit_cycle else subsynchronous if forced else None
     if turns is not None:
         branches += search.begun(turns, branches)
     warnings += search.complete(branches, turns) if system.forces else []
+    if search.late and not branches:
+        raise ValueError(f"no periodic motion was found in {max_seconds:.6g} s: raise --max-seconds")
     if not branches:
         equilibrium(system, low)  # its message is the better one
         raise ValueError(f"no periodic motion was found to begin with, {listing(problems + warnings, 'and')}")
@@ -111,7 +120,10 @@ def periodic_motion(
         warnings.append("no limit cycle found: no Hopf point, and motion in time comes to none")
     if subsynchronous and not any(b.turns == subsynchronous for b in branches):
         warnings.append(f"no motion of {subsynchronous} revolutions was found")
-    return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings + _doubts(branches)))
+    warnings += _doubts(branches)
+    if search.late:
+        warnings.insert(0, f"the search was stopped after {max_seconds:.6g} s (--max-seconds)")
+    return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings), search.tried)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +134,29 @@ class _Search:
     low: float
     high: float
     forced: bool
+    until: float
+    in_time_at: list[float] = field(default_factory=list)
+
+    def problem(self, turns: int) -> Periodic:
+        """What a motion of so many revolutions is sought of."""
+        return Periodic(self.system, turns, self.until)
+
+    @property
+    def late(self) -> bool:
+        """Whether the limit of time has come."""
+        return time.monotonic() > self.until
+
+    @property
+    def tried(self) -> str:
+        """Where motions were sought, in sentences."""
+        at, in_time = (
+            f"{listing([f'{speed * RPM:.6g}' for speed in speeds], 'and')} rpm"
+            for speeds in ((self.low, self.high), self.in_time_at)
+        )
+        start = "at rest" if self.forced else "with a large whirl"
+        words = f"Motions were followed from rest at {at}"
+        words += f"; motion in time was begun {start} at {in_time}" if self.in_time_at else ""
+        return f"{words}. Other motions were not sought."
 
     def follow(self, problem: Periodic, start: Start) -> list[Branch]:
         """The branch, if it begins."""
@@ -133,7 +168,7 @@ class _Search:
 
     def main(self) -> tuple[list[Branch], list[str]]:
         """From rest at the lowest speed upwards and, if that is another branch, at the highest downwards."""
-        problem, found, said = Periodic(self.system, 1), list[Branch](), list[str]()
+        problem, found, said = self.problem(1), list[Branch](), list[str]()
         for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
             try:
                 start = at_speed(problem, self.linear(speed))
@@ -155,7 +190,7 @@ class _Search:
 
     def begun(self, turns: int, branches: list[Branch]) -> list[Branch]:
         """Limit cycles that begin at Hopf points, or motions of two revolutions at period doublings."""
-        problem, found = Periodic(self.system, turns), list[Branch]()
+        problem, found = self.problem(turns), list[Branch]()
         begin = {0: (HOPF, self.cycle), 2: (DOUBLING, self.doubled)}
         kind, start = begin.get(turns, ("", self.doubled))
         for point in (b for branch in branches for b in branch.bifurcations if b.kind == kind):
@@ -176,12 +211,15 @@ class _Search:
                 end = self.reached(speed)
             except ValueError as problem_met:
                 end = f"is not known: {problem_met}"
+            if self.late:
+                break
+            self.in_time_at.append(speed)
             if isinstance(end, Orbit):
                 own = round(end.period * speed / (2 * np.pi)) if self.forced else 0
                 if _known(own, end, branches):
                     continue
                 if own in (1, turns):
-                    problem = Periodic(self.system, own)
+                    problem = self.problem(own)
                     ways = [sign for sign, last in ((1.0, self.high), (-1.0, self.low)) if speed != last]
                     more = [b for way in ways for b in self.follow(problem, at_speed(problem, end, way))]
                     branches += more
@@ -213,6 +251,8 @@ class _Search:
             q = q + _FAR * whirl_at_rest(self.system, q, speed)[1].real
         sizes, turn, period = list[float](), 2 * np.pi / speed, 0.0
         for _ in range(_BLOCKS):
+            if self.late:
+                return _NOTHING
             motion = run(self.system, (speed, speed), _TURNS * turn, (q, v))
             if motion.stopped:
                 return f"from rest ends: {motion.stopped.split(' after ')[0]}"
@@ -285,6 +325,22 @@ def repeating(
         return repeating(system, speed, 2 * np.pi / speed, q, v)
     away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
     return at if away.max() < _NEAR else None
+
+
+def departing(system: MotionSystem, turns: int, left: Bifurcation) -> float:
+    """Frequency, rad/s, of the motion by which a motion of so many revolutions is left at a bifurcation.
+
+    A multiplier gives it but for its sign and multiples of 2π / T: these are of the largest part of the
+    disturbance, its eigenvector followed through the period T.
+    """
+    orbit, direction = left.point.orbit, left.direction
+    states = Periodic(system, turns).linearised(orbit).states[..., : direction.size] @ direction
+    places = np.ravel([system.index(node) for node in system.nodes])
+    moved, N = states[:-1, places], len(states) - 1
+    phase = float(np.angle(np.vdot(moved[0], states[-1, places])))
+    parts = np.fft.fft(moved * np.exp(-1j * phase * np.arange(N) / N)[:, None], axis=0)
+    k = np.fft.fftfreq(N, 1 / N)[np.linalg.norm(parts, axis=1).argmax()]
+    return float(abs(phase + 2 * np.pi * k) / orbit.period)
 
 
 def _forced(system: MotionSystem) -> bool:

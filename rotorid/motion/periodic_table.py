@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +15,7 @@ from rotorid.base.result import Column, rows
 from rotorid.base.rpm import RPM
 from rotorid.base.text import ROUNDING
 from rotorid.motion.continuation import FOLD, HOPF, TORUS, Bifurcation, Branch, Point
-from rotorid.motion.periodic import PeriodicMotion, whirl_at_rest
+from rotorid.motion.periodic import PeriodicMotion, departing, whirl_at_rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +119,7 @@ class Readings:
         if not branch.turns:
             return math.tau / orbit.period / orbit.speed
         if bifurcation.kind == TORUS:
-            first = min(bifurcation.point.multipliers, key=lambda one: abs(abs(one) - 1))
-            return abs(cmath.phase(first)) / math.tau / branch.turns
+            return departing(self.motion.system, branch.turns, bifurcation) / orbit.speed
         return math.nan
 
     def to_dict(self) -> dict[str, Any]:
@@ -149,6 +147,7 @@ class Readings:
                     {"speed_rad_s": speed, "from_m": before, "to_m": after}
                     for speed, before, after in self.jumps
                 ],
+                "tried": self.motion.tried,
                 "warnings": self.motion.warnings,
             }
         )

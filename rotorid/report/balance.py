@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from balancing.correction.correction_words import method_words
 from rotorid.base.rpm import RPM
 from rotorid.base.text import sentence
@@ -53,7 +55,8 @@ def balance_report(
         only the sheet shows under the key "sheet".
     parts
         What the document is made of, by its keys: "" (the `Correction`), and, None where there is none,
-        "mounting" (`Mounted`), "verdict" (`Verdict`, whose tolerances are drawn), "trade_off" (`TradeOff`).
+        "mounting" (`Mounted`), "left_to_do" (`LeftToDo`), "verdict" (`Verdict`, whose tolerances are drawn),
+        "trade_off" (`TradeOff`).
     influence, job
         Coefficients and job of the correction.
     provenance
@@ -76,7 +79,7 @@ def balance_report(
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
-    shown = result
+    shown, left = result, parts["left_to_do"]
     if mounted is not None:
         shown = replace(result, after=mounted.after, after_covariance=mounted.after_covariance)
     text: dict[str, Any] = {
@@ -91,6 +94,11 @@ def balance_report(
         "speed": labels.speed_in,
         "speed_scale": 1.0 if labels.speed_unit == "rpm" else units.SPEED[labels.speed_unit].scale / RPM,
     }
+    discs = [] if left is not None else _discs(result, job, mounted, verdict, text["seen"])
+    if left is not None and left.word == "trim":
+        add = dict(zip(left.planes, left.trim.tolist(), strict=True))
+        trim = replace(left.correction, weights=np.array([add[plane] for plane in left.correction.planes]))
+        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, None, text["seen"])
     return render_report(
         "balance.html",
         whole,
@@ -109,7 +117,7 @@ def balance_report(
             conventions_explained.phase_figure(labels),
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
-        discs=_discs(result, job, mounted, verdict, text["seen"]),
+        discs=discs,
         residual_figure=inline_svg(
             residual_figure(shown),
             "Vibration before and predicted after",
@@ -118,7 +126,7 @@ def balance_report(
         influence_planes=influence.planes,
         several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
         forbidden=result.limits is not None and any(result.limits.forbidden),
-        unsplit=[p for p in result.planes if p in job.holes] if mounted is None else [],
+        unsplit=[p for p in result.planes if p in job.holes] if mounted is None and left is None else [],
     )
 
 

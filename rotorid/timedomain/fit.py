@@ -11,6 +11,7 @@ from rotorid.base.registry import find
 from rotorid.regression.prior import Prior, prior_rows
 from rotorid.regression.search import inside
 from rotorid.timedomain.fit_diagnostics import judge
+from rotorid.timedomain.integration import taylor
 from rotorid.timedomain.integration.simulate import SimulationError
 from rotorid.timedomain.methods.fit_methods import METHODS, Search, Trajectories
 from rotorid.timedomain.methods.iteration_history import Path, Stop, half_square
@@ -22,8 +23,6 @@ from rotorid.timedomain.models.several_records import for_copies, recorded_start
 from rotorid.timedomain.residual_tests import output_errors, settled
 from rotorid.timedomain.result import Fit
 
-SECONDS = 60.0
-"""Of a search, by default."""
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""
 Searching = Callable[[Problem, FloatArray], Path]
@@ -48,7 +47,7 @@ def fit(  # noqa: PLR0913
     rtol: float = RTOL,
     seed: int = 0,
     weigh: bool = False,
-    max_seconds: float = SECONDS,
+    max_seconds: float = np.inf,
     ridge: float = 0.0,
 ) -> Fit:
     """Estimate the parameters of a model from time records.
@@ -88,7 +87,8 @@ def fit(  # noqa: PLR0913
         Estimate the standard deviation of each output from its residuals and weigh by it, until it stays.
         Without stated errors all samples count alike otherwise, whatever their unit.
     max_seconds
-        Limit of time of the search; what it has found by then is given, without intervals.
+        Limit of time of the search; what it has found by then is given, without intervals. Without it the
+        number of evaluations alone is limited, by `max_iterations`.
     ridge
         λ of a ridge towards the starting values, as `rotorid.regression.prior` has it.
 
@@ -142,12 +142,13 @@ def fit(  # noqa: PLR0913
 
     search = Search(way, limits, loss, kind, pieces, max_iterations, Stop(tolerance))
     begins = spread_starts(begin, limits, starts, seed)
-    path, minima = search_all(search, begins, problem)
-    if weigh:
-        problem, path, minima = _weighed(search, problem, (path, minima), prior, begins)
-    problem.limit = np.inf  # of the search alone
-    judged = judge(problem, path, loss)
-    simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
+    with taylor.learning(problem.models):
+        path, minima = search_all(search, begins, problem)
+        if weigh:
+            problem, path, minima = _weighed(search, problem, (path, minima), prior, begins)
+        problem.limit = np.inf  # of the search alone
+        judged = judge(problem, path, loss)
+        simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
     warnings = judged.warnings
     if len(minima) > 1:
         warnings = (*warnings, f"{len(minima)} different minima were found; the best is given, see minima")

@@ -76,6 +76,7 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     r = found.residuals if draft.prior is None else draft.prior.best  # of the data alone
     seen = correlation(problem, r)
     poor = misfit(problem, found.dof, r, loss)
+    widening = 1.0 if poor or seen is None else seen.widening
     draft.note(poor, spoils=True)
     if not poor:
         draft.note("" if seen is None else seen.words(), *_chi_words(found))
@@ -83,12 +84,23 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     if draft.reliable:
         draft.note(*_pulses(problem, found.solution), spoils=True)
     draft.note(*_begins_later(problem))
-    if not draft.reliable:
-        curved = found.curved and tuple(replace(c, std=None) for c in found.curved)
-        found = replace(found, covariance=None, solution_covariance=None, curved=curved)
+    if not draft.reliable or widening > 1:
+        found = _widened(found, widening if draft.reliable else np.nan)
     neighbours = None if seen is None else seen.neighbours
     change, warnings = draft.integration_change, tuple(draft.warnings)
-    return Judgement(found, draft.reliable, warnings, change, neighbours, draft.prior, draft.normal_matrix)
+    reliable = draft.reliable and widening == 1
+    return Judgement(found, reliable, warnings, change, neighbours, draft.prior, draft.normal_matrix)
+
+
+def _widened(found: Estimate, factor: float) -> Estimate:
+    """With standard deviations so many times as large; NaN: without any."""
+    parts = [found.covariance, found.solution_covariance]
+    covariances = [None if np.isnan(factor) or C is None else C * factor**2 for C in parts]
+    curved = found.curved and tuple(
+        replace(one, std=None if np.isnan(factor) or one.std is None else one.std * factor)
+        for one in found.curved
+    )
+    return replace(found, covariance=covariances[0], solution_covariance=covariances[1], curved=curved)
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:

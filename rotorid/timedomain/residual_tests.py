@@ -50,11 +50,16 @@ class Correlation:
     probability: float
     factor: float
 
+    @property
+    def widening(self) -> float:
+        """By what intervals are multiplied; 1 where the residuals may be white, or it does not matter."""
+        return self.factor if self.probability < 1e-4 and self.factor > 1.2 else 1.0
+
     def words(self) -> str:
         """A warning, or nothing."""
         if not self.probability < 1e-4:
             return ""
-        longer = f": intervals should be about {self.factor:.2g} times as wide" if self.factor > 1.2 else ""
+        longer = f": intervals were made {self.widening:.2g} times as wide" if self.widening > 1 else ""
         return (
             "the residuals are not random: those of neighbouring samples are correlated "
             f"({self.neighbours:.2f}, Durbin–Watson {2 - 2 * self.neighbours:.2f}){longer}. Either the noise "

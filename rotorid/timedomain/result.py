@@ -44,7 +44,8 @@ class Fit(Answered, Path):
         Values, covariance, rank, combinations; residuals (model − record, over the stated standard deviations
         if there are any), record by record, output by output. No covariance where intervals would mislead.
     reliable
-        Whether a minimum was reached that describes the record: otherwise there are no intervals.
+        Whether a minimum was reached that describes the record, with residuals that are not in order:
+        otherwise there are no intervals, or such as were widened.
     warnings
         What must be known before the numbers are used.
     simulations
@@ -85,6 +86,11 @@ class Fit(Answered, Path):
     def model(self) -> OdeModel:
         """Of the first record."""
         return self.models[0]
+
+    @property
+    def described(self) -> bool:
+        """Whether the model describes the record: otherwise there are no intervals."""
+        return self.reliable or self.estimate.covariance is not None
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -159,14 +165,14 @@ class Fit(Answered, Path):
         prior, judged = self.prior, self.estimate.describe_rank()
         own = self.estimate.told(self.at_bounds, prior.why if prior else {})
         own = replace(own, judgement=prior.judgement(own.judgement)) if prior else own
-        said = own.judgement if self.reliable else f"NO intervals, see why. {own.judgement}"
+        said = own.judgement if self.described else f"NO intervals, see why. {own.judgement}"
         if not self.converged:  # nothing is said of a place that is no minimum
             said = "No estimates: the values are where the search stopped."
         found = [own.found, f"\n  {self.method}, integrator {self.integrator}: {self.message}"]
         found.append(f"  residual rms {self.residual_rms:.4g}")
         data = np.concatenate([values for record in self.records for values in record.outputs.values()])
         size = float(np.sqrt(np.nanmean(data**2)))
-        if self.reliable and size > 0:
+        if self.described and size > 0:
             left = self.residual_rms / size
             said += f"\nThe model leaves {percent(left)} % of the record (rms)."
         if self.errors:
@@ -179,7 +185,7 @@ class Fit(Answered, Path):
             said,
             "\n".join(found),
             tuple(w for w in self.warnings if w != judged and not w.startswith(self.message)),
-            own.notes if self.reliable or self.estimate.dof <= 0 else (),
+            own.notes if self.described or self.estimate.dof <= 0 else (),
             (self.normal_matrix.text(),) if self.normal_matrix else (),
             "the normal matrix",
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
 from rotorid.base.answer import Answer, together
+from rotorid.base.text import sentence
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.input_checks import check_choices, file_of
 from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
         Trials,
         Verdict,
     )
+    from balancing.mounting.left_to_do import LeftToDo
     from rotorid.base.registry import Method
     from rotorid.report.equations import Equations
     from rotorid.tables import Job
@@ -98,7 +101,8 @@ class BalanceOptions:
         Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
     split
         Choose pieces in the holes of the job, all planes together: the fewest that leave at most 1.2 times
-        the least vibration (a picture of discs).
+        the least vibration, a fifth of the present one, or what a check run does not show (a picture of
+        discs).
     best
         The pieces that leave the least, however many they are.
     split_seconds : SECONDS
@@ -170,6 +174,8 @@ class Balance(Parts):
     mounted, check, verdict, tolerance, subsets, curve, history
         Pieces in holes, check runs beside their prediction, what limits and tolerances say, the tolerance
         itself, choices of planes, residual against total weight, all runs; None where there is nothing.
+    left
+        What is left to do after the check run.
     next_trial
         Of a calibrated rotor: the trial run that would tell most.
     of_type
@@ -187,6 +193,7 @@ class Balance(Parts):
     subsets: Subsets | None
     curve: TradeOff | None
     history: History | None
+    left: LeftToDo | None = None
     next_trial: NextTrial | None = None
     of_type: TypeKnowledge | None = None
 
@@ -197,6 +204,7 @@ class Balance(Parts):
             "": self.result,
             "mounting": self.mounted,
             "check": self.check,
+            "left_to_do": self.left,
             "verdict": self.verdict,
             "best_planes": self.subsets,
             "trade_off": self.curve,
@@ -213,24 +221,37 @@ class Balance(Parts):
         weights, sound = self.result.answer, self.result.sound
         if needs_trial_run(self.job, self.influence):
             weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-        if sound and (self.check or self.mounted):
+        if self.left is not None:
+            return self._after_check(self.left)
+        if sound and self.mounted:
             weights = replace(weights, judgement="")
         if self.mounted:
             weights = replace(weights, found="", tables=(weights.found, *weights.tables))
-        elif self.check:
-            first, _, predicted = weights.found.partition("\n\n")
-            weights = replace(weights, found=first, tables=(predicted, *weights.tables))
-        judged = [part.answer for part in (self.verdict, self.check, self.mounted) if part]
+        judged = [part.answer for part in (self.verdict, self.mounted) if part]
         asked = [part.answer for part in (self.subsets, self.curve, self.history) if part]
         found = together([*judged, weights, *asked] if sound else [weights, *judged, *asked])
         notes = list(found.notes)
-        if self.check:
-            notes.insert(0, "--refine adds the check run, and gives the trim")
         if self.next_trial is not None:
             notes.insert(0, self.next_trial.words)
         if self.result.limits is not None and (self.subsets or self.curve):
             notes.append("the comparison of planes and the trade-off do not look at the limits")
         return replace(found, notes=tuple(notes))
+
+    def _after_check(self, left: LeftToDo) -> Answer:
+        """The verdict and what is left to do; the weights of the bare rotor are tables."""
+        limits = [] if self.verdict is None else [self.verdict.answer]
+        first = [one.judgement for one in (*limits, left.answer)]
+        cause, pieces = [], self.job.check_pieces
+        if self.check is not None:
+            first.insert(-1, self.check.headline)
+            cause.append(sentence(self.check.verdict))
+        if pieces is not None:
+            first.append(f"Taken to be mounted, by --split: {pieces.in_holes()}; else state check_weights.")
+        behind = [part.answer for part in (self.mounted, self.result) if part]
+        tables = [replace(one, found="", tables=(one.found, *one.tables)) for one in behind]
+        asked = [part.answer for part in (self.check, self.subsets, self.curve, self.history) if part]
+        found = together([left.answer, *limits, *asked, *tables])
+        return replace(found, judgement="\n".join([" ".join(first), *cause]))
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""
@@ -247,8 +268,9 @@ class Balance(Parts):
         """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""
         from balancing.plots import correction_polar, discs, tolerances, trade_off_curve
 
-        if self.mounted is not None:
-            return discs.mounted_discs(self.mounted)
+        pieces = self.mounted if self.left is None else self.left.pieces
+        if pieces is not None:
+            return discs.mounted_discs(pieces)
         below, verdict = None, self.verdict
         if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
             below = partial(tolerances.residuals, verdict, t=self.tolerance)
@@ -312,7 +334,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     _check(options)
     source = _source(job, options)
     files = source if isinstance(source, JobSource) else None
-    read = with_contradiction(_read(source, options))
+    read = _with_pieces(with_contradiction(_read(source, options)), options)
     known, of_type = _choose(read, options)
     influence = known[0]
     planes, subsets = _planes(read, known, options)
@@ -321,17 +343,23 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         result = of_type.judged(result)
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
-    mounted = _mount(result, read, known, options) if options.split else None
+    room = bool(read.holes) or read.check_pieces is None or not options.refine
+    mounted = _mount(result, read, known, options) if options.split and room else None
     checked = None if options.refine else read.check
     tolerance = _tolerance(result.planes, options)
+    check = None if checked is None else compare_check(result, checked, *known)
+    if check is not None:
+        check = replace(check, as_proposed=not read.check_mounted)
+    verdict = _judge(result, influence, read, tolerance, mounted)
     return Balance(
         result=result,
         influence=influence,
         job=read,
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
-        check=None if checked is None else compare_check(result, checked, *known),
-        verdict=_judge(result, influence, read, tolerance, mounted),
+        check=check,
+        verdict=verdict,
+        left=None if read.check is None else _left(result, read, known, options, check, verdict, mounted),
         tolerance=tolerance,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
@@ -461,10 +489,64 @@ def _again(
     return _correct(job, _choose(job, options)[0], planes, options)
 
 
+def _with_pieces(job: Job, options: BalanceOptions) -> Job:
+    """The job with the pieces in its check runs that these options propose without them."""
+    from rotorid.workflows.check_pieces import pieces_mounted, with_pieces
+
+    if job.check is None or job.check_mounted or not job.holes:
+        return job
+    before = replace(options, refine=False)
+    known, _ = _choose(job, before)
+    result = _correct(job, known, _planes(job, known, before)[0], before)
+    pieces = pieces_mounted(job, result, *known, time_limit=options.split_seconds)
+    return job if pieces is None else with_pieces(job, pieces)
+
+
+def _left(
+    result: Correction,
+    job: Job,
+    known: Known,
+    options: BalanceOptions,
+    check: CheckComparison | None,
+    verdict: Verdict | None,
+    mounted: Mounted | None,
+) -> LeftToDo:
+    """What is left to do after the check run, by all runs where the coefficients are measured."""
+    import numpy as np
+
+    from balancing.correction.convention_assumptions import contradiction
+    from balancing.correction.refine_coefficients import mounted_in
+    from balancing.mounting.left_to_do import left_to_do
+
+    assert job.check is not None
+    words = () if result.convention_test is None else contradiction(result.convention_test, result.labels)
+    stop, pieces = "; ".join(words), mounted if options.refine else None
+    if not options.refine:
+        there = mounted_in(job.check, result)
+        weights = np.column_stack(list(there.values()))
+        runs = replace(job.check, planes=tuple(there), weights=weights)
+        refined = replace(options, refine=True, best_planes=None)
+        try:
+            measured = known[1] is None and known[0].trials is not None and options.machine_type is None
+            known = _choose(job, refined)[0] if measured else (known[0], runs)
+            result = _correct(job, known, result.planes, refined)
+        except ValueError as error:
+            stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
+            result = replace(result, mounted=(runs.runs[-1], runs.planes, weights[-1]))
+    if job.check_pieces is not None and pieces is None and not stop:
+        with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
+            pieces = _mount(result, job, known, replace(options, refine=True))
+    explained = None if check is None else check.explained
+    judged = "" if verdict is None else verdict.overall
+    return left_to_do(result, job.check, explained=explained, judged=judged, stop=stop, pieces=pieces)
+
+
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
     from balancing.mounting.fewest_pieces import FEW
     from balancing.mounting.mount import mount
 
+    if job.check_pieces is not None and not options.refine:
+        return job.check_pieces
     return mount(
         result,
         *known,

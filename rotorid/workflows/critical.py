@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.tables import Table, file_bytes, frame
+from rotorid.base.text import listing
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -137,6 +139,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         return found if other is model else critical_speeds_near(other, found)
 
     std, said = error_band(model, "the critical speeds", speeds)
+    left_out += _stubby(model, modes)
     log_rotor(model)
     return CriticalSpeeds(
         modes=dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *said)),
@@ -146,6 +149,28 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         more=int((modes.frequencies > 0).sum()) >= (options.number or 3),
         provenance=provenance(files, options),
     )
+
+
+def _stubby(model: Rotor, modes: Modes) -> list[str]:
+    """What shear and rotary inertia of the shaft, where left out, would change by more than 1 %."""
+    import fem
+
+    missing = [key for key in ("shear", "rotary_inertia") if not getattr(model.model, key)]
+    counted_in = dataclasses.replace(model.model, **dict.fromkeys(missing, True))
+    discs = model.discs
+    if "rotary_inertia" in missing:  # of discs it has a warning of its own
+        discs = tuple(dataclasses.replace(disc, diametral_inertia=0.0) for disc in discs)
+    with suppress(ValueError):  # none is left in the bearing tables
+        other = dataclasses.replace(model, model=counted_in, discs=discs)
+        full = fem.critical_speeds(other, modes.frequencies.size) if missing else modes
+        high, low = (each.frequencies[each.frequencies > 0] for each in (modes, full))
+        first = 1 + modes.frequencies.size - high.size
+        excess = [(k, 100 * (f / g - 1)) for k, (f, g) in enumerate(zip(high, low, strict=False), first)]
+        large = [f"mode {k} by {percent:.1f} %" for k, percent in excess if percent > 1]
+        if large:
+            keys = ", ".join(f"{key} = true" for key in missing)
+            return [f"these speeds are too high, {listing(large, 'and')}: [model] {keys} in a rotor file"]
+    return []
 
 
 def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:

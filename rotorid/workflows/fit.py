@@ -57,7 +57,7 @@ class FitOptions:
         Of gauss-newton and quasilinearization: end where a step is below this part of each parameter, or
         changes the sum of squares by less than this part of it, [F]; default: where no step matters.
     max_seconds : S
-        Limit of the search; what it has found by then has no intervals.
+        Limit of the search; what it has found by then has no intervals. Default: none.
     trajectory : model|data
         Where quasilinearization (default: model) and multiple shooting (default: data) begin: the model's own
         solution, or the measured outputs.
@@ -88,7 +88,7 @@ class FitOptions:
     seed: int | None = None
     max_iterations: int = 100
     tolerance: float | None = None
-    max_seconds: float = 60.0
+    max_seconds: float | None = None
     trajectory: str | None = None
     pieces: int | None = None
     rtol: float | None = None
@@ -200,7 +200,7 @@ def fit(
             seed=options.seed or 0,
             max_iterations=options.max_iterations,
             tolerance=options.tolerance,
-            max_seconds=options.max_seconds,
+            max_seconds=math.inf if options.max_seconds is None else options.max_seconds,
             trajectory=options.trajectory,
             pieces=options.pieces,
             rtol=RTOL if options.rtol is None else options.rtol,
@@ -231,7 +231,7 @@ def _plan(
         raise ValueError(f"--design takes at most {MOST_CANDIDATES} times, not {len(candidates)}")
     if sigma is None:
         raise ValueError("--design needs the errors of the samples: --sigma 0.01, or y1=0.01,y2=0.02")
-    if found and (len(found.records) > 1 or not found.reliable):
+    if found and (len(found.records) > 1 or not found.described):
         raise ValueError("--design needs one record that the model describes, or none")
     guess = dict(zip(model.parameters, model.start.tolist(), strict=True)) | dict(begin)
     if found:

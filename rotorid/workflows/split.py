@@ -62,7 +62,7 @@ class SplitOptions:
         Angle of hole 1 of equally spaced ones; default: 0.
     pieces : 10g,20g
         Available pieces; without them amounts are free. The fewest are taken whose error is at most 1.2
-        times the least.
+        times the least, or a fifth of VECTOR.
     best
         The nearest to VECTOR, however many pieces that takes.
     stock : 8,4

@@ -18,7 +18,7 @@ from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rotorid.worksheet.job_files import Conflict
 from rotorid.worksheet.session import Session
@@ -29,6 +29,7 @@ PAGE = {"/": "index.html", "/worksheet.js": "worksheet.js", "/worksheet.css": "w
 _KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
 _LARGEST = 30_000_000
 """Bytes of a request."""
+_TOO_LARGE = f"at most {_LARGEST // 10**6} MB"
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
     "connect-src 'self'; img-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'",
@@ -54,7 +55,17 @@ class Guard:
         if why := self.refusal(Request(scope)):
             await JSONResponse({"error": why}, 403, HEADERS)(scope, receive, send)
             return
-        await self.app(scope, receive, send)
+        size = 0
+
+        async def counted() -> Message:
+            nonlocal size
+            message = await receive()
+            size += len(message.get("body", b""))
+            if size > _LARGEST:  # a body in chunks does not say so before
+                raise ValueError(_TOO_LARGE)
+            return message
+
+        await self.app(scope, counted, send)
 
     def refusal(self, request: Request) -> str:
         """Why a request is refused; empty where it is not."""
@@ -63,7 +74,7 @@ class Guard:
         if request.headers.get("origin", f"http://{self.own}") != f"http://{self.own}":
             return "another page may not use the worksheet"
         if int(request.headers.get("content-length", "0")) > _LARGEST:
-            return f"at most {_LARGEST // 10**6} MB"
+            return _TOO_LARGE
         given = request.headers.get(TOKEN, "").encode()
         if request.scope["path"] not in PAGE and not hmac.compare_digest(given, self.token):
             return "the address lacks the token of this worksheet: open the one that the program shows"

@@ -297,12 +297,20 @@ class JobFiles:
             for path in files.keys() - kept.keys():
                 path.unlink(missing_ok=True)
         except (InputError, PermissionError) as error:
-            done = [path for path in kept if kept[path] == self._read(path) != known.get(path)]
-            write_files({path: data for path in done if (data := known.get(path)) is not None})
-            cause, first = error.__cause__ or error, next(iter(files))
+            self._put_back(files, known)
+            cause = error.__cause__ or error
+            failed = Path(error.problems[0].file if isinstance(error, InputError) else error.filename)
             if isinstance(cause, PermissionError):
-                raise ValueError(_is_open(first, "Excel", " or protected")) from error
-            raise ValueError(f"{first.name} is not written: {getattr(cause, 'strerror', cause)}") from error
+                raise ValueError(_is_open(failed, "Excel", " or protected")) from error
+            raise ValueError(f"{failed.name} is not written: {getattr(cause, 'strerror', cause)}") from error
+
+    def _put_back(self, files: Contents, known: Contents) -> None:
+        """What a step had written or removed before it failed."""
+        done = [path for path, data in files.items() if data == self._read(path) != known.get(path)]
+        write_files({path: data for path in done if (data := known.get(path)) is not None})
+        for path in done:
+            if known.get(path) is None:
+                path.unlink()
 
     def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
         if version.read_only:

@@ -35,7 +35,8 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
 
         from rotorid.worksheet.app import application
     except ImportError as error:
-        raise ValueError(f'the worksheet needs {error.name}: pip install "rotorid[worksheet]"') from error
+        needed = "starlette uvicorn tomlkit"
+        raise ValueError(f"the worksheet needs {error.name}: pip install {needed}") from error
     from rotorid.worksheet.job_files import JobFiles
     from rotorid.worksheet.session import Session
 

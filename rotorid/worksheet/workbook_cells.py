@@ -13,12 +13,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.versions import now
 from rotorid.tables.job.job_from_excel import NAMED, OPTIONAL, SETTINGS, job_in_sheets, key_parts
 from rotorid.tables.job.job_keys import CELLS, READINGS
 from rotorid.tables.job.workbook_sheets import dotted_key, number_cell, setting_cell
 from rotorid.tables.reader.columns import sheet_source
 from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma
-from rotorid.tables.reader.excel_pages import Line, header_row, put, sized
+from rotorid.tables.reader.excel_pages import Line, header_row, put, saved, sized
 from rotorid.tables.reader.excel_workbook import find_sheet, sheets_in
 from rotorid.tables.reader.grid import Cell, Row, clean, from_header, make_grid, show
 from rotorid.tables.reader.problems import InputError, Problems
@@ -178,9 +179,8 @@ class WorkbookVersion:
                     sized(cell.comment)
                 if isinstance(cell.value, float):  # nor would it write 17 digits
                     put(cell, cell.value, sheet.title)
-        stream = io.BytesIO()
-        self._book.save(stream)
-        return {self.job: stream.getvalue()}
+        self._book.properties.modified = now().replace(tzinfo=None)
+        return {self.job: saved(self._book)}
 
 
 def _put(cell: Any, value: Cell) -> None:  # noqa: ANN401

@@ -299,3 +299,21 @@ def test_ignored_inertia_names_what_is_missing():
     )
     assert "diametral moment of inertia is ignored" in warnings(gyroscopic=True)[0]
     assert warnings(gyroscopic=True, rotary_inertia=True) == ()
+
+
+def on_ends(lengths):
+    """A shaft on two springs."""
+    ends = [fem.Support(1, 1e8), fem.Support(len(lengths) + 1, 1e8)]
+    return fem.Rotor(lengths, 0.05, supports=ends)
+
+
+def test_an_element_of_a_thousandth_of_its_neighbour_is_computed():
+    fine = fem.critical_speeds(on_ends([0.05] * 20), 2).frequencies
+    short = [0.05] * 10 + [5e-5, 0.05 - 5e-5] + [0.05] * 9
+    np.testing.assert_allclose(fem.critical_speeds(on_ends(short), 2).frequencies, fine, rtol=1e-8)
+
+
+@pytest.mark.parametrize("lengths", [[0.25, 1e-9, 0.25], [8e-5, 0.25], [0.25, 1e-9, 1e-9, 0.25]])
+def test_much_shorter_elements_are_refused(lengths):
+    with pytest.raises(ValueError, match=r"element [12]: its length.* 1/3000 of its longer neighbour"):
+        on_ends(lengths)

@@ -254,3 +254,16 @@ def test_damped_critical_speeds_do_not_depend_on_the_steps(seed):
     for speed in few.critical_speeds:
         omega = whirl_exactly(rotor, speed, 8).frequencies
         assert np.abs(omega - speed).min() < 1e-8 * speed
+
+
+@pytest.mark.parametrize("highest", [700.0, 1000.0, 5000.0])
+@pytest.mark.parametrize("loss", [1e-13, 1e-10, 1e-7])
+def test_a_threshold_does_not_depend_on_the_size_of_tiny_losses(loss, highest):
+    # internal damping alone: stable up to the critical speed, whatever its size
+    ends = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
+    rotor = fem.Rotor([0.25] * 4, 0.05, supports=ends, material_damping=loss)
+    critical = fem.critical_speeds(rotor, 1).frequencies[0]
+    assert fem.stability_threshold(rotor, highest).threshold == pytest.approx(critical, rel=1e-10)
+    (window,) = fem.campbell(rotor, np.arange(100.0, 1000.0, 100.0)).windows
+    assert window.first == pytest.approx(critical, rel=1e-10)
+    assert not fem.campbell(rotor, np.arange(100.0, 650.0, 100.0)).windows

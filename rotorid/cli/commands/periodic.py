@@ -15,8 +15,8 @@ from rotorid.workflows.motion.periodic import periodic as work
 
 @command(
     PeriodicOptions,
-    least={"subsynchronous": 2, "modes": 0},
-    panels={"Motion": "subsynchronous limit_cycle", "Method": "modes"},
+    least={"subsynchronous": 2, "modes": 0, "max_seconds": 0.01},
+    panels={"Motion": "subsynchronous limit_cycle", "Method": "modes max_seconds"},
 )
 def periodic(
     model: Annotated[

@@ -9,7 +9,7 @@ import numpy as np
 import fem
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import Bases, growing_at
-from fem.stability import SMALLEST, range_of_speeds, searched
+from fem.stability import range_of_speeds, searched
 from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
 
 if TYPE_CHECKING:
@@ -47,4 +47,4 @@ def stability_threshold(
 def threshold_of(whirl: Whirl) -> fem.Stability:
     """The same in the range of speeds of `whirl`, which holds all modes of the small model."""
     found = Bases(whirl.Q, whirl.Q, whirl.scale, np.inf, np.inf)
-    return searched(found, growing_at(found, whirl.speeds, SMALLEST), whirl)
+    return searched(found, growing_at(found, whirl.speeds), whirl)

@@ -38,7 +38,7 @@ def arrow() -> Any:  # noqa: ANN401 - the module
     try:
         import pyarrow.parquet
     except ImportError as error:
-        raise ValueError('the tables of a fleet need pyarrow: pip install "rotorid[fleet]"') from error
+        raise ValueError("the tables of a fleet need pyarrow: pip install pyarrow") from error
     return pyarrow
 
 

@@ -17,6 +17,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors, as_phase, check_angles
 
 if TYPE_CHECKING:
+    from balancing.mounting.mount_result import Mounted
     from fem.model.rotor import Rotor
     from fem.model.sensors import Sensor
 
@@ -72,7 +73,9 @@ class Job:
     check
         Check runs, in the units and at the speeds of the job, or None.
     check_mounted
-        Whether `check.weights` say what was mounted in the check runs; else the proposed corrections were.
+        Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
+    check_pieces
+        The pieces that `check.weights` are then, by `rotorid.workflows.check_pieces`; None: others.
     rotor
         The model that the job names, or None.
     plane_nodes
@@ -110,6 +113,7 @@ class Job:
     left_out: tuple[str, ...] = ()
     check: Trials | None = None
     check_mounted: bool = False
+    check_pieces: Mounted | None = None
     rotor: Rotor | None = None
     plane_nodes: Mapping[str, int] = field(default_factory=dict)
     sensor_places: Mapping[str, Sensor] = field(default_factory=dict)

@@ -387,7 +387,12 @@ JOB = (
     Key("influence", FILE, "stored coefficients instead of trial runs, or beside them"),
     Key("rotor", FILE, "a rotor table or file: coefficients are computed"),
     Key("check", FILE, "runs table of a check run, with the proposed weights mounted"),
-    Key("check_weights", FILE, "weights table of the check run, where others were mounted than proposed"),
+    Key(
+        "check_weights",
+        FILE,
+        "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
+        "where there are holes, else the weights",
+    ),
     Key(
         "slow_roll",
         Kind(_slow_roll, {"anyOf": [FILE.schema, _VECTORS.schema]}, cell="name"),

@@ -74,7 +74,6 @@ def book_bytes(pages: Sequence[Page], shown: str) -> bytes:
     """
     import openpyxl
     from openpyxl.packaging.custom import IntProperty
-    from openpyxl.writer.excel import ExcelWriter
 
     book = openpyxl.Workbook()
     book.remove(book.active)
@@ -86,8 +85,27 @@ def book_bytes(pages: Sequence[Page], shown: str) -> bytes:
         _write(sheet, page)
         sheet.sheet_view.tabSelected = page.title == shown
     book.active = [page.title for page in pages].index(shown)
+    return saved(book)
+
+
+def saved(book: Any) -> bytes:  # noqa: ANN401
+    """A workbook as a file; no temporary files are made, which a full disk would break off."""
+    from openpyxl.drawing.spreadsheet_drawing import SpreadsheetDrawing
+    from openpyxl.worksheet._writer import WorksheetWriter
+    from openpyxl.writer.excel import ExcelWriter
+
+    class InMemory(ExcelWriter):  # type: ignore[misc]  # openpyxl has no types
+        def write_worksheet(self, ws: Any) -> None:  # noqa: ANN401
+            ws._drawing, part = SpreadsheetDrawing(), io.BytesIO()
+            ws._drawing.charts, ws._drawing.images = ws._charts, ws._images
+            writer = WorksheetWriter(ws, part)
+            writer.write()
+            ws._rels = writer._rels
+            self._archive.writestr(ws.path[1:], part.getvalue())
+            self.manifest.append(ws)
+
     stream = io.BytesIO()
-    ExcelWriter(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
+    InMemory(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
     return stream.getvalue()
 
 

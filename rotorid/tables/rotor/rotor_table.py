@@ -19,13 +19,15 @@ from rotorid.tables.reader.units import one_of
 from rotorid.tables.rotor.rotor_plausibility import warn_of_rotor, warn_of_table
 
 _LENGTH = one_of(units.LENGTH)
-_INERTIA = one_of(units.INERTIA)
-ATTACHED = (
-    Column("mass", one_of(units.MASS), ("mass_kg",), required=False),
-    Column("polar_inertia", _INERTIA, ("polar_inertia_kg_m2",), required=False),
-    Column("diametral_inertia", _INERTIA, ("diametral_inertia_kg_m2",), required=False),
-    Column("support_stiffness", one_of(units.STIFFNESS), ("support_stiffness_N_per_m",), required=False),
-    Column("support_damping", one_of(units.DAMPING), ("support_damping_N_s_per_m",), required=False),
+ATTACHED = tuple(
+    Column(stem, one_of(unit), (name,), required=False, blank=True)
+    for stem, unit, name in (
+        ("mass", units.MASS, "mass_kg"),
+        ("polar_inertia", units.INERTIA, "polar_inertia_kg_m2"),
+        ("diametral_inertia", units.INERTIA, "diametral_inertia_kg_m2"),
+        ("support_stiffness", units.STIFFNESS, "support_stiffness_N_per_m"),
+        ("support_damping", units.DAMPING, "support_damping_N_s_per_m"),
+    )
 )
 OF_ELEMENTS = (
     Column("youngs_modulus", one_of(units.MODULUS), ("youngs_modulus_Pa",), required=False, blank=True),
@@ -89,12 +91,11 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     if not elements.any():
         expected = "at least one row with a length above 0"
         table.in_header(table.fields["length"].name, expected)
-    diameter, inner = table.numbers("diameter"), table.numbers("inner_diameter", 0.0)
-    material_of = {column.stem: table.numbers(column.stem) for column in OF_ELEMENTS}
-    modulus, density, poisson, damping = material_of.values()
-    for stem in ("diameter", "inner_diameter", *material_of):
-        # blank only in a last row without an element
-        table.complain_where(elements & table.is_blank(stem), stem, "a number")
+    diameter, inner = table.numbers("diameter"), _or_none(table, "inner_diameter", 0.0)
+    own: dict[str, Any] = {c.stem: _or_none(table, c.stem, getattr(material, c.stem)) for c in OF_ELEMENTS}
+    modulus, density, poisson, damping = own.values()
+    # blank only in a last row without an element
+    table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
     for stem, fits, expected in (
         ("diameter", diameter > 0, "a diameter above 0"),
         ("inner_diameter", inner >= 0, "a diameter of 0 or more"),
@@ -109,9 +110,7 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
         table.must_be(stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}")
     warn_of_table(table, elements)
-    own: dict[str, Any] = {
-        stem: table.numbers(stem, getattr(material, stem))[elements] for stem in material_of
-    }
+    own = {stem: values[elements] for stem, values in own.items()}
     discs, supports = _attached(table)
     return Shaft(length[elements], diameter[elements], inner[elements], discs=discs, supports=supports, **own)
 
@@ -128,8 +127,13 @@ def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problem
     return rotor
 
 
+def _or_none(table: Table, stem: str, none: float) -> FloatArray:
+    """Values of an optional column in SI, shape (rows,); `none` where its cell says nothing."""
+    return np.where(table.is_blank(stem), none, table.numbers(stem, none))
+
+
 def _attached(table: Table) -> tuple[tuple[Disc, ...], tuple[Support, ...]]:
-    values = [table.numbers(column.stem, 0.0) for column in ATTACHED]
+    values = [_or_none(table, column.stem, 0.0) for column in ATTACHED]
     discs, supports = [], []
     for index in range(len(table)):
         mass, polar, diametral, stiffness, damping = (float(column[index]) for column in values)

@@ -60,8 +60,7 @@ def library(path: Path, kind: str) -> Iterator[None]:
     except InputError:
         raise
     except ImportError as error:
-        needed = 'pip install "rotorid[instruments]"'
-        raise refusal(path, f"what reads {kind} files to be installed: {needed}") from error
+        raise refusal(path, f"what reads {kind} files to be installed: pip install {error.name}") from error
     except Exception as error:
         reason = f" ({printable(str(error)[:80])})" if isinstance(error, ValueError) else ""
         raise refusal(path, f"a whole {kind} file; it is damaged or of another kind{reason}") from error

@@ -74,8 +74,8 @@ def simulate(
     record
         Times and inputs; times alone (n,) for a model without inputs.
     method
-        One of `INTEGRATORS`; "auto" with the extra `rotorid[fast]` takes "taylor" for a model that has
-        needed many steps.
+        One of `INTEGRATORS`; "auto" with the extra `rotorid[fast]` takes "taylor" in fits of a
+        model that has needed many steps.
     rtol
         Relative tolerance of "dop853" and "lsoda"; the absolute one follows the size of each state.
     sensitivities

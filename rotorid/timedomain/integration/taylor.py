@@ -1,6 +1,6 @@
 """Taylor integration of a model with its sensitivities by heyoka, with the extra `rotorid[fast]`.
 
-Compiling takes a second or two, and so it is done for a model that has cost that much the ordinary way.
+Compiling takes a second or two, and so a model is compiled whose fits have cost that much the ordinary way.
 States and parameters are scaled by their sizes there, and what is compiled has to repeat the last ordinary
 solution. Source: Biscani and Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics", MNRAS 504 (2021) 2614.
@@ -8,6 +8,8 @@ mechanics", MNRAS 504 (2021) 2614.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,15 +31,30 @@ STEPS = 20_000
 """At most; more leave it to the ordinary way to say why."""
 
 
+@contextmanager
+def learning(models: Sequence[OdeModel]) -> Iterator[None]:
+    """Count and compile within fits alone: a single simulation does not depend on what went before."""
+    for model in models:
+        model.machine["fitted"] = True
+    try:
+        yield
+    finally:
+        for model in models:
+            model.machine["fitted"] = False
+
+
 def integrate(system: Augmented, x0: FloatArray, s0: FloatArray, longest: float) -> FloatArray | None:
     """States and sensitivities (n, size); None where the model is not compiled, or has no finite solution."""
-    taylor = system.model.machine.get("taylor")
+    machine = system.model.machine
+    taylor = machine.get("taylor") if machine.get("fitted") else None
     return None if taylor is None or not system.np else taylor(system, x0, s0, longest)
 
 
 def learn(system: Augmented, table: FloatArray, steps: int, longest: float) -> None:
-    """Count the steps of an ordinary solution (n, size), and compile the model when they are many."""
+    """Count the steps of a fit's ordinary solutions (n, size), and compile the model when they are many."""
     machine = system.model.machine
+    if not machine.get("fitted"):
+        return
     machine["steps"] = machine.get("steps", 0) + steps
     if machine["steps"] < WORK or "taylor" in machine or not system.np or not system.model.rates_alone:
         return

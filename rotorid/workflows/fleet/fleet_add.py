@@ -196,6 +196,7 @@ def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) 
     from rotorid.tables.fleet.job_records import job_rows, kind_of
     from rotorid.tables.fleet.job_search import job_id
     from rotorid.tables.reader.input_file import sha256
+    from rotorid.workflows.check_pieces import pieces_mounted
     from rotorid.workflows.coefficients import proposed
 
     influence, trials, check, labels = job.influence, job.trials, job.check, job.trials.labels
@@ -211,7 +212,8 @@ def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) 
             before = starting_point(influence, runs).readings
             if not job.check_mounted:
                 correction = proposed(job, influence, runs)
-                mounted = correction.planes, correction.weights
+                pieces = pieces_mounted(job, correction, influence, runs)
+                mounted = correction.planes, (pieces or correction).weights
         except ValueError as error:
             refused = f"no corrections are proposed: {error}"
     told = [str(one.message).encode(errors="replace").decode() for one in caught]  # of any names of files

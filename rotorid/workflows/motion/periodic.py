@@ -55,6 +55,8 @@ class PeriodicOptions:
         default: as of `motion`; small models keep all.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
+    max_seconds : S
+        Limit of the search; what is known by then is given, with a warning. Default: none.
     """
 
     speeds: Band
@@ -65,6 +67,7 @@ class PeriodicOptions:
     bow: Path | str | Mapping[int, complex] | None = None
     modes: int | None = None
     gravity_direction: float = -90.0
+    max_seconds: float | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,7 +90,9 @@ class PeriodicMotions(Outcome):
         told = [self._judgement(k) for k in range(len(motion.branches))]
         return Answer(
             "\n".join(told),
-            text(bifurcations, width=COLUMNS) if bifurcations[0].values else "No bifurcation.",
+            text(bifurcations, width=COLUMNS)
+            if bifurcations[0].values
+            else f"No bifurcation. {motion.tried}",
             motion.warnings,
             (
                 *([] if self.reduced is None else [self.reduced.note]),
@@ -165,6 +170,8 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
         raise ValueError("--speeds: periodic motion needs a turning rotor, so speeds above 0")
     if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 8:
         raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 8")
+    if options.max_seconds is not None and not options.max_seconds > 0:
+        raise ValueError("--max-seconds takes a number above 0")
     direction = degrees(options.gravity_direction, "--gravity-direction")
     what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
@@ -179,7 +186,12 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     with phase("periodic motion"):
         motion = periodic_motion(
-            system, low, high, subsynchronous=options.subsynchronous, limit_cycle=options.limit_cycle
+            system,
+            low,
+            high,
+            subsynchronous=options.subsynchronous,
+            limit_cycle=options.limit_cycle,
+            max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
         )
     readings = Readings(motion, labels, directions)
     return PeriodicMotions(readings=readings, reduced=reduced, provenance=provenance(what.files, options))

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 MACHINES, STARTS = 250, 8
 """Samples in a file: some seconds of work."""
 MANIFEST = "_study.json"  # with _: who reads the folder as a table passes it over
+LOCK = "_study.lock"
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def study(
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
-        raise ValueError(f'a study needs {error.name}: pip install "rotorid[fleet]"') from error
+        raise ValueError("a study needs pyarrow: pip install pyarrow") from error
     from rotorid.tables.study_file import read_study
     from rotorid.workflows.studies.chunks import read_parts, run_study
 
@@ -86,8 +90,7 @@ def study(
     kept = {"schema_version": SCHEMA_VERSION, "version": told["version"], "seed": seed}
     with tempfile.TemporaryDirectory() as own:
         folder = Path(options.results or own)
-        _claim(folder, {**kept, "inputs": [*map(hash_of, files)]})
-        with phase("samples"):
+        with _claimed(folder, {**kept, "inputs": [*map(hash_of, files)]}), phase("samples"):
             run_study(task, samples, folder, options.workers, executor)
         parts = read_parts(task, samples, folder)
         common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words, "provenance": told}
@@ -127,19 +130,28 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
     return Task(draw_start, given, seed, columns, STARTS), files, tuple(given.assumed)
 
 
-def _claim(folder: Path, study: dict[str, Any]) -> None:
-    """Say in the folder which study it holds; refuse one that holds another, or something else."""
-    manifest, new = folder / MANIFEST, (folder / MANIFEST).with_suffix(".tmp")
+@contextmanager
+def _claimed(folder: Path, study: dict[str, Any]) -> Iterator[None]:
+    """Say in the folder which study it holds; refuse one that holds another, or is being written."""
+    manifest, lock = folder / MANIFEST, folder / LOCK
+    new = manifest.with_suffix(".tmp")
     told = json.dumps(study, indent=1).encode()
     folder.mkdir(parents=True, exist_ok=True)
-    if manifest.exists():
-        if manifest.read_bytes() != told:
+    if not manifest.exists() and any(file not in (new, lock) for file in folder.iterdir()):
+        raise ValueError(f"{folder}: no study is kept here, but other files: name another folder")
+    with closing(sqlite3.connect(lock, timeout=0, isolation_level=None)) as held:
+        try:
+            held.execute("BEGIN EXCLUSIVE")  # until it is closed, or the process ends
+        except sqlite3.OperationalError as error:
+            busy = error.sqlite_errorcode == sqlite3.SQLITE_BUSY
+            why = "a study is running here: wait for its end" if busy else f"cannot be written ({error})"
+            raise ValueError(f"{folder}: {why}, or name another folder") from error
+        if not manifest.exists():
+            new.write_bytes(told)
+            new.replace(manifest)
+        elif manifest.read_bytes() != told:
             raise ValueError(
                 f"{folder}: another study is kept here (its file, its rotor, the seed or the version of "
                 "rotorid differs): name another folder"
             )
-    elif any(file != new for file in folder.iterdir()):
-        raise ValueError(f"{folder}: no study is kept here, but other files: name another folder")
-    else:
-        new.write_bytes(told)
-        new.replace(manifest)
+        yield

@@ -45,8 +45,8 @@ class VectorsOptions:
     orders : LIST
         Default: 1.
     speeds : LIST
-        Vectors at these, where a run-up passes them first: 900,1200rpm; default: one for a steady speed, else
-        as many as are independent.
+        Vectors at these (rad/s, or 900,1200rpm), where a run-up passes them first; default: one for a steady
+        speed, else as many as are independent.
     picture : tacho | orbit | waterfall
         What --plot draws of the first record; default: tacho.
     """
@@ -98,7 +98,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions) -> VectorsOf
         phase=options.phase,
         orders=_orders(options.orders),
         rate=options.rate,
-        speeds=None if options.speeds is None else [*speeds(options.speeds, "--speeds")],
+        speeds=None if options.speeds is None else speeds(options.speeds),
     )
     with phase("reading"):
         waveforms = read_waveforms(records, given)

@@ -108,7 +108,7 @@ function save(changes) {
 const number = (text) => Number(String(text).trim().replace(",", "."));
 const near = (a, b) => Math.abs(number(a) - number(b)) <= 0.005 * number(a);
 const each = (values) => [...new Set(values)].filter((value) => value);
-const listOf = (text, by = /[,;]/) => each(text.split(by).map((one) => one.trim()));
+const partsOf = (text, by) => text.split(by).map((one) => one.trim()).filter((one) => one);
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
 const unitOf = (column) => (column || "").replace(/^(amplitude|speed|mass|unbalance)_?/, "")
   .replace("um", "µm").replace(/_(pp|rms)$/, " $1").replace(/(m|in)_s/, "$1/s").replace("_", "·");
@@ -154,7 +154,7 @@ const textOf = (value) => value === null || typeof value !== "object" ? String(v
 function jsonOf(path, text) {
   const now = at(state.settings, path);
   const one = (word) => (Number.isNaN(number(word)) ? word.trim() : number(word));
-  const parts = listOf(text, /;/);
+  const parts = partsOf(text, ";");
   if (text === textOf(now)) return now ?? null;
   if (text.includes(":")) return Object.fromEntries(parts.map((part) => part.split(":").map(one)));
   if (parts.length > 1 || (text && /^(available|stock|holes_)/.test(path.at(-1)))) return parts.map(one);
@@ -323,20 +323,23 @@ function listing(doc, path, columns, size = () => 0, count = Infinity) {
   }))));
 }
 
-const judged = (text) => h("p", { class: /^(do not|measure|fail)/im.test(text) ? "why" : "judgement" }, text);
+const judged = (text) => h("p", { class: /^(do not|measure|fail|not as)|Take off what|Add nothing yet/im.test(text) ? "why" : "judgement" }, text);
 
 function answer(name, title, { document: doc, judgement, warnings, notes }) {
-  const { conventions: said, mounting: pieces, mounted_in_last_run: last } = doc;
+  const { conventions: said, left_to_do: left, mounted_in_last_run: last } = doc;
+  const pieces = left ? null : doc.mounting; // after a check run these are not what is to be done
   const [weight, unit] = [said.weight_unit, said.vibration_unit].map(unitOf);
   const columns = [["if"], ["plane"], ["action", ""], ["hole"], ["pieces"], ["mass", weight, "mass_std"],
     ["angle_deg", "at °", "angle_std_deg"]];
   const place = [["sensor", "largest"], ["speed_rpm", "rpm"], ["before"], ["after", `after, ${unit}`]];
   const limits = [["name", "limit of"], ["speed_rpm", "rpm"], ["size"], ["limit"], ["verdict", ""]];
   return h("section", { key: name, "data-doc": name }, h("h3", {}, title), judged(judgement),
-    listing(doc, pieces ? "mounting.holes" : "corrections", columns),
-    h("p", {}, pieces?.on_top_of ? `Beside those of ${pieces.on_top_of}. ` : `For ${doc.corrections_refer_to}. `,
+    left ? [h("b", {}, `Mounted in ${left.run}:`), listing(doc, "left_to_do.mounted", columns),
+      left.word === "trim" && [h("b", {}, "To add:"), listing(doc, "left_to_do.add", columns)]]
+      : listing(doc, pieces ? "mounting.holes" : "corrections", columns),
+    h("p", {}, left ? "" : `For ${doc.corrections_refer_to}. `,
       `Angles count ${said.angles}, phase ${said.phase}. ± is one standard deviation.`),
-    !pieces && last?.weights.some(({ mass }) => mass) && [
+    !left && !pieces && last?.weights.some(({ mass }) => mass) && [
       h("b", {}, `If the weights of ${last.run} stay, instead:`), listing(doc, "add_to_mounted", columns)],
     !pieces && doc.other_readings.length > 0 && listing(doc, "other_readings", columns),
     doc.verdict && listing(doc, "verdict.rows", limits, (row) => row.size / row.limit, 5),
@@ -467,7 +470,7 @@ async function take({ files: [file], dataset: { import: run } }) {
 const submitted = {
   "setup-form"() {
     const [speedName, amplitude] = ["setup-speed-unit", "setup-amplitude-unit"].map((id) => $(id).value);
-    const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => listOf($(id).value));
+    const [speeds, names] = ["setup-speeds", "setup-sensors"].map((id) => each(partsOf($(id).value, /[,;]/)));
     const header = ["run", speedName, "sensor", amplitude, "phase_deg"];
     const places = speeds.flatMap((speed) => names.map((sensor) => ({ speed, sensor })));
     if (data.runs) edit(...runs().flatMap((run) => addRows("runs", run, places)));

@@ -9,6 +9,7 @@ from cases import each_of
 
 from balancing import Influence, Limits, ReadingErrors, UndeterminedError, correct, estimate_influence
 from balancing.coefficients.baseline import starting_point
+from balancing.coefficients.trial_effects import nonlinear
 from balancing.correction.mount_decision import Inputs, remedies
 from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.error_propagation import error_form, prediction_covariance
@@ -56,7 +57,7 @@ def test_good_jobs_are_not_warned_of(method, share):
 
 def test_where_weights_fight_what_is_proposed_is_better():
     rng = np.random.default_rng(2)
-    ours, theirs = [], []
+    ours, theirs, fight = [], [], []
     for i in range(120):
         trials, W, Y0 = simulated(rng, alike=(0.02, 0.1, 0.5)[i % 3])
         if W.shape[-1] == 1:
@@ -66,10 +67,12 @@ def test_where_weights_fight_what_is_proposed_is_better():
             continue
         ours.append(left(W, Y0, c.planes, c.decision.choices[0]))
         theirs.append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
+        fight.append("within the errors" not in c.decision.cause)
         assert c.decision.instead
-    assert len(ours) > 20
+    assert sum(fight) > 20
     assert np.mean(ours) < 0.4 * np.mean(theirs)
-    assert np.mean(np.array(ours) < theirs) > 0.9
+    # errors are smaller than assumed here, so that weights "within the errors" are better than they promise
+    assert np.mean((np.array(ours) < theirs)[fight]) > 0.9
     assert np.max(np.subtract(ours, theirs)) < 0.1
 
 
@@ -200,3 +203,58 @@ def test_a_good_correction_says_nothing():
     assert c.to_dict()["judgement"]["word"] == "mount"
     assert c.to_dict()["judgement"]["cause"] is None
     assert "Do not mount" not in c.summary()
+
+
+def softening(size, least=0.04):
+    """One plane: the machine answers less, the nearer it is to rest, and reads `least` in its last run."""
+    T = np.array([0, 12, 24, 36, 40]) * GRAM * np.exp(1j * np.radians([0, 200, 248, 240, 244]))
+    Y = np.array([0.35, 0.32, 0.24, 0.11, least]) * np.exp(1j * np.radians([97, 111, 89, 111, 43]))
+    return job(size * Y[:, None], T[:, None], runs=("1", "2", "3", "4", "5"))
+
+
+@pytest.mark.parametrize("least", [0.04, 0.07])
+def test_a_run_that_reads_less_than_is_promised_stays(least):
+    c = correct(estimate_influence(softening(3.0, least)))
+    assert c.decision.word == "do not mount"
+    assert 3 * least < c.check_rms
+    assert c.decision.lines()[0].startswith(
+        "Do not mount these weights: leave those of run '5' where they are"
+    )
+    assert c.decision.instead[0].startswith("The runs do not fit one linear machine")
+    limits = Limits(np.array([30 * GRAM]), np.full((1, 1), np.inf), ((),))
+    bound = correct(estimate_influence(softening(3.0, least)), limits=limits)
+    assert "run '5'" not in bound.decision.cause  # it has 40 g
+
+
+def test_runs_of_a_linear_machine_are_not_called_nonlinear():
+    rng = np.random.default_rng(8)
+    W, T = complex_normal(rng, (1, 3, 1)), np.array([0, 1, 0.6j, 0.95])[:, None] * GRAM
+    Y = (-W[..., 0] + np.einsum("scp,rp->rsc", W, T / GRAM)) * (1 + 0.01 * complex_normal(rng, (4, 1, 3)))
+    trials = job(Y, T)
+    assert nonlinear(trials, estimate_influence(trials).W) == ""
+    strange = softening(1.0)
+    assert "4 times" in nonlinear(strange, estimate_influence(strange).W)
+
+
+def test_weights_that_hardly_help_by_their_bound_are_not_mounted():
+    """Unbalance outside the plane: the weights take away a tenth, and check runs scatter by more."""
+    rng = np.random.default_rng(9)
+    W = complex_normal(rng, (1, 6, 1))
+    Y0 = -W[..., 0] + 3.0 * complex_normal(rng, (1, 6))
+    c = correct(estimate_influence(job(np.stack((Y0, Y0 + 2 * W[..., 0])), np.array([[0], [2 * GRAM]]))))
+    before = np.sqrt(np.mean(np.abs(c.before) ** 2))
+    assert c.check_rms > 0.9 * before
+    assert c.decision.word == "do not mount"
+
+
+def test_no_answer_calls_planes_not_determined_and_mounts_their_weights():
+    rng = np.random.default_rng(10)
+    words = []
+    for i in range(60):
+        trials, W, _ = simulated(rng, alike=(0.05, 0.1, 0.3)[i % 3])
+        if W.shape[-1] > 1:
+            c = correct(estimate_influence(trials), refuse=False)
+            open_ = any("weights are not determined" in w for w in c.warnings)
+            assert not (open_ and c.decision.word == "mount")
+            words.append(c.decision.word)
+    assert len(set(words)) > 1

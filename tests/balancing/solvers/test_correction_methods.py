@@ -133,6 +133,28 @@ def test_covariance_with_row_weights_is_that_of_repeated_jobs():
     assert (np.abs(ratio - 1) < 1.8 / np.sqrt(n)).all()  # 0.09 for 400 draws: 3.5 %
 
 
+@pytest.mark.parametrize("method", ["weighted", "least-squares"])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_limit_that_barely_binds_keeps_the_errors_of_what_is_not_bound(method, seed):
+    """Unbalance outside the planes: most of the ± is what explains it, with a limit and without."""
+    trials, _ = job(seed, outside=0.5, effect=1.5)
+    influence = estimate_influence(trials)
+
+    def widths(share):
+        most = {"left": share * abs(free.weights[0])}
+        limits = Limits.of(S, influence.sensors, influence.planes, max_weight=most)
+        found = correct(influence, method=method, limits=limits)
+        assert bool(found.active) == (share < 1)
+        return np.concatenate((found.mass_std, found.angle_std))
+
+    free = correct(influence, method=method)
+    unlimited = np.concatenate((free.mass_std, free.angle_std))
+    np.testing.assert_allclose(widths(1.001), unlimited, rtol=1e-6)
+    barely = widths(0.9999) / unlimited
+    assert 0.5 < barely[0] < 0.7  # half of the machines need less than the limit: sqrt(1/2 - 1/(2 pi)) = 0.58
+    np.testing.assert_allclose(barely[1:], 1, atol=0.15)
+
+
 @pytest.fixture
 def few_draws(monkeypatch):
     """Errors of weights that are drawn come from 100 draws instead of 400."""

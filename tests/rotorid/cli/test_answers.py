@@ -3,6 +3,7 @@
 import warnings
 
 import pytest
+from cases import each_of
 
 from rotorid.base.answer import Answer, kinds
 from rotorid.samples import sample_data
@@ -126,6 +127,21 @@ def test_warnings_come_last_one_of_each_kind_and_numerical_ones_first(cli, monke
         "rotorid: nothing can be done",
     ]
     assert kinds(["a 1", "b", "a 2."]) == ["a 1 (and 1 more of this kind)", "b"]
+
+
+@each_of(
+    "first, second, worst",
+    [
+        ("plane 'A': 3 g over", "plane 'B': 300 g over", 1),
+        ("plane 'A1': 300 g over", "plane 'B900': 3 g over", 0),
+        ("'p' at 900 rpm rises from 2 to 30 µm", "'p' at 9000 rpm rises from 2 to 3 µm", 0),
+        ("'A' changed at most 16 % of it", "'B' changed at most 2 % of it", 1),
+        ("it is only 3 times its error", "it is only 4 times its error", 0),
+        ("line 3: no mass", "line 500: no mass", 0),
+    ],
+)
+def test_of_a_kind_the_worst_is_kept(first, second, worst):
+    assert kinds([first, second, first]) == [f"{(first, second)[worst]} (and 1 more of this kind)"]
 
 
 def weights_and_signs(text):

@@ -221,3 +221,11 @@ def test_reduce_speaks_as_the_other_commands(cli):
     assert "warning:" not in text
     assert "Warning: " in text
     assert "e+0" not in text
+
+
+def test_speeds_of_vectors_without_a_unit_are_rad_s_as_of_other_commands(cli):
+    settings = sample_data() / "waveforms" / "waveforms.toml"
+    found = [cli("vectors", settings, "--speeds", text, "--json").json for text in ("204.2", "204.2rad/s")]
+    assert found[0]["rows"] == found[1]["rows"] != []
+    refused = cli("vectors", settings, "--speeds", "2935")
+    assert (refused.code, refused.err.count("\n")) == (2, 1)

@@ -492,3 +492,16 @@ def test_waiting_is_shown_at_a_terminal_only(monkeypatch, capsys):
 def test_help_has_an_example(cli):
     for command in ("campbell", "response", "critical", "influence"):
         assert "Example: rotorid " + command in cli(command, "--help").out
+
+
+@pytest.mark.parametrize(("model", "named"), [("", 3), ("shear = true\nrotary_inertia = true", 0)])
+def test_what_a_stubby_shaft_lacks_is_one_warning(cli, tmp_path, model, named):
+    columns = ["length_m", "diameter_m", "inner_diameter_m", "support_stiffness_N_per_m"]
+    shaft = [[0.06, 0.05, "", 1e8], [0.06, 0.05, 0.02, ""], [0.06, 0.05, "", ""], [0, 0.05, "", 1e8]]
+    write_csv(tmp_path / "shaft.csv", [columns, *shaft])
+    file = tmp_path / "rotor.toml"
+    file.write_text(f'shaft = "shaft.csv"\n[model]\n{model}\n')
+    document = cli("critical", file, "-n", 3, "--json").json
+    said = [text for text in document["warnings"] if "too high" in text]
+    assert sum(text.count("mode ") for text in said) == named
+    assert len(said) == (named > 0)

@@ -207,3 +207,33 @@ def test_speeds_are_bounded():
                 speeds(text + unit)
             with pytest.raises(ValueError, match="is not a range"):
                 band(f"1:{text}{unit}")
+
+
+@pytest.mark.parametrize("way", [["-OO"], []])
+def test_without_docstrings_commands_work_and_their_help_is_the_same(way, tmp_path):
+    def output(way, *words, **environment):
+        command = [sys.executable, *way, "-m", "rotorid", *map(str, words)]
+        done = subprocess.run(
+            command, capture_output=True, env={**os.environ, **environment}, cwd=tmp_path, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    level = {} if way else {"PYTHONOPTIMIZE": "2"}
+    for words in (["balance", "--help"], [], ["critical", ROTOR, "-n", "2"]):
+        assert output(way, *words, **level) == output([], *words) != b""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits of a process")
+def test_a_workbook_that_does_not_fit_is_one_message_that_names_it(tmp_path):
+    import resource
+
+    def little_room():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+    options = {"cwd": tmp_path, "preexec_fn": little_room, "env": {**os.environ, "TMPDIR": str(tmp_path)}}
+    process = start("critical", ROTOR, "--output", "modes.xlsx", **options)
+    out, err = process.communicate(timeout=60)
+    expected = b"rotorid: modes.xlsx: expected a file that can be written (File too large)\n"
+    assert (process.returncode, out, err) == (2, b"", expected)
+    assert list(tmp_path.iterdir()) == []

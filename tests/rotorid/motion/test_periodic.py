@@ -387,3 +387,38 @@ def test_motions_that_no_branch_shows_are_said():
     given = [CubicSpring(1, "", 1.0, 0.5), InternalDamping(1, "", 0.1)]
     told = periodic_motion(disc(1.0, given, damping=0.1), 1.0, 3.0).warnings[-1]
     assert "(--limit-cycle), at 23.8732 and 28.6479 rpm" in told  # 2.5 and 3 rad/s; below 2 it rests
+
+
+@pytest.mark.parametrize("external", [20.0, 8.0])
+def test_the_whirl_that_begins_is_told_by_its_shape(external):
+    """c_i ω / (c_i + c_e): the natural frequency by the speed, which the multiplier does not tell."""
+    internal, stiffness, mass = 40.0, 1e5, 5.0
+    natural = np.sqrt(stiffness / mass)
+    damping = [InternalDamping(1, "", damping=internal)]
+    problem = disc(mass, damping, damping=external, stiffness=(stiffness,) * 2, unbalance=1e-4)
+    found = periodic_motion(problem, 1.05 * natural, 1.1 * natural * (1 + external / internal))
+    (row,) = Readings(found, ("1",), np.eye(2)[:1]).to_dict()["bifurcations"]
+    assert row["bifurcation"] == TORUS
+    assert row["whirl_ratio"] == pytest.approx(internal / (internal + external), rel=1e-4)
+
+
+def test_time_that_runs_out_leaves_what_is_known(monkeypatch):
+    """By a clock that counts how often it is asked: the branch up to there, and what was not sought."""
+    from rotorid.motion import periodic
+
+    asked = [0]
+
+    def clock():
+        asked[0] += 1
+        return float(asked[0])
+
+    monkeypatch.setattr(periodic.time, "monotonic", clock)
+    problem = damper(0.05, 0.30)
+    found = periodic_motion(problem, 0.4, 3.0, max_seconds=60)
+    (branch,) = found.branches
+    assert branch.speeds[0] == 0.4
+    assert 0.4 < branch.speeds[-1] < 3.0
+    assert "60 s" in found.warnings[0]
+    assert any("synchronous branch stopped" in text for text in found.warnings)
+    with pytest.raises(ValueError, match="raise --max-seconds"):
+        periodic_motion(problem, 0.4, 3.0, max_seconds=1)

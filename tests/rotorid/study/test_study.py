@@ -271,7 +271,7 @@ def test_without_pyarrow_one_sentence_says_how_to_get_it(cli, tmp_path, monkeypa
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     outcome = cli("study", write(tmp_path))
     assert outcome.code == 2
-    assert outcome.err == 'rotorid: a study needs pyarrow: pip install "rotorid[fleet]"\n'
+    assert outcome.err == "rotorid: a study needs pyarrow: pip install pyarrow\n"
 
 
 def test_the_pictures_have_a_limit_and_units(tmp_path):

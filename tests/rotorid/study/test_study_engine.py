@@ -171,6 +171,26 @@ def test_a_folder_of_another_study_is_refused_as_it_is(tmp_path, threads):
         study(file, StudyOptions(results=tmp_path), executor=threads)
 
 
+def test_a_second_study_into_the_same_folder_is_refused_while_the_first_runs(tmp_path, threads):
+    file, folder = write(tmp_path), tmp_path / "kept"
+
+    class Second(Losing):
+        """Tries the same study in another process before the first of its own samples."""
+
+        def submit(self, function, *args):
+            words = [sys.executable, "-m", "rotorid", "study", file, "--results", folder]
+            self.second = subprocess.run(words, capture_output=True, text=True, timeout=120)
+            return super().submit(function, *args)
+
+    executor = Second(set())
+    study(file, StudyOptions(results=folder), executor=executor)
+    assert (executor.second.returncode, executor.second.stdout) == (2, "")
+    assert executor.second.stderr.startswith(f"rotorid: {folder}: a study is running here")
+    first = kept(folder)
+    study(file, StudyOptions(results=folder), executor=threads)
+    assert kept(folder) == first
+
+
 class Rows(list):
     """Rows that can be watched."""
 

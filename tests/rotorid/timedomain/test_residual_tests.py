@@ -229,3 +229,25 @@ def test_stated_errors_that_are_far_too_large_are_said():
     assert "these are too large" in " ".join(fit(model, wide).warnings)
     with pytest.raises(ValueError, match="nothing to estimate them for"):
         fit(model, wide, weigh=True)
+
+
+def following(rho, seed, n=200):
+    """A charging curve with errors that follow each other, AR(1)."""
+    t, rng = np.linspace(0.0, 6.0, n), np.random.default_rng(seed)
+    error = rng.standard_normal(n)
+    for i in range(1, n):
+        error[i] = rho * error[i - 1] + np.sqrt(1 - rho**2) * error[i]
+    return Record(t, {"x": 1.25 * (1 - np.exp(-0.8 * t)) + 0.01 * error})
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.7])
+def test_intervals_hold_where_residuals_follow_each_other(rho):
+    model = ode_model({"x": "-a*x + b"}, initial={"x": 0.0}, estimate={"a": 0.6, "b": 0.8})
+    hits, reliable, count = np.zeros(2), 0, 60
+    for seed in range(count):
+        found = fit(model, following(rho, seed))
+        low, high = found.ci95.T
+        hits += (low < [0.8, 1.0]) & (high > [0.8, 1.0])
+        reliable += found.reliable
+    assert (hits >= 0.87 * count).all()  # three standard deviations less than 95 %
+    assert reliable == count if rho == 0 else reliable <= 0.05 * count

@@ -11,6 +11,23 @@ from rotorid.workflows import PeriodicOptions, ResponseOptions, periodic, respon
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 RANGE = ("--speeds", "6200:6600rpm")
+DAMPER = """
+nodes = [1]
+masses_kg = [25]
+weight_N = [0]
+shaft_stiffness_N_per_m = [[0]]
+[[squeeze_film]]
+node = 1
+length_mm = 10
+diameter_mm = 100
+clearance_um = 100
+viscosity_mPa_s = 5
+centring_stiffness_N_per_m = 1e6
+[[unbalance]]
+node = 1
+unbalance_g_mm = 750
+angle_deg = 0
+"""
 
 
 @pytest.mark.full
@@ -79,3 +96,19 @@ def test_on_linear_supports_it_is_the_response():
     size = abs(steady.response.readings(steady.sensors))
     np.testing.assert_allclose(found.along[0][[0, -1]], size, rtol=1e-3)
     assert branch.stable.all()
+
+
+def test_no_bifurcation_says_what_was_tried(cli, tmp_path):
+    (tmp_path / "damper.toml").write_text(DAMPER)
+    found = cli("periodic", tmp_path / "damper.toml", "--speeds", "590:600")
+    assert found.code == 0
+    assert "No bifurcation." in found.out
+    tried = cli("periodic", tmp_path / "damper.toml", "--speeds", "590:600", "--json").json["tried"]
+    assert all(speed in tried for speed in ("5634.08", "5681.83", "5729.58"))
+    assert tried in " ".join(found.out.split())
+
+
+def test_a_limit_of_time_that_is_none(cli):
+    told = cli("periodic", ROTOR, *RANGE, "--max-seconds", "0")
+    assert told.code == 2
+    assert "max-seconds" in told.err

@@ -547,3 +547,23 @@ def test_an_empty_table_is_begun_in_place(tmp_path):
     assert job.state()["tables"]["runs"]["file"] == "runs.csv"
     job.undo()
     assert contents(tmp_path)["runs.csv"] == b""
+
+
+def test_a_step_that_fails_at_its_last_file_leaves_none_of_the_others(tmp_path, monkeypatch):
+    """The table of the check run is made, then the job, which names it, cannot be replaced."""
+    job = plain_job(tmp_path, "run,speed_rpm,sensor,amplitude,phase_deg\nbase,1000,A,1,2\n")
+    before, real = contents(tmp_path), Path.replace
+
+    def replace(self, target):
+        if target.name == "job.toml":
+            raise PermissionError(13, "in use")
+        return real(self, target)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", replace)
+        with pytest.raises(ValueError, match=r"^job\.toml is open in Excel"):
+            job.apply([{"create": "check", "header": HEADER}])
+    assert contents(tmp_path) == before
+    assert job.look() == []
+    job.apply([{"create": "check", "header": HEADER}])
+    assert contents(tmp_path).keys() - before.keys() == {"check.csv"}

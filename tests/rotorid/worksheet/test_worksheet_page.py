@@ -302,3 +302,15 @@ def test_nothing_sticks_out_and_axe_finds_nothing_serious(tmp_path, serve, share
         assert [(one["id"], [node["html"][:200] for node in one["nodes"]]) for one in serious] == []
         if width < 1366:
             assert window.driver.execute_script(_TARGETS, FINGER) == []
+
+
+def test_equal_numbers_of_a_list_are_all_saved(turbo, serve, windows):
+    window, job = windows[0], turbo / "holes.toml"
+    window.open(serve(job).address)
+    plane = next(iter(tomllib.loads(job.read_text(encoding="utf-8"))["planes"]))
+    for key, text in (("available_g_mm", "20; 10; 5; 50"), ("stock", "1; 1; 1; 1")):
+        window.type(f'[data-key="planes.{plane}.{key}"]', text)
+        window.leave()
+    window.saved()
+    saved = tomllib.loads(job.read_text(encoding="utf-8"))["planes"][plane]
+    assert (saved["available_g_mm"], saved["stock"]) == ([20, 10, 5, 50], [1, 1, 1, 1])

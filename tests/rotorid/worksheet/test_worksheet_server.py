@@ -1,5 +1,9 @@
 """The worksheet over HTTP: who may use it, its numbers, two windows, edits that survive, long work."""
 
+import contextlib
+import http.client
+import itertools
+import json
 import shutil
 import subprocess
 import sys
@@ -304,7 +308,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
     words = [sys.executable, "-c", code, "worksheet", str(tmp_path), "--no-browser"]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == 'rotorid: the worksheet needs uvicorn: pip install "rotorid[worksheet]"\n'
+    assert done.stderr == "rotorid: the worksheet needs uvicorn: pip install starlette uvicorn tomlkit\n"
 
 
 @pytest.mark.full
@@ -403,3 +407,16 @@ def test_a_column_without_which_rows_say_nothing_must_be_in_the_file_wherever_it
     assert (status, "speed_rpm" in answer["error"]) == (400, True)
     assert take("speed_rpm,sensor,amplitude,phase_deg\n3000,1,7.1,238\n")[0] == 200
     assert (folder / "runs.csv").read_text().splitlines()[-1] == ",again,3000,1,7.1,238"
+
+
+def test_a_body_in_chunks_is_counted_as_it_comes(shared):
+    """Who sends more than the page may is refused, though no header says how much it is."""
+    served = shared()
+    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=60)
+    with contextlib.closing(connection):
+        headers = {"X-Rotorid-Token": served.token, "Host": f"127.0.0.1:{served.port}"}
+        blanks = (b" " * 1_000_000 for _ in range(31))  # of JSON: fewer would be read as any other body
+        connection.request("POST", "/edit", itertools.chain(blanks, [b'{"edits": []}']), headers)
+        answer = connection.getresponse()
+        assert (answer.status, json.loads(answer.read())) == (400, {"error": "at most 30 MB"})
+    assert served.edit()[0] == 200

@@ -95,7 +95,6 @@ BAD_CELLS = [
     ("diameter_m", "", "a number"),
     ("diameter_m", "110 mm", "write the unit in the header"),
     ("mass_kg", -5, "0 (nothing attached) or more"),
-    ("mass_kg", "", "a number"),
     ("mass_kg", "inf", "a finite number"),
     ("support_stiffness_N_per_m", "rigid", "a number"),
     ("support_stiffness_N_per_m", -1, "0 (nothing attached) or more"),
@@ -108,16 +107,40 @@ def test_bad_cells(table, column, value, words):
     the_only(problems, "rotor.csv", 3, column, str(value), words)
 
 
-@pytest.mark.parametrize(
-    "column",
-    ["inner_diameter_m", "youngs_modulus_Pa", "density_kg_per_m3", "poisson_ratio", "material_damping_s"],
-)
-def test_blanks_in_optional_columns_are_not_filled(table, column):
-    usual = {"youngs_modulus_Pa": 2e11, "density_kg_per_m3": 7800}.get(column, 0.05)
+NOTHING = {
+    "inner_diameter_m": (0.05, "inner_diameter", 0.0),
+    "youngs_modulus_Pa": (2e11, "youngs_modulus", 2.1e11),
+    "density_kg_per_m3": (7700, "density", 7800.0),
+    "poisson_ratio": (0.2, "poisson_ratio", 0.3),
+    "material_damping_s": (0.05, "material_damping", 0.0),
+}
+
+
+@pytest.mark.parametrize("column", NOTHING)
+@pytest.mark.parametrize("book", [False, True])
+def test_blanks_in_optional_columns_of_elements_say_nothing(table, tmp_path, column, book):
+    usual, name, default = NOTHING[column]
     wide = [[*TABLE[0], column], *([*row, usual] for row in TABLE[1:])]
-    assert table(wide).n_elements == 3
-    the_only(complaints(table, replaced(wide, 4, column, "")), "rotor.csv", 4, column, "", "a number")
+    blank = replaced(wide, 4, column, "")
+    rotor = read_rotor(write_book(tmp_path / "a.xlsx", {"rotor": blank})) if book else table(blank)
+    assert getattr(rotor, name).tolist() == [usual, usual, default]
     the_only(complaints(table, replaced(wide, 4, column, -1)), "rotor.csv", 4, column, "-1", "")
+
+
+def test_blanks_in_columns_of_nodes_attach_nothing(table, tmp_path):
+    columns = ["mass_kg", "polar_inertia_kg_m2", "support_stiffness_N_per_m", "support_damping_N_s_per_m"]
+    header = ["length_m", "diameter_m", *columns]
+    blank = [header, [0.1, 0.05, "", "", 1e8, ""], [0.1, 0.05, 2, "", "", ""], [0, "", "", "", 1e8, 30]]
+    for rotor in (table(blank), read_rotor(write_book(tmp_path / "a.xlsx", {"rotor": blank}))):
+        assert rotor.discs == (Disc(2, 2.0),)
+        assert rotor.supports == (Support(1, 1e8), Support(3, 1e8, 30.0))
+
+
+def test_an_element_much_shorter_than_its_neighbour(table):
+    short = [[*TABLE[0]], *([*row] for row in TABLE[1:]), ["end", 0, 0, 2e7, 3]]
+    assert table(replaced(short, 3, "length_m", 1.1e-4)).n_elements == 3
+    problems = complaints(table, replaced(short, 3, "length_m", 1e-4))
+    assert "element 2: its length, 0.0001 m, is less than 1/3000 of its longer neighbour" in str(problems[0])
 
 
 def test_a_bore_larger_than_the_shaft(table):

@@ -291,7 +291,7 @@ def test_channels_of_tdms_groups(tmp_path):
 def test_without_the_extra_it_is_said_how_to_install_it(suffix, name, tmp_path, monkeypatch):
     (tmp_path / f"a{suffix}").write_bytes(b"x")
     monkeypatch.setitem(sys.modules, name, None)
-    refused(tmp_path / f"a{suffix}", 'pip install "rotorid[instruments]"')
+    refused(tmp_path / f"a{suffix}", f"pip install {name}")
 
 
 def test_files_that_are_none(tmp_path):

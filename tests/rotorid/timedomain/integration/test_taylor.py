@@ -52,7 +52,9 @@ def test_drawn_models_in_drawn_units_are_integrated_as_without_it(monkeypatch):
             slow = simulate(model, model.start, record, rtol=1e-12)
         except SimulationError:
             continue
-        found = simulate(model, 1.0 * model.start, record)
+        with taylor.learning([model]):
+            for _ in range(2):
+                found = simulate(model, 1.0 * model.start, record)
         compiled += found.method == "taylor"
         for ours, theirs in ((found.x, slow.x), (found.S, slow.S)):
             limit = 1e-7 * np.abs(theirs).max(axis=0)
@@ -84,22 +86,35 @@ def test_what_diverges_says_the_same(monkeypatch):
     monkeypatch.setattr(taylor, "WORK", 1)
     t = np.linspace(0.0, 0.9, 10)
     model = ode_model({"x": "a*x**2"}, initial={"x": 1.0}, estimate={"a": 1.0})
-    for theta in (0.5, 0.6):
-        found = simulate(model, [theta], t)
-        np.testing.assert_allclose(found.x[:, 0], 1 / (1 - theta * t), rtol=1e-9)
-    assert found.method == "taylor"
-    with pytest.raises(SimulationError, match=r"diverges: at t = 0\.8"):
-        simulate(model, [1.25], t)
+    with taylor.learning([model]):
+        for theta in (0.5, 0.6):
+            found = simulate(model, [theta], t)
+            np.testing.assert_allclose(found.x[:, 0], 1 / (1 - theta * t), rtol=1e-9)
+        assert found.method == "taylor"
+        with pytest.raises(SimulationError, match=r"diverges: at t = 0\.8"):
+            simulate(model, [1.25], t)
 
 
 def test_a_pulse_is_not_stepped_over(monkeypatch):
     monkeypatch.setattr(taylor, "WORK", 1)
     model = ode_model({"x": "a*exp(-((t - 5)/0.05)**2) - x"}, initial={"x": 0.0}, estimate={"a": 1.0})
     t = np.linspace(0.0, 10.0, 101)
-    model.machine["taylor"] = None
     slow = simulate(model, [1.0], t)
-    model.machine.clear()
-    for _ in range(2):
-        found = simulate(model, [1.0], t)
+    with taylor.learning([model]):
+        for _ in range(2):
+            found = simulate(model, [1.0], t)
     assert (slow.method, found.method) == ("dop853", "taylor")
     np.testing.assert_allclose(found.x, slow.x, atol=1e-9)
+
+
+def test_a_simulation_gives_the_same_bytes_however_often(monkeypatch):
+    """Also after fits that have compiled the model."""
+    monkeypatch.setattr(taylor, "WORK", 100)
+    t = np.linspace(0.0, 10.0, 101)
+    model = model_of({"x": "v", "v": "-a*x - b*x**3 - 0.1*v"})
+    first = simulate(model, [1.0, 0.5, 0.2], t)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(first.x.shape)
+    record = Record(t, dict(zip(("x", "v"), (first.x + noise).T, strict=True)))
+    assert fit(model, record).integrator == "taylor"
+    again = [simulate(model, [1.0, 0.5, 0.2], t) for _ in range(4)]
+    assert {(one.method, one.S.tobytes()) for one in again} == {(first.method, first.S.tobytes())}
