@@ -94,20 +94,6 @@ def test_what_another_writer_has_added_meanwhile_is_known(tree, monkeypatch):
     assert (added.jobs, added.vectors, added.known) == (1, 12, 1)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems know no such names")
-def test_names_that_are_no_text_spoil_nothing(tree):
-    os.rename(tree / "fan", os.fsencode(tree) + b"/L\xfcfter")
-    assert fleet_add("F", [tree]).jobs == 2
-    assert fleet_add("F", [tree]).known == 2
-    assert set(FleetStore(tree.parent / "F").table("jobs")["machine_type"]) == {"L\ufffdfter"}
-
-
-def test_a_folder_with_a_colon_is_no_address(tree):
-    fleet_add("on:2/F", [tree])
-    assert len(FleetStore(tree.parent / "on:2" / "F").table("readings")) == 28
-    assert len(FleetStore(Path("on:2/F")).table("jobs")) == 2
-
-
 def test_tables_are_plain_parquet(tree):
     fleet_add("F", [tree])
     for name, columns in TABLES.items():
@@ -205,20 +191,6 @@ def test_two_writers_at_once_one_with_two_processes(tmp_path):
     for name in TABLES:
         one, other = store.table(name), FleetStore(tmp_path / "G").table(name)
         pd.testing.assert_frame_equal(one, other)
-
-
-class Dying(ThreadPoolExecutor):
-    """Workers that the system ends."""
-
-    def map(self, *given, chunksize):
-        yield from super().map(*given, chunksize=chunksize)
-        raise BrokenProcessPool
-
-
-def test_a_worker_that_dies_is_told(tree, monkeypatch):
-    monkeypatch.setattr("rotorid.workflows.fleet.fleet_add.worker_pool", Dying)
-    with pytest.raises(ValueError, match="has died; the memory may be too small for so many workers"):
-        fleet_add("F", [tree], FleetAddOptions(workers=2))
 
 
 def test_show_tells_types_and_machines(tmp_path, cli):

@@ -117,17 +117,6 @@ def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
     assert "coefficients of the type 'fan', 25 machines" in " ".join(found.result.notes)
 
 
-def test_each_run_narrows_what_is_known(fleet, tmp_path):
-    machine, sizes, lefts = Machine(np.random.default_rng(22)), [], []
-    for runs in (1, 2, 3):
-        job = machine.job(tmp_path / str(runs), runs=runs, more="" if runs != 2 else "[planes.L]\n")
-        found = balance(job, BalanceOptions(machine_type=address(fleet))).result
-        sizes.append(np.trace(found.covariance))
-        lefts.append(np.linalg.norm(machine.W @ (found.weights * 1e3 - machine.D)) if runs != 2 else np.nan)
-    assert sizes[0] > sizes[2]
-    assert lefts[2] < 0.5 * lefts[0]
-
-
 def test_a_check_run_refines(fleet, tmp_path):
     machine = Machine(np.random.default_rng(23))
     job = machine.job(tmp_path / "checked", check=True)
@@ -232,15 +221,6 @@ def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
     assert "keyphasor" in found.of_type.reason
     assert not found.to_dict()["of_type"]["of_type"]
     assert found.to_dict()["judgement"]["word"] == "do not mount"
-
-
-@pytest.mark.full
-def test_machines_of_the_type_are_seldom_called_others(fleet, tmp_path):
-    rng, said = np.random.default_rng(25), 0
-    for k in range(30):
-        job = Machine(rng).job(tmp_path / str(k))
-        said += type_coefficients(read_job(job), address(fleet)).probability < 0.001
-    assert said <= 1
 
 
 @pytest.mark.usefixtures("cli")

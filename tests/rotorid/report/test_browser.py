@@ -115,19 +115,6 @@ def test_the_browser_sees_what_a_sheet_must_not_do(browser, tmp_path):
     assert disagreements(shown, browser.document()) == ["a is 1.0, shown as 2"]
 
 
-def test_a_good_page_is_not_complained_about(browser, tmp_path):
-    page = tmp_path / "good.html"
-    page.write_text(
-        '<!doctype html><meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
-        "<p>short</p>",
-        encoding="utf-8",
-    )
-    browser.resize(TELEPHONE)
-    visit = browser.open(page)
-    assert (visit.console, foreign(visit, page), browser.too_wide()) == ([], [], [])
-    assert browser.widths() == (TELEPHONE, TELEPHONE)
-
-
 def test_a_machine_without_a_browser_says_what_to_install(monkeypatch):
     monkeypatch.setenv("PATH", "")
     assert "chromium and chromium-driver" in browsers.missing()

@@ -145,50 +145,6 @@ def test_the_rows_of_lessons_1_to_4(task):
     assert list(shown.columns) == UNKNOWNS.get(task, list(shown.columns))
 
 
-def test_the_printed_third_row_of_lesson_1_is_another():
-    third = identify(*files("task_1_1")).equations.symbolic[2]
-    assert not same(third, "-w*X2i*a1 + w*(X1i - X2i)*a12 = c2*X1r + (m2*w**2 - c2)*X2r")
-
-
-def test_formula_23_with_the_coupling_where_it_prints_c1_and_c2():
-    model, truth, w, inputs = two_masses()
-    shown = identify(model, simulate_harmonic(model, truth, w, inputs)).equations
-    right = (
-        "F1 + (m1*w**2 - c1)*X1r - c*X2r",
-        "(m1*w**2 - c1)*X1i - c*X2i",
-        "-c*X1r + (m2*w**2 - c2)*X2r",
-        "(m2*w**2 - c2)*X2i - c*X1i",
-    )
-    left = ("-w*X1i*a1 - w*X2i*a", "w*X1r*a1 + w*X2r*a", "-w*X2i*a2 - w*X1i*a", "w*X2r*a2 + w*X1r*a")
-    for row, a, b in zip(shown.symbolic, left, right, strict=True):
-        assert same(row, f"{a} = {b}")
-    np.testing.assert_allclose(shown.solution, truth, rtol=1e-9)
-
-
-def test_formula_27_turned_by_the_phase():
-    model = harmonic_model(
-        ["(m*p**2 + b*p + c)*Z - q*p/omega*Z = -m*e*p**2"],
-        known={"m": 10.0, "e": 1e-4},
-        estimate=["c", "b", "q"],
-        varying=["omega"],
-    )
-    w = np.array([80.0, 100.0, 120.0])
-    Z = np.array([1.4e-6 - 16e-6j, -20e-6j, -1.8e-6 - 24e-6j])
-    tests = experiments(model, w, {"Z": Z, "omega": w})
-    real, imaginary = identify(model, tests).equations.symbolic
-    Z, phi, omega = sympy.symbols("Z phi omega")
-    put = {sympy.Symbol("Zr"): Z * sympy.cos(phi), sympy.Symbol("Zi"): Z * sympy.sin(phi)}
-    re, im = (side(row.left).subs(put) - side(row.right).subs(put) for row in (real, imaginary))
-    turned = [re * sympy.cos(phi) + im * sympy.sin(phi), re * sympy.sin(phi) - im * sympy.cos(phi)]
-    m, c, b, q, e = sympy.symbols("m c b q e")
-    printed = [  # the term b of the second row lacks its ω in the print of the theory: −Z ω b
-        Z * c - Z * omega**2 * m - m * e * omega**2 * sympy.cos(phi),
-        -Z * omega * b + Z * q - m * e * omega**2 * sympy.sin(phi),
-    ]
-    for got, wanted in zip(turned, printed, strict=True):
-        assert sympy.simplify(got.subs(sympy.Symbol("w"), omega) - wanted) == 0
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_symbols_with_numbers_put_in_are_the_matrix_that_gives_the_estimate(task):
     model, data = files(task)
@@ -285,22 +241,6 @@ def test_the_stretched_rows_give_the_weights():
     assert not any("another way" in note for note in shown.notes)
 
 
-def test_blocks_and_names_of_the_stretched_rows():
-    found = balance(JOB, BalanceOptions(method="least-squares"))
-    shown, result = found.equations, found.result
-    W = shown.matrix
-    np.testing.assert_array_equal(W[::2, ::2], W[1::2, 1::2])  # [[Re, −Im], [Im, Re]]
-    np.testing.assert_array_equal(W[::2, 1::2], -W[1::2, ::2])
-    sensor, speed = result.sensors[1], result.labels.speed_words(result.speeds[0])
-    assert shown.rows[2:4] == [f"Re {sensor}, {speed}", f"Im {sensor}, {speed}"]
-    assert shown.columns[:2] == [f"Re {result.planes[0]}", f"Im {result.planes[0]}"]
-    values = {f"Re W{p + 1}": W[2, 2 * p] for p in range(len(result.planes))}
-    values |= {f"Im W{p + 1}": W[3, 2 * p] for p in range(len(result.planes))}
-    for k, row in enumerate(shown.symbolic):
-        numbers = [float(sympy.sympify(c).subs(values)) for c, _ in row.left]
-        np.testing.assert_allclose(numbers, W[2 + k])
-
-
 def test_weights_of_readings_and_other_methods():
     job = read_job(JOB)
     counts = np.ones((len(job.trials.speeds), len(job.trials.sensors)))
@@ -348,14 +288,6 @@ def test_the_printed_matrices_of_formula_50_with_a_seal():
         np.testing.assert_allclose(float(side(row.right).subs(values)), D, rtol=1e-12)
 
 
-def test_the_masses_of_the_readme_of_the_book():
-    shown = reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=1)).equations
-    np.testing.assert_allclose(
-        np.linalg.solve(shown.matrix, shown.right), [140.357, 191.941, 160.680], atol=1e-3
-    )
-    assert shown.rows[0] == "mass at 7, mode 1"
-
-
 def test_other_rows_of_formula_50():
     relative = reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=2, rows="relative", normalise="largest"))
     shown = relative.equations
@@ -371,34 +303,6 @@ def test_other_rows_of_formula_50():
 
 def written(shown, name):
     return [row.written() for row in shown.symbolic if row.name == name]
-
-
-def test_formula_37_of_the_three_masses():
-    shown = fit(FIT / "three_masses" / "model.toml", FIT / "three_masses" / "record.csv").equations
-    A = [
-        ["0", "1", "0", "0", "0", "0"],
-        ["-(c2 + c1)/m1", "0", "c2/m1", "0", "0", "0"],
-        ["0", "0", "0", "1", "0", "0"],
-        ["c2/m2", "0", "-(c2 + c3)/m2", "0", "c3/m2", "0"],
-        ["0", "0", "0", "0", "0", "1"],
-        ["0", "0", "c3/m3", "0", "-(c4 + c3)/m3", "0"],
-    ]
-    y = ["y1", "v1", "y2", "v2", "y3", "v3"]
-    rate = [sum(parse(a) * sympy.Symbol(x) for a, x in zip(row, y, strict=True)) for row in A]
-    rows = iter(shown.symbolic)
-    for theta in ("c1", "m1", "m2"):
-        for i, name in enumerate(y):
-            U = [sympy.Symbol(f"∂{x}/∂{theta}") for x in y]
-            wanted = sum(parse(a) * u for a, u in zip(A[i], U, strict=True))
-            wanted += sympy.diff(rate[i], sympy.Symbol(theta))
-            row = next(rows)
-            assert [(c, str(d)) for c, d in row.left if c != 0] == [(1, f"d(∂{name}/∂{theta})/dt")]
-            assert sympy.simplify(side(row.right) - wanted) == 0
-    assert len(written(shown, "start")) == 18
-    assert all(text.endswith(" = 0") for text in written(shown, "start"))
-    assert "d(∂v1/∂c1)/dt = (-c1 - c2)/m1·∂y1/∂c1 + c2/m1·∂y2/∂c1 - y1/m1" in written(shown, "rate")
-    np.testing.assert_allclose(shown.solution, [0.13999975, 11.99998962, 28.00000273], rtol=1e-6)
-    assert shown.rows == ()
 
 
 def test_symbols_are_what_is_integrated():
@@ -525,26 +429,6 @@ def test_latex_can_be_read(name):
     assert text.count(r"\\" + "\n" + r"\text{") == len(shown.symbolic) - 1
 
 
-@pytest.mark.parametrize("broken", [r"\frac{a}{b", r"\left(a", "a_{1}_{2}", r"\nocommand{a}", "a^"])
-def test_what_is_broken_is_found(broken):
-    with pytest.raises(ValueError):
-        readable(broken)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "fault"),
-    [
-        (r"\end{align*}", "", "end of document"),
-        (r"\end{document}", r"\end{document}}", "braces"),
-        (" & ", "  ", "cells"),
-        (r"\ensuremath{\omega}", "ω", "ω"),
-    ],
-)
-def test_a_broken_document_is_found(old, new, fault):
-    text = FOUND["identify"].equations.latex()
-    assert fault in document_faults(text.replace(old, new))
-
-
 @pytest.mark.parametrize(
     ("name", "formula"),
     [
@@ -627,15 +511,6 @@ def test_text_and_latex_have_the_numbers_of_the_matrix():
         np.testing.assert_allclose([float(x.rstrip(" \\")) for x in cells], numbers, rtol=1e-5)
 
 
-def test_a_long_name_of_an_unknown_is_cut_over_its_column_only():
-    names = [f"{letter * 60}{k}" for k in (1, 2) for letter in "ab"]
-    shown = Equations("t", [], ("K", "θ", "Y"), ["r"], names, np.ones((1, 4)), np.ones(1), np.ones(4))
-    whole = shown.answer(FOUND["fit"].answer).whole()
-    assert max(map(len, whole.splitlines())) <= 100
-    assert whole.count("a" * 19 + "…") == 2
-    assert all(f"{name} = 1" in whole and name in shown.latex() for name in names)
-
-
 def test_an_undetermined_unknown_is_said():
     nothing = Equations(
         "t", [], ("K", "θ", "Y"), ["r"], ["a", "b"], np.ones((1, 2)), np.ones(1), np.array([1, np.nan])
@@ -659,13 +534,3 @@ def test_the_command_prints_text_table_latex_and_json(cli):
     for document in (with_it, without):
         document["provenance"].pop("date")
     assert with_it == without
-
-
-def test_stated_errors_of_the_model_count_too():
-    model, data = files("task_1_1")
-    file = read_harmonic_model(model)
-    stated = replace(read_measurements(data, file), errors=AmplitudeErrors(relative=0.02, phase=0.02))
-    shown = identify(file.model, stated).equations
-    solved = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
-    np.testing.assert_allclose(solved, shown.solution, rtol=1e-9)
-    assert "after weighting" in shown.notes[0]

@@ -52,24 +52,6 @@ def test_nothing_from_outside_and_ids_once(name):
     assert [tag for tag, *_ in sheet.order].count("svg") == 1
 
 
-@pytest.mark.parametrize("name", ESTIMATES)
-def test_warnings_then_the_judgement_then_the_estimate_then_pictures(name):
-    sheet = read_sheet(make(name).html)
-    text = words_of(sheet)
-    for warning in every_warning(sheet.document):
-        assert " ".join(warning.split()) in text.split("<main>")[0]
-    places = [text.index(part) for part in ('id="warnings"', "What was found", PARAMETERS, "<svg")]
-    assert places == sorted(places)
-
-
-@pytest.mark.parametrize("name", ESTIMATES)
-def test_the_model_stands_there_as_its_file_says(name):
-    model = next(word for word in COMMANDS[name].split() if word.endswith(".toml"))
-    sheet = read_sheet(make(name).html)
-    listing = html.unescape(sheet.text.split("The model, as its file says")[1].split("<pre>")[1])
-    assert listing.split("</pre>")[0] == (sample_data() / model).read_text(encoding="utf-8").strip()
-
-
 def test_a_fit_says_its_data_and_each_signal():
     sheet = read_sheet(make("fit from record").html)
     text = words_of(sheet)
@@ -95,15 +77,6 @@ def test_intervals_of_the_sheet_are_those_of_the_document():
         value, std, low, high = numbers(row[1:])
         assert [value, low, high] == pytest.approx([one["value"], *one["ci95"]], abs=0.06 * one["std"])
         assert std == pytest.approx(one["std"], rel=0.005)
-
-
-def test_several_records_and_the_tolerance_that_ended_it():
-    sheet = read_sheet(make("fit two records").html)
-    text = words_of(sheet)
-    assert "record.csv: 31 times, 0 to 3.14159 s; record_noisy.csv: 31 times, 0 to 3.14159 s" in text
-    assert "|Δβ| is below 0.001 |β|" in text
-    assert sheet.document["stopped_by"] == "step"
-    assert len(rows_of(sheet, "Each signal")) == 4
 
 
 def test_a_search_that_stopped_shows_no_interval():
@@ -134,12 +107,6 @@ def test_readings_with_what_the_model_leaves():
     c, damping, w = 99385.71, 4978.845, table[:, 0]
     model = 10 * 1e-4 * w**2 / np.abs(-10 * w**2 + 1j * w * damping + c)
     np.testing.assert_allclose(table[:, 2], model, rtol=1e-3)
-
-
-def test_shapes_have_no_readings_and_errors_are_said():
-    assert "Each reading" not in read_sheet(make("identify shapes").html).text
-    assert "2 % of an amplitude, 1° of a phase" in words_of(read_sheet(make("identify").html))
-    assert "not stated: all count alike" in words_of(read_sheet(make("identify shapes").html))
 
 
 def test_a_design_is_in_the_sheet_with_and_without_data(tmp_path):
@@ -191,14 +158,3 @@ def test_a_model_without_a_file_and_a_bound():
     sheet = read_sheet(fit(model, [Record(t, {"x": np.exp(-2 * t)})]).sheet())
     assert rows_of(sheet, PARAMETERS)[0][-1] == "at its bound"
     assert "as its file says" not in sheet.text
-
-
-def test_outputs_without_samples_are_left_out(recwarn):
-    outputs = {"x": "x", "y": "2*x", "z": "3*x"}
-    model = ode_model({"x": "-a*x"}, initial={"x": 1.0}, estimate={"a": 1.0}, outputs=outputs)
-    t = np.linspace(0.0, 3.0, 30)
-    record = Record(t, {"x": np.exp(-1.2 * t), "y": np.full(30, np.nan)})
-    found = fit(model, [record], FitOptions(allow_missing=True))
-    assert [one["output"] for one in found.document["series"]] == ["x"]
-    assert [row[0] for row in rows_of(read_sheet(found.sheet()), "Each signal")] == ["x"]
-    assert not [str(one.message) for one in recwarn.list]

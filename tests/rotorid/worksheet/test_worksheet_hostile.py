@@ -37,33 +37,6 @@ def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
     assert process.returncode == 130
 
 
-@pytest.mark.full
-def test_an_interrupt_answers_the_windows_that_wait(tmp_path):
-    served = Served(copy(tmp_path) / "job.toml")
-    version, got = served.settled()["version"], []
-    waiting = threading.Thread(target=lambda: got.append(served.ask(f"/state?after={version}")[0]))
-    waiting.start()
-    time.sleep(0.5)
-    served.process.send_signal(signal.SIGINT)
-    assert served.process.communicate(timeout=20) == ("", "")
-    waiting.join(5)
-    assert got == [200]
-
-
-@pytest.mark.full
-def test_another_folder_of_the_same_name_is_computed_anew(tmp_path, serve):
-    folder = copy(tmp_path)
-    served = serve(folder / "job.toml")
-    state = served.settled()
-    shutil.copytree(folder, tmp_path / "copy")
-    folder.rename(tmp_path / "old")
-    (tmp_path / "copy").rename(folder)
-    row = state["tables"]["runs"]["rows"][0]
-    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": "89", "new": "120"}
-    assert served.edit(edit)[0] == 200
-    assert corrections(served.settled()) != corrections(state)
-
-
 @pytest.mark.parametrize("kind", ["loop", "folder", "outside"])
 def test_a_table_that_cannot_be_read_any_more_leaves_no_old_answer(tmp_path, shared, kind):
     served = shared()

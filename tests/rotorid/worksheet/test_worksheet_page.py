@@ -114,33 +114,6 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     assert [line for visit in visits for line in visit.console] == []
 
 
-@pytest.mark.full
-def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
-    window = windows[0]
-    served = serve(turbo / "job.toml")
-    window.open(served.address)
-    window.type(FIRST, "101")
-    window.press(ENTER)
-    window.saved()
-    window.press(*"102", DOWN, *"103", ENTER)
-    served.kill()  # two cells may be on their way
-    window.press(*"104", UP)
-    window.wait(lambda: window.text("#saved").startswith("not saved"), "not saved")
-    assert " wait" in window.text("#saved")
-    assert phases(turbo)[0] == "101"
-
-    again = serve(turbo / "job.toml", "--port", str(served.port))
-    window.wait(lambda: "address" in window.text("#message"), "the token is an old one")
-    assert again.state()["tables"]["runs"]["rows"][0]["cells"][-1] == "101"
-    window.driver.get(again.address)  # of the same page: what waits there stays
-    window.saved()
-    assert phases(turbo)[:16:4] == ["101", "102", "103", "104"]
-    window.open(again.address)
-    assert (
-        window.texts('[data-cell^="runs|baseline|"][data-cell$="|probe 1|phase_deg"]') == phases(turbo)[:20:4]
-    )
-
-
 def test_two_windows_on_one_job_lose_nothing(shared, windows):
     one, other = windows
     served = shared(sample="bk_two_plane")
@@ -226,19 +199,6 @@ def test_a_block_from_excel_is_one_step(shared, windows):
     window.wait(lambda: window.texts(cells) == held, "one step takes it back")
     window.saved()
     assert (turbo / "runs.csv").read_bytes() == before
-
-
-@pytest.mark.full
-def test_headings_of_a_block_are_no_readings(shared, windows):
-    window, served = windows[0], shared()
-    window.open(served.address)
-    window.clipboard("Amplitude\tPhase\r\nµm\t°\r\n3,5\t91\r\n")
-    window.go(FIRST.replace("phase_deg", "amplitude_um_pp"))
-    window.hold(CONTROL, "v")
-    window.wait(lambda: window.text(FIRST) == "91", "the block is there")
-    window.saved()
-    lines = (served.job.parent / "runs.csv").read_text().splitlines()
-    assert lines[1] == "baseline,1220,probe 1,3.5,91"
 
 
 @pytest.mark.full

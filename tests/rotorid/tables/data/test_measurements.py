@@ -71,16 +71,6 @@ def test_excel_with_decimal_commas(table):
     assert rows.names == ("A",)
 
 
-def test_a_workbook(tmp_path):
-    import openpyxl
-
-    book = openpyxl.Workbook()
-    for row in (["frequency_rad_s", "F_re", "X_re", "X_im"], [10, 10, 0, -0.1]):
-        book.active.append(row)
-    book.save(tmp_path / "data.xlsx")
-    assert read_measurements(tmp_path / "data.xlsx", MODEL).signals["X"] == pytest.approx([-0.1j])
-
-
 def test_blank_amplitudes_were_not_measured(table):
     rows = table("frequency_rad_s,F_re,X_amplitude,X_phase_deg,Y_re,Y_im\n1,1,,,2,3\n2,1,0,,,\n", TWO)
     np.testing.assert_array_equal(np.isnan(rows.signals["X"]), [True, False])
@@ -215,11 +205,6 @@ def test_a_model_file(model_file):
     assert file.errors.phase == pytest.approx(math.radians(1))
 
 
-def test_the_smallest_model_file(model_file):
-    file = model_file(SMALL)
-    assert (dict(file.bounds), dict(file.start), file.errors) == ({}, {}, None)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "messages"),
     [
@@ -290,9 +275,3 @@ def test_no_text_of_a_model_file_runs_code(model_file, tmp_path, text):
     with pytest.raises(InputError, match=r"harmonic\.toml"):
         model_file(text.replace("EVIL", EVIL.format(mark)))
     assert not mark.exists()
-
-
-@pytest.mark.parametrize("cell", ["=1+1", "@SUM(1)", EVIL.format("x")])
-def test_no_cell_of_a_table_runs_code(table, cell):
-    with pytest.raises(InputError):
-        table(f'frequency_rad_s,F_re,X_re,X_im\n1,1,"{cell}",3\n')

@@ -137,14 +137,6 @@ def test_stored_coefficients(folder, stored, job):
         np.testing.assert_allclose(again, correct(stored).weights, rtol=1e-12)
 
 
-def test_stored_coefficients_are_put_into_the_order_of_the_readings(folder, stored):
-    runs = [RUNS[0], *([line[0], 1003, *line[2:]] for line in RUNS[2:0:-1])]
-    read = job_from_files([write_csv(folder / "now.csv", runs)], influence=folder / "influence.csv")
-    assert read.trials.sensors == read.influence.sensors == ("B", "A")
-    np.testing.assert_allclose(read.influence.W, stored.W[:, ::-1], rtol=1e-14)
-    np.testing.assert_array_equal(read.influence.speeds, read.trials.speeds)
-
-
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import Labels
 from rotorid.tables import job_from_files, read_job
@@ -90,32 +88,6 @@ def test_a_job_without_any(job):
     assert job(plane("use = true")).left_out == ()
 
 
-def test_a_workbook_says_the_same(job, tmp_path):
-    planes = [
-        ["plane", "max_mass_g", "radius_mm", "forbidden_deg", "use"],
-        ["1", 20, 150, "20-60; 350 - 10", None],
-        ["2", None, None, None, False],
-    ]
-    sensors = [["sensor", "limit", "weight"], ["A", 4, 2], ["B", "2000: 6", 0]]
-    sheets = {"runs": TWO_SPEEDS, "weights": WEIGHTS, "planes": planes, "sensors": sensors}
-    settings = [["key", "value"], ["speed_weights.2000", 0.5]]
-    book = read_job(write_book(tmp_path / "job.xlsx", {**sheets, "settings": settings}))
-    plain = job()
-    for name in ("max_weight", "residual"):
-        np.testing.assert_array_equal(getattr(book.limits, name), getattr(plain.limits, name))
-    assert book.limits.forbidden == plain.limits.forbidden
-    np.testing.assert_array_equal(book.row_weights, plain.row_weights)
-    assert (book.left_out, book.radii) == (plain.left_out, plain.radii)
-    no = replaced(planes, 3, "use", "no")
-    assert read_job(write_book(tmp_path / "job.xlsx", {**sheets, "planes": no})).left_out == ("2",)
-    maybe = replaced(planes, 3, "use", "maybe")
-    found = complaints(read_job, write_book(tmp_path / "job.xlsx", {**sheets, "planes": maybe}))
-    the_only(found, "job.xlsx", 3, "use", "maybe", "true or false")
-    empty = replaced(planes, 2, "forbidden_deg", "20 60")
-    found = complaints(read_job, write_book(tmp_path / "job.xlsx", {**sheets, "planes": empty}))
-    the_only(found, "job.xlsx", 2, "forbidden_deg", "20 60", "in a sheet 20-60; 300-340")
-
-
 @pytest.mark.parametrize(
     ("pair", "side", "first", "last"),
     [
@@ -134,16 +106,6 @@ def test_arcs(pair, side, first, last):
     assert np.degrees(start) == pytest.approx(first)
     assert np.degrees(width) == pytest.approx(last - first)
     assert labels.arc(start, width) == pytest.approx([pair[0] % 360, pair[1] % 360])
-
-
-@pytest.mark.parametrize("angles", ["with rotation", "against rotation"])
-def test_a_weight_between_from_and_to_is_in_the_arc(job, angles):
-    """Whatever the direction: weights as the job writes them, 25° and 55° inside, 15° and 65° outside."""
-    read = job(f'angles = "{angles}"\n' + plane("forbidden_deg = [20, 60]"))
-    ((start, width),) = read.limits.forbidden[0]
-    for degrees, inside in ((25, True), (55, True), (15, False), (65, False)):
-        turned = math.radians(degrees * read.trials.labels.angle_sign)
-        assert ((turned - start) % math.tau < width) is inside
 
 
 @pytest.mark.parametrize(
@@ -264,20 +226,6 @@ def test_nothing_left(job):
     the_only(found, "job.toml", None, "planes", None, "at least one plane without use = false")
     found = complaints(job, HEAD + "[sensors.A]\nweight = 0\n[sensors.B]\nweight = 0\n")
     the_only(found, "job.toml", None, "sensors", None, "at least one sensor with a weight above 0")
-
-
-def test_all_problems_at_once(job):
-    found = complaints(
-        job,
-        HEAD + "[planes.1]\nmax_mass_g = 0\nforbidden_deg = 3\n"
-        "[planes.3]\nradius_mm = 2\n[sensors.A]\nlimit = 0\n",
-    )
-    assert [p.column for p in found] == [
-        "planes.1.max_mass_g",
-        "planes.1.forbidden_deg",
-        "sensors.A.limit",
-        "planes.3",
-    ]
 
 
 def test_limits_of_the_command_line(job):

@@ -10,7 +10,7 @@ import numpy as np
 import openpyxl
 import pytest
 from cases import each_of
-from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
+from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, write_book
 from workbook_jobs import differences, filled, rows
 
 from balancing import correct, estimate_influence
@@ -234,23 +234,6 @@ def test_formulas_with_stored_values_count(tmp_path):
     assert openpyxl.load_workbook(sheet)["runs"]["D4"].value == 4.9
 
 
-def test_merged_cells_explain_themselves(tmp_path):
-    path = write_book(tmp_path / "job.xlsx", {**BOOK, "weights": [["Pump 3, June", *[None] * 3], *WEIGHTS]})
-    book = openpyxl.load_workbook(path)
-    book["weights"].merge_cells("A1:D1")
-    book.save(path)
-    words = "the header in the first row, and it seems to be row 2"
-    problem = the_only(complaints(read_job, path), "job.xlsx", 1, None, "Pump 3, June", words)
-    assert "sheet 'weights'" in problem.file
-    book = openpyxl.load_workbook(write_book(path, BOOK))
-    book["runs"].merge_cells("D1:E1")  # amplitude and phase under one name
-    book.save(path)
-    found = complaints(read_job, path)
-    assert [(p.row, p.column) for p in found if p.row == 1] == [(1, "phase_deg")]
-    assert all("sheet 'runs'" in p.file for p in found)
-    assert {(p.value, p.expected) for p in found if p.row != 1} == {("5 cells", "4 cells, as in the header")}
-
-
 def test_hidden_sheets_count_and_empty_rows_do_not(tmp_path):
     path = write_book(tmp_path / "job.xlsx", {**BOOK, "Tabelle2": []})
     plain = read_job(path)
@@ -268,34 +251,6 @@ def test_hidden_sheets_count_and_empty_rows_do_not(tmp_path):
     book.save(path)
     found = complaints(read_job, path)
     the_only(found, "job.xlsx", None, None, "Tabelle2", "remarks go into 'notes' (hidden sheets count too)")
-
-
-@pytest.mark.parametrize(
-    ("encoding", "first"), [("cp1252", ""), ("utf-8-sig", "sep=;\n"), ("cp1252", "sep=;\n")]
-)
-def test_csv_files_of_a_european_excel_become_a_workbook(tmp_path, encoding, first):
-    runs = [[c.replace("A", "Lüfter") if isinstance(c, str) else c for c in row] for row in RUNS]
-    for name, table in (("runs", runs), ("weights", WEIGHTS)):
-        text = (
-            first
-            + "".join(line + ";;\n" for line in csv_text(table, ";", comma=True).splitlines())
-            + ";;;;;;\n"
-        )
-        (tmp_path / f"{name}.csv").write_bytes(text.encode(encoding))
-    job_file = tmp_path / "job.toml"
-    job_file.write_text(
-        'runs = "runs.csv"\nweights = "weights.csv"\n["sensors"."Lüfter"]\nlimit = 3\n', "utf-8"
-    )
-    sheet = tmp_path / "sheet.xlsx"
-    if encoding == "cp1252":
-        with pytest.warns(UserWarning, match="read as cp1252"):
-            job = read_job(job_file)
-    else:
-        job = read_job(job_file)
-    sheet.write_bytes(job_workbook_bytes(job, JobSource((job_file,)), sheet))
-    assert differences(job, read_job(sheet)) == ()
-    written = [list(row) for row in openpyxl.load_workbook(sheet)["runs"].iter_rows(values_only=True)]
-    assert written == runs
 
 
 def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,6 @@ import fem
 from rotorid.harmonic import identify
 from rotorid.harmonic.experiments import experiments
 from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes
@@ -104,22 +102,6 @@ def test_a_record_gives_the_dampers_of_a_reduced_rotor(cli, tmp_path, three, inp
     assert worst(outcome.json) < 1e-6
 
 
-def test_an_amplitude_that_is_not_measured(cli, tmp_path, three):
-    """Output error predicts it; equation error does without."""
-    model = saved(tmp_path, "model.toml", ode_model_bytes(three, BEGIN))
-    X = response(three, TRUTH, np.array([1.0, 0, 0]))
-    columns = {"x7": X[:, 0], "x18": X[:, 2], "f_x7": np.ones(len(X), dtype=complex)}
-    data = saved(tmp_path, "data.csv", amplitude_table(columns))
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", TableWarning)
-        outcome = cli("identify", model, data, "--method", "output-error", "--json")
-        eliminated = cli("identify", model, data, "--json")
-    assert outcome.code == 0, outcome.err
-    assert worst(outcome.json) < 1e-6
-    assert "the table has no x12" in outcome.err
-    assert worst(eliminated.json) < 1e-6
-
-
 def test_matrices_keep_all_digits_in_both_planes(tmp_path):
     rng = np.random.default_rng(5)
     M, C, K = (rng.standard_normal((4, 4)) * 10.0 ** rng.integers(-9, 9, (4, 4)) for _ in range(3))
@@ -189,30 +171,6 @@ def test_states_of_massless_supports_serve_both(tmp_path):
     for options in ({}, {"method": "output-error", "start": file.start, "bounds": file.bounds}):
         part = identify(file.model, measured, **options)
         np.testing.assert_allclose(part.values, list(truth.values()), rtol=1e-6)
-
-
-@pytest.mark.parametrize("damping", [0.0, ((900.0, 100.0), (50.0, 700.0))])
-def test_turning_rotor_in_both_planes(cli, tmp_path, damping):
-    """Gyroscopic discs and cross-coupled bearings, whose amplitudes nobody measures."""
-    stiffness = ((4e7, 6e6), (-6e6, 5e7))
-    rotor = fem.Rotor(
-        length=[0.2, 0.3, 0.25, 0.3, 0.2],
-        outer_diameter=0.07,
-        discs=[fem.Disc(3, 40.0, 3.0, 1.6), fem.Disc(5, 25.0, 2.0, 1.1)],
-        supports=[fem.Support(2, stiffness, damping), fem.Support(4, stiffness, damping)],
-        model=fem.Model(gyroscopic=True),
-    )
-    motion = small_rotor(rotor, (3, 5), [40.0, 25.0]).motion(150.0)
-    truth = {"d_x3": 320.0, "d_y5": 710.0}
-    begin = {"x3": 100.0, "y5": 100.0}
-    model = saved(tmp_path, "m.toml", ode_model_bytes(motion, begin, inputs=["f_x3"]))
-    X = response(motion, truth, np.eye(len(motion.coordinates))[0])
-    columns = {name: X[:, motion.index(name)] for name in ("x3", "x5", "y3", "y5")}
-    data = amplitude_table(columns | {"f_x3": np.ones(len(X), dtype=complex)})
-    outcome = cli("identify", model, saved(tmp_path, "data.csv", data), "--json")
-    assert outcome.code == 0, outcome.err
-    for name, value in truth.items():
-        assert outcome.json["parameters"][name]["value"] == pytest.approx(value, rel=1e-6)
 
 
 def test_outputs_that_do_not_show_a_mass(tmp_path, three):

@@ -1,6 +1,5 @@
 """Small models for motion as files."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -181,8 +180,3 @@ def test_a_shaft_that_resists_a_shift_is_asked_about(tmp_path):
         read_small_model(written(tmp_path, few))
     alone = PLAIN.replace("[[1e6, -2e6", "[[1.1e7, -2e6").split("[[bearing]]")[0]
     assert read_small_model(written(tmp_path, alone)).motion().K[0, 0] == 1.1e7
-
-
-def test_a_model_that_was_changed_is_another(tmp_path):
-    model = replace(some(0), bow={})
-    assert b"[[bow]]" not in small_model_bytes(model)

@@ -70,23 +70,6 @@ def test_fixed_decimals(numbers, decimals, comma):
     np.testing.assert_allclose(written_steps([*short, largest]), 10.0**-decimals, rtol=1e-12)
 
 
-@given(
-    st.lists(st.tuples(st.integers(100, 999), st.integers(-6, 0)), min_size=1, max_size=8),
-    st.booleans(),
-)
-def test_fixed_significant_digits(numbers, scientific):
-    """Three digits, wherever the point is, and zeros at the end dropped or not."""
-    texts = [
-        f"{n * 10.0**power:.2e}" if scientific else f"{n * 10.0**power:.{-power}f}" for n, power in numbers
-    ]
-    true = [10.0**power for _, power in numbers]
-    np.testing.assert_allclose(written_steps(texts), true, rtol=1e-12)
-    full = f"{123 * 10.0 ** min(p for _, p in numbers):.2e}"
-    np.testing.assert_allclose(written_steps([*map(without_zeros, texts), full])[:-1], true, rtol=1e-12)
-    as_numbers = [float(text) for text in (*texts, full)]
-    np.testing.assert_allclose(written_steps(as_numbers)[:-1], true, rtol=1e-12)
-
-
 STEPS = np.broadcast_to(np.reshape([0.05e-6, np.deg2rad(1)], (2, 1, 1, 1, 1)), (2, 1, 3, 1, 2))
 
 

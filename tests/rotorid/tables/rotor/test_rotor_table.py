@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from tables_data import complaints, csv_text, replaced, the_only, write_book, write_csv
@@ -127,23 +125,6 @@ def test_a_bore_larger_than_the_shaft(table):
         (2, "110", "less than the outer diameter"),
         (3, "110", "less than the outer diameter"),
     ]
-
-
-BAD_COLUMNS = [
-    ("length_m", "lenght_m", "did you mean 'length_m'?"),
-    ("length_m", "length", "one of the units m, mm, um, mil or in, which is missing"),
-    ("length_m", "length_ft", "not 'ft'"),
-    ("diameter_m", "diametr_m", "did you mean 'diameter_m'?"),
-    ("mass_kg", "mas_kg", "did you mean 'mass_kg'?"),
-    ("mass_kg", "mass_t", "one of the units kg, g, mg, oz or lb"),
-    ("support_stiffness_N_per_m", "stiffness_N_per_m", "did you mean 'support_stiffness_N_per_m'?"),
-    ("support_stiffness_N_per_m", "support_stiffness", "which is missing"),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "words"), BAD_COLUMNS)
-def test_bad_columns(table, old, new, words):
-    the_only(complaints(table, replaced(TABLE, 1, old, new)), "rotor.csv", 1, new, new, words)
 
 
 def test_missing_column_and_no_element(table):
@@ -289,9 +270,3 @@ def test_rotor_files_that_are_none(file, tmp_path):
     the_only(complaints(file, "disc = 3\nshaft='shaft.csv'"), "rotor.toml", None, "disc", "3", "[[disc]]")
     (tmp_path / "x.toml").write_bytes("shaft = 'Welle süd.csv'".encode("cp1252"))
     the_only(complaints(read_rotor, tmp_path / "x.toml"), "x.toml", None, None, None, "in UTF-8")
-
-
-def test_problems_of_the_file_and_of_its_table_together(file, tmp_path):
-    write_csv(tmp_path / "shaft.csv", replaced(TABLE, 2, "length_m", math.nan))
-    problems = complaints(file, FILE.replace("mass_kg = 4", "mass_kg = -4"))
-    assert [(p.row, p.column) for p in problems] == [(2, "length_m"), (None, "disc[1].mass_kg")]

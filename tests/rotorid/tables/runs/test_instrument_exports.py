@@ -9,9 +9,6 @@ import time
 import tomllib
 from contextlib import suppress
 from dataclasses import fields
-from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -23,7 +20,7 @@ from repetitions import FULL
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
 from rotorid.base.text import listing
-from rotorid.tables import InputError, job_from_files, read_job, read_trials
+from rotorid.tables import InputError, read_job, read_trials
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 from rotorid.tables.runs.runs_table import COLUMNS
@@ -241,15 +238,6 @@ def test_an_export_is_read_as_the_same_runs_table(tmp_path, name):
 
 
 @each_of("name", READ)
-def test_an_export_without_a_job_file(tmp_path, name):
-    expected = read(tmp_path, tidy_text(name)).trials
-    (tmp_path / "runs.csv").write_text(READ[name], encoding="utf-8")
-    files = tmp_path / "runs.csv", tmp_path / "weights.csv"
-    np.testing.assert_array_equal(job_from_files(files, phase="lag").trials.readings, expected.readings)
-    assert_same(read_trials(*files, phase="lag"), expected)
-
-
-@each_of("name", READ)
 def test_the_same_as_a_sheet(tmp_path, name):
     """The digits are those that a sheet keeps, 4 of 4.0."""
     write_book(tmp_path / "tidy.xlsx", {"runs": sheet_of(tidy_text(name))})
@@ -435,25 +423,6 @@ def keeps_to(text):
     return Draft202012Validator(schema("job")).is_valid(tomllib.loads(text))
 
 
-BESIDE = [
-    "amplitude_std_um_pp phase_std_deg",
-    "order2_amplitude_um_pp order2_phase_deg",
-    "overall_um_pp turns",
-]
-
-
-@each_of("beside", BESIDE)
-def test_what_vectors_writes_beside_the_readings_stays(tmp_path, beside):
-    """With degrees in its cells the table is the same as without."""
-    rows = [line.split(",") for line in tidy_text("").splitlines()]
-    plain, signs = (
-        [[*rows[0], *beside.split()], *([*row[:4], f"{row[4]}{sign}", "0.25", "1"] for row in rows[1:])]
-        for sign in ("", "°")
-    )
-    (tmp_path / "plain").mkdir()
-    assert_same(read(tmp_path, csv_text(signs)).trials, read(tmp_path / "plain", csv_text(plain)).trials)
-
-
 @each_of("piece", ["9", "9.", "9 ", "a@", " ", "1X", "(", "9/", "9um ", "Phase "])
 def test_long_cells_and_headings_take_no_time(tmp_path, piece):
     """A step for each pair of signs would take 20 s."""
@@ -561,22 +530,6 @@ def test_names_that_do_not_fit_are_explained(tmp_path, old, new, message):
     assert refused(tmp_path, GERMAN, NAMED.replace(old, new)) == message
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.sampled_from(["units row", "cells with units", "vectors", "slashes", "wide", "labels"]), st.data())
-def test_columns_and_rows_in_any_order(tmp_path, name, data):
-    sign = ";" if ";" in READ[name] else "[,\t]"
-    lines = [re.split(sign, line) for line in READ[name].splitlines()]
-    order = data.draw(st.permutations(range(len(lines[0]))))
-    top = 2 if name == "units row" else 1
-    rows = lines[:top] + data.draw(st.permutations(lines[top:]))
-    mixed = "".join(";".join(line[i] for i in order) + "\n" for line in rows)
-    found, expected = read(tmp_path, mixed).trials, read(tmp_path, tidy_text(name)).trials
-    runs = [found.runs.index(run) for run in expected.runs]
-    sensors = [found.sensors.index(sensor) for sensor in expected.sensors]
-    np.testing.assert_array_equal(found.readings[:, runs][..., sensors], expected.readings)
-    np.testing.assert_array_equal(found.steps[:, :, runs][..., sensors], expected.steps)
-
-
 EXAMPLES = 400 if FULL else 200
 EDITS = "abdgklmprsuxXµ°@<∠/()[]# \"'|_=:;,\t"
 
@@ -599,35 +552,3 @@ def test_an_edit_of_a_word_or_sign_changes_no_number(tmp_path, name, place, sign
     shown = np.stack([amplitude, phase], axis=-1).reshape(-1, 2)
     written = np.array([[float(a), float(b)] for a, b in DIGITS])
     np.testing.assert_allclose(np.sort(shown, axis=0), np.sort(written, axis=0), rtol=1e-12)
-
-
-@cache
-def undamaged(name):
-    with TemporaryDirectory() as folder:
-        return read(Path(folder), tidy_text(name)).trials
-
-
-@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.sampled_from(sorted(READ)), st.integers(0, 10**6), st.sampled_from(["twice", "gone", "cut", "swap"])
-)
-def test_a_damaged_line_is_refused_or_says_what_it_said(tmp_path, name, place, damage):
-    lines = READ[name].splitlines()
-    at = place % len(lines)
-    if damage == "twice":
-        lines.insert(at, lines[at])
-    elif damage == "gone":
-        del lines[at]
-    elif damage == "cut":
-        lines[at] = lines[at][: place // len(lines) % (len(lines[at]) + 1)]
-    else:
-        lines[at], lines[at - 1] = lines[at - 1], lines[at]
-    expected = undamaged(name)
-    try:
-        found = read(tmp_path, "\n".join(lines) + "\n").trials
-    except InputError:
-        return
-    runs = [expected.runs.index(run) for run in found.runs]
-    sensors = [expected.sensors.index(sensor) for sensor in found.sensors]
-    shown, told = (t.labels.vibration(t.readings)[0] for t in (found, expected))
-    np.testing.assert_allclose(shown, told[:, runs][..., sensors], rtol=1e-12)
