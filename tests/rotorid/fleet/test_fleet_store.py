@@ -1,14 +1,10 @@
 """The store: nothing twice, nothing half, one writer at a time; commands over it."""
 
-import os
 import shutil
 import subprocess
 import sys
 import zipfile
-from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,7 +14,7 @@ from repetitions import FULL
 from rotorid.samples import sample_data
 from rotorid.tables.fleet.fleet_store import FleetStore
 from rotorid.tables.fleet.fleet_tables import TABLES
-from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add, read_jobs
+from rotorid.workflows.fleet.fleet_add import fleet_add, read_jobs
 from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")

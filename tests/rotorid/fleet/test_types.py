@@ -16,7 +16,6 @@ from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 from rotorid.workflows.fleet.type_coefficients import type_coefficients
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
-FANS = sample_data() / "fleet" / "fan-132"
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")
 
 

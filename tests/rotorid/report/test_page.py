@@ -89,14 +89,6 @@ def test_the_page_needs_nothing_else():
     assert made.count("<style>") == 1
 
 
-def test_warnings_come_first_and_provenance_last():
-    made = page(warnings=["one", "two"])
-    places = [made.index(word) for word in ("<li>one</li>", "<li>two</li>", "<main>", 'id="provenance"')]
-    assert places == sorted(places)
-    assert made.index("<li>one</li>") < made.index("<main>")
-    assert 'id="warnings"><p>No warnings.' in page()
-
-
 def test_a_figure_refers_to_nothing_outside_and_parses():
     made = str(inline_svg(figure(), 'size < 1 "x"'))
     root = xml.dom.minidom.parseString(made).documentElement

@@ -1,14 +1,11 @@
 """Sheets of critical, response and reduce: the document's numbers, the rotor's data, nothing from outside."""
 
-import html
-import re
 
 import numpy as np
 import pytest
 from sheets import COMMANDS, ESTIMATES, Shown, disagreement, disagreements, make, read_sheet, rows_of, run
 
 import fem
-from rotorid.report.document import Document
 from rotorid.report.number_tables import evenly, every_warning
 from rotorid.report.rotor import critical_report
 from rotorid.report.rotor_description import rotor_sheet, unbalance_table
@@ -35,17 +32,6 @@ def test_nothing_from_outside_and_ids_once(name):
     assert sheet.text.replace('xmlns="http://www.w3.org/2000/svg"', "").count("http") == 0
     assert len(sheet.ids) == len(set(sheet.ids))
     assert [tag for tag, *_ in sheet.order].count("script") == 1
-
-
-def test_critical_speeds_inside_the_operating_range_are_warned_of():
-    sheet = read_sheet(make("critical").html)
-    rows = sheet.document["operating"]["critical_speeds"]
-    inside = [k for k, row in enumerate(rows, start=1) if row["inside"]]
-    assert inside == [1, 2]
-    said = re.findall(r"critical speed (\d+), [\d.]+ rpm, lies inside the operating range", sheet.text)
-    assert [int(k) for k in said] == inside
-    table = rows_of(sheet, "Where the frequency of free whirl")
-    assert [row[5] == "INSIDE" for row in table] == [row["inside"] for row in rows]
 
 
 def test_every_critical_speed_and_shape_is_shown():

@@ -4,10 +4,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from fem_rotors import rotor23
-from matplotlib.lines import Line2D
 
 import fem
-from rotorid.reduction import compare_methods, reduce
 from rotorid.report import rotor_figures
 
 mpl.use("Agg")

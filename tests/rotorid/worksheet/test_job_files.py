@@ -4,7 +4,6 @@ import codecs
 import itertools
 import os
 import shutil
-import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,6 @@ from rotorid.tables import read_job
 from rotorid.tables.reader import table_writing
 from rotorid.tables.reader.columns import read_grid
 from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.worksheet import job_files
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
 pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")

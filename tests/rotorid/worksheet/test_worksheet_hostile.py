@@ -5,11 +5,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import pytest
-from worksheet.served import Served
 
 from rotorid.samples import sample_data
 

@@ -12,7 +12,7 @@ from repetitions import FULL
 from worksheet.served import command
 from worksheet.stranger import stranger
 from worksheet.typed_job import rows, type_job
-from worksheet.window import CONTROL, DOWN, ENTER, TAB, UP, Window
+from worksheet.window import CONTROL, TAB, Window
 
 from rotorid.samples import sample_data
 

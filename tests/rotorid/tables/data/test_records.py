@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_ode_model, read_record
+
 MODEL = """
 inputs = ["u"]
 [states]

@@ -12,8 +12,8 @@ from tables_data import RUNS, WEIGHTS, replaced
 from workbook_jobs import differences, filled, rows
 
 from balancing import correct, estimate_influence
-from rotorid.samples import sample_data
 from rotorid.tables import InputError, read_job
+
 OFFICE = shutil.which("soffice") or shutil.which("libreoffice")
 pytestmark = pytest.mark.skipif(
     OFFICE is None, reason="no LibreOffice on this machine: install Debian's package libreoffice-calc"

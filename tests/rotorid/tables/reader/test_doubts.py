@@ -21,6 +21,7 @@ from rotorid.tables import (
     write_influence,
     write_table,
 )
+
 SHAFT = [
     ["length_m", "diameter_m", "support_stiffness_N_per_m", "youngs_modulus_Pa", "density_kg_per_m3"],
     [1.0, 0.1, 1e8, 2.1e11, 7800],
