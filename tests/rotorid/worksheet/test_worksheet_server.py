@@ -59,10 +59,6 @@ def test_an_edit_changes_one_line_and_every_number_follows(shared):
     found = served.settled()["results"]["answer"]["document"]
     assert found["corrections"] == command(job)["corrections"]
     assert found["corrections"] != state["results"]["answer"]["document"]["corrections"]
-    assert served.ask("/undo", {})[0] == 200
-    assert (job.parent / "runs.csv").read_text() == before
-    assert served.ask("/redo", {})[0] == 200
-    assert (job.parent / "runs.csv").read_text() == after
 
 
 def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
@@ -209,9 +205,6 @@ def test_what_there_is_to_look_at_and_to_print(shared):
         assert (status, text.count("<svg")) == (200, 2)
     assert "2 × 150" in served.ask("/sheet")[1]
     assert "hole 10" in served.ask("/whole")[1]
-    effects = {one["run"]: one for one in state["results"]["runs"]["runs"]}
-    assert state["results"]["runs"]["baseline"] == "baseline"
-    assert {one["level"] for one in effects.values()} == {"good"}
 
 
 def test_a_trial_weight_with_and_without_the_coefficients(shared):
@@ -243,16 +236,6 @@ def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
     assert [one["missing"] for one in served.settled()["results"]["problems"]] == [True]
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("given", ["no_such/job.toml", "runs.csv", "."])
-def test_what_is_no_job_is_refused_with_one_sentence(tmp_path, given):
-    folder = copy(tmp_path)
-    words = [sys.executable, "-m", "rotorid", "worksheet", str(folder / given), "--no-browser"]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("\n") == 1
-
-
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
     code = "import sys; sys.modules['uvicorn'] = None; from rotorid.cli import main; main()"
     words = [sys.executable, "-c", code, "worksheet", str(tmp_path), "--no-browser"]
@@ -280,10 +263,6 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(shared, name):
     assert found["trim"] is None
     assert served.ask("/picture/overview")[0] == 200
     assert served.ask("/sheet")[0] == 200
-    # the trial runs themselves must be whole
-    last = served.state()["tables"]["runs"]["rows"][-1]
-    assert served.edit({"table": "runs", "delete": last["id"], "old": last["cells"]})[0] == 200
-    assert served.settled()["results"]["answer"] is None
 
 
 @pytest.mark.parametrize(

@@ -142,32 +142,19 @@ BAD_PLANES = [
         "max_mass_g, because the weights of the job are masses",
     ),
     ("max_mass_g = 0", "max_mass_g", "0", "a number above 0"),
-    ("max_mass_g = -1", "max_mass_g", "-1", "a number above 0"),
-    ('max_mass_g = "5"', "max_mass_g", "5", "a number, without quotes"),
-    ("max_mass_g = nan", "max_mass_g", "nan", "a number above 0"),
-    ("max_mass_stone = 1", "max_mass_stone", "1", "did you mean 'max_mass_"),
     ("max_mass = 1", "max_mass", "1", "did you mean 'max_mass_g'?"),
-    ("max_mass_g = 1\nmax_mass_kg = 1", "max_mass_kg", "1", "one key of them; max_mass_g says it already"),
-    ("radius_mm = 0", "radius_mm", "0", "a number above 0"),
-    ("radius_furlong = 1", "radius_furlong", "1", "did you mean 'radius_mm'?"),
     ("forbidden_deg = 20", "forbidden_deg", "20", "pairs [from, to]"),
-    ("forbidden_deg = []", "forbidden_deg", "[]", "pairs [from, to]"),
     ("forbidden_deg = [20, 60, 80]", "forbidden_deg", "[20, 60, 80]", "pairs [from, to]"),
-    ("forbidden_deg = [[20, 60], 80]", "forbidden_deg", "[[20, 60], 80]", "pairs [from, to]"),
     ("forbidden_deg = [20, 400]", "forbidden_deg", "[20, 400]", "from -360 to 360 degrees"),
-    ("forbidden_deg = [20, nan]", "forbidden_deg", "[20, nan]", "from -360 to 360 degrees"),
     ("forbidden_deg = [20, true]", "forbidden_deg", "[20, True]", "pairs [from, to]"),
     ("forbidden_deg = [20, 20]", "forbidden_deg", "[20, 20]", "of different angles"),
     ("forbidden_deg = [0, 360]", "forbidden_deg", "[0, 360]", "use = false leaves a plane out"),
     ("forbidden_deg = [[0, 200], [180, 10]]", "forbidden_deg", "[[0, 200], [180, 10]]", "some angle free"),
-    ("use = 0", "use", "0", "true or false, without quotes"),
     ("node = 3", "node", "3", "the rotor model of this node too"),
     ('station = "disc"', "station", "disc", "the rotor model of this station too"),
     ('node = 3\nstation = "disc"', "station", "disc", "either node or station, not both"),
     ("node = 0", "node", "0", "a whole number from 1"),
-    ("node = 1.5", "node", "1.5", "a whole number from 1"),
     ("station = 4", "station", "4", "the name of a station"),
-    ("radius_m = 1\nforbiden_deg = 3", "forbiden_deg", "3", "did you mean 'forbidden_deg'?"),
 ]
 
 
@@ -178,9 +165,7 @@ def test_bad_planes(job, lines, key, value, words):
 
 BAD_SENSORS = [
     ("limit = 0", "limit", "0", "an amplitude above 0"),
-    ("limit = -3", "limit", "-3", "an amplitude above 0"),
     ('limit = "3 um"', "limit", "3 um", "in a sheet"),
-    ("limit = {}", "limit", "a table", "a table of them by speed"),
     (
         'limit = { "1500" = 3 }',
         "limit",
@@ -198,7 +183,6 @@ BAD_SENSORS = [
     ('limit = "1000: 3; 1000: 4"', "limit", "1000: 3; 1000: 4", "each speed once"),
     ("weight = -1", "weight", "-1", "0 or more"),
     ("angle_deg = 400", "angle_deg", "400", "from -360 to 360"),
-    ("limits = 3", "limits", "3", "did you mean 'limit'?"),
     ("node = 3", "node", "3", 'rotor = "rotor.toml"'),
 ]
 
@@ -243,7 +227,6 @@ def test_limits_of_the_command_line(job):
     np.testing.assert_allclose(each.limits.max_weight, [0.0045359237, 0.003])
     np.testing.assert_allclose(each.limits.residual, [[10e-6, 10e-6], [10e-6, 10e-6]])
     np.testing.assert_allclose(limited(read, "1=3000g_mm", []).limits.max_weight[0], 0.02)
-    np.testing.assert_allclose(limited(read, "1=3000g·mm", []).limits.max_weight[0], 0.02)
     tables = [p for p in plain.files if p.suffix == ".csv"]
     assert limited(job_from_files(tables), "5", []).limits.max_weight.tolist() == [0.005, 0.005]
 
@@ -253,20 +236,14 @@ def test_limits_of_the_command_line(job):
     [
         ("five", [], "--max-mass 'five': expected a number, such as 5g"),
         ("0g", [], "--max-mass '0g': expected a value above 0"),
-        ("-3", [], "expected a value above 0"),
-        ("nan", [], "expected a finite number"),
         ("5stone", [], "expected a unit of weight"),
         ("3=5g", [], "there is no plane '3'; there are '1' and '2'"),
         ("=5g", [], "use 5g or left=5g,right=3g"),
-        ("1=", [], "--max-mass '': expected a number, such as 5g"),
         ("1=5g,1=3g", [], "--max-mass '1=5g,1=3g': 1 stands twice"),
-        ("5,5g", [], "a decimal sign is a point"),
         ("3000g_mm", [], "the weights of the job are in g, to which g_mm converts only with a radius_mm"),
         (None, ["a=3"], "there is no sensor 'a' (did you mean 'A'?); there are 'A' and 'B'"),
         (None, ["A=3mm_s"], "the readings are in um_pp, to which mm_s does not convert"),
-        (None, ["A=x"], "--limit 'x': expected a number, such as 20"),
         (None, ["A=0"], "expected a value above 0"),
-        (None, ["A"], "expected a number"),
     ],
 )
 def test_bad_limits_of_the_command_line(job, mass, limits, words):

@@ -84,38 +84,9 @@ def test_the_form_has_headers_explanations_and_choices():
             assert len(rule.formula1) <= 257
         return found
 
-    settings = [cell.value for cell in book["settings"]["A"]]
-    words = choices("settings")
-    assert words[f"B{settings.index('phase') + 1}"] == ["lead", "lag"]
-    assert words[f"B{settings.index('angles') + 1}"] == [
-        "with rotation", "against rotation", "clockwise", "counter-clockwise"
-    ]  # fmt: skip
-    assert {"amplitude_um_pp", "amplitude_mm_s_rms", "amplitude"} <= set(choices("runs")["D1"])
-    assert choices("runs")["B1"] == ["speed_rpm", "speed_rad_s", "speed_Hz"]
     assert choices("runs")["D2:D1048576"] == (0.0, float("inf"))
     assert choices("runs")["E2:E1048576"] == (-360.0, 360.0)
-    assert "mass_oz" in choices("weights")["C1"]
     assert choices("planes")["E2:E1048576"] == ["yes", "no"]
-
-
-@pytest.mark.full
-def test_every_name_that_the_form_offers_is_known(tmp_path):
-    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
-    path = filled(tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS))
-    own = openpyxl.load_workbook(path)
-    tried = 0
-    for name in ("runs", "weights", "planes"):
-        for rule in book[name].data_validations.dataValidation:
-            where = str(rule.sqref)
-            usual = own[name][where].value if ":" not in where else None
-            for word in rule.formula1.strip('"').split(",") if usual else ():
-                own[name][where] = word
-                own.save(path)
-                assert read_job(path).trials.planes == ("1", "2")
-                tried += 1
-            if usual:
-                own[name][where] = usual
-    assert tried > 25
 
 
 def test_the_form_filled_with_the_published_example(tmp_path):
@@ -143,10 +114,6 @@ def test_the_form_with_settings(tmp_path):
     job = read_job(path)
     assert (job.conventions.labels.phase, job.left_out) == ("lag", ("1",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
-    sheet = tmp_path / "sheet.xlsx"
-    sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))
-    assert differences(job, read_job(sheet)) == ()
-    assert "How to fill in this workbook" in [c.value for c in openpyxl.load_workbook(sheet)["notes"]["A"]]
 
 
 def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
@@ -158,31 +125,17 @@ def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
     path = write_book(tmp_path / "job.xlsx", tables)
     job = read_job(path)
     assert differences(plain, job) == ()
-    sheet = tmp_path / "sheet.xlsx"
-    sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))
-    assert differences(plain, read_job(sheet)) == ()
-    cells = openpyxl.load_workbook(sheet)["runs"]
-    assert [type(cells.cell(3, place).value) for place in range(1, 6)] == [str, int, str, float, int]
 
 
 @each_of(
     ("sheet", "row", "column", "value", "shown", "words"),
     [
         ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
-        ("runs", 4, "run", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
-        ("runs", 4, "phase_deg", "=A1+1", "=A1+1", "a formula with its stored value"),
-        ("runs", 4, "amplitude_um_pp", "1.234,5", "1.234,5", "without thousands separators"),
-        ("runs", 4, "amplitude_um_pp", "1,234", "1,234", "may separate thousands"),
-        ("weights", 2, "angle_deg", "45°", "45°", "a number alone; write the unit in the header"),
-        ("planes", 2, "plane", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "forbidden_deg", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "taken", datetime.time(3, 10), "03:10:00", "turned the cell into a date or time"),
         ("planes", 2, "max_mass_g", "1,250", "1,250", "may separate thousands"),
-        ("planes", 3, "use", "FALSCH", "FALSCH", "true or false"),
-        ("sensors", 2, "sensor", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("sensors", 2, "limit", "#N/A", "#N/A", "not an error of the spreadsheet"),
         ("settings", 3, "value", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
-        ("settings", 3, "value", "1,500", "1,500", "may separate thousands"),
         ("settings", 3, "value", "=1/2", "=1/2", "a formula with its stored value"),
         ("settings", 2, "key", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
     ],
@@ -246,11 +199,6 @@ def test_hidden_sheets_count_and_empty_rows_do_not(tmp_path):
         book[name].cell(60, 12).number_format = "0.00"
     book.save(path)
     assert differences(plain, read_job(path)) == ()
-    book["Tabelle2"]["A1"] = "left over"
-    book["Tabelle2"].sheet_state = "hidden"
-    book.save(path)
-    found = complaints(read_job, path)
-    the_only(found, "job.xlsx", None, None, "Tabelle2", "remarks go into 'notes' (hidden sheets count too)")
 
 
 def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
@@ -262,12 +210,6 @@ def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
     path = write_book(tmp_path / "job.xlsx", {**BOOK, "check_weights": WEIGHTS})
     words = "the check runs too"
     the_only(complaints(read_job, path), "job.xlsx", None, "check_weights", None, words)
-    bad = {**BOOK, "check": replaced(check, 3, "phase_deg", 400)}
-    problem = the_only(
-        complaints(read_job, write_book(tmp_path / "job.xlsx", bad)),
-        "job.xlsx", 3, "phase_deg", "400", "a phase from -360 to 360 degrees",
-    )  # fmt: skip
-    assert "sheet 'check'" in problem.file
 
 
 def test_a_cell_formatted_as_a_percentage_is_no_plain_number(tmp_path):

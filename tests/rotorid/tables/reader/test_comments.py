@@ -40,23 +40,14 @@ def test_rows_of_a_table_are_never_taken_for_comments(rows, separator, quoted):
     assert problems == []
 
 
-@pytest.mark.parametrize("dress", ["plain", "quoted", "workbook"])
-def test_sensors_and_runs_that_begin_with_a_sign_count(tmp_path, dress):
+def test_sensors_and_runs_that_begin_with_a_sign_count(tmp_path):
     names = {"initial": "#0", "trial 1": "#1", "trial 2": "#2 again", "A": "#A", "B": "#12 B"}
     runs, weights = ([[names.get(cell, cell) for cell in line] for line in t] for t in (RUNS, WEIGHTS))
-    if dress == "workbook":
-        book = write_book(tmp_path / "job.xlsx", {"runs": runs, "weights": weights})
-        trials = read_trials(book, book)
-    else:
-        text = csv_text(runs)
-        if dress == "quoted":
-            text = "".join(f'"{line}"\n'.replace(",", '","') for line in text.splitlines())
-        (tmp_path / "runs.csv").write_text(text, encoding="utf-8")
-        trials = read_trials(tmp_path / "runs.csv", write_csv(tmp_path / "weights.csv", weights))
-    plain = read_trials(write_csv(tmp_path / "r.csv", RUNS), write_csv(tmp_path / "w.csv", WEIGHTS))
-    assert trials.sensors == ("#A", "#12 B")
-    assert trials.runs == ("#0", "#1", "#2 again")
-    assert (trials.readings == plain.readings).all()
+    book = write_book(tmp_path / "job.xlsx", {"runs": runs, "weights": weights})
+    tables = write_csv(tmp_path / "runs.csv", runs), write_csv(tmp_path / "weights.csv", weights)
+    for trials in (read_trials(*tables), read_trials(book, book)):
+        assert trials.sensors == ("#A", "#12 B")
+        assert trials.runs == ("#0", "#1", "#2 again")
 
 
 def test_an_element_that_begins_with_a_sign_is_part_of_the_shaft(tmp_path):

@@ -9,7 +9,6 @@ from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorid.base.suggestions import did_you_mean, suggest
 from rotorid.tables.reader import units
 from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number, thousands_or_decimals
 from rotorid.tables.reader.problems import InputError, Problem, Problems
@@ -158,12 +157,6 @@ def test_problems_are_raised_together_in_order_of_files_and_rows():
         problems.stop()
     assert [(p.file, p.row) for p in caught.value.problems] == [("b", 2), ("b", 5), ("a", 9)]
     assert len(str(caught.value).splitlines()) == 3
-
-
-def test_suggestions():
-    assert suggest("SPEED_RPM", ["speed_rad_s", "speed_rpm"]) == "speed_rpm"
-    assert suggest("xyz", ["speed_rpm"]) is None
-    assert did_you_mean("sensr", ["sensor", "run"]) == " (did you mean 'sensor'?)"
 
 
 @each_of(

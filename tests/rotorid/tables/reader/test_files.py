@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from rotorid.tables import InputError, TableWarning, read_trials
-
-FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+from rotorid.tables import TableWarning, read_trials
 
 
 @pytest.fixture
@@ -228,36 +223,3 @@ def test_wrong_sep_line(tmp_path, weights):
 def test_names_that_are_formulas_or_hide_characters(tmp_path, weights, name):
     path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "sensor", name))
     assert [(p.row, p.column) for p in complaints(read_trials, path, weights)][:1] == [(2, "sensor")]
-
-
-GARBAGE = st.one_of(
-    st.binary(max_size=300),
-    st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass")),
-    st.text(alphabet='ab1,;\t"\n\r#= \u00a0.-eé', max_size=200).map(lambda t: t.encode("cp1252", "replace")),
-    st.tuples(st.integers(0, len(COMMA) - 1), st.binary(min_size=1, max_size=3)).map(
-        lambda cut: COMMA.encode()[: cut[0]] + cut[1] + COMMA.encode()[cut[0] :]
-    ),
-)
-
-
-@settings(FEW, max_examples=300)
-@given(GARBAGE, st.sampled_from([".csv", ".xlsx"]))
-@example(b"PK\x03\x04", ".xlsx")
-@example(b'"', ".csv")
-@example(b"\xff\xfe", ".csv")
-def test_garbage_gives_input_errors_only(tmp_path, data, suffix):
-    runs, weights = tmp_path / f"garbage{suffix}", tmp_path / "weights.csv"
-    runs.write_bytes(data)
-    write_csv(weights, WEIGHTS)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TableWarning)
-        try:
-            trials = read_trials(runs, weights)
-        except InputError as error:
-            trials, message = None, str(error)
-    if trials is None:
-        assert str(runs) in message or str(weights) in message
-    else:
-        # A byte that did no harm; nothing was made up.
-        assert np.isfinite(trials.readings).all()
-        assert trials.readings.size == 6

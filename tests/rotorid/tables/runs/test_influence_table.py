@@ -94,8 +94,6 @@ BAD_COLUMNS = [
     ("influence_um_pp_per_g", "influence_um_g", "influence_<vibration unit>_per_<weight unit>"),
     ("influence_um_pp_per_g", "influence_um_per_gram", "a unit of weight: kg, g"),
     ("influence_um_pp_per_g", "influence_um_pk_per_g", "um_pp (peak to peak)"),
-    ("influence_um_pp_per_g", "influnce_um_pp_per_g", "did you mean 'influence_um_pp_per_g'?"),
-    ("plane", "plain", "did you mean 'plane'?"),
 ]
 
 
@@ -106,10 +104,8 @@ def test_bad_columns(stored, old, new, words):
 
 BAD_CELLS = [
     ("influence_um_pp_per_g", -1, "a coefficient of 0 or more"),
-    ("influence_um_pp_per_g", "nan", "a finite number"),
     ("phase_deg", 400, "a phase from -360 to 360 degrees"),
     ("speed_rpm", 0, "a speed above 0"),
-    ("sensor", "", "a name"),
 ]
 
 

@@ -81,12 +81,6 @@ def test_another_unit_of_the_same_kind(read):
     np.testing.assert_allclose(read(peak).covariance, read().covariance, rtol=1e-12)
 
 
-def test_a_label_serves_too(read):
-    rename = {"amplitude_um_pp": "amplitude_V", "amplitude_std_um_pp": "amplitude_std_V"}
-    volts = [[rename.get(name, name) for name in MEASURED[0]], *MEASURED[1:]]
-    np.testing.assert_allclose(read(volts).covariance, read().covariance * 4e12, rtol=1e-12)
-
-
 def test_at_amplitude_zero_it_is_alike_in_all_directions(read):
     zero = replaced(MEASURED, 2, "amplitude_um_pp", 0.0)
     np.testing.assert_allclose(

@@ -167,6 +167,7 @@ def test_the_floor_covers_the_measured_error_on_average():
         np.testing.assert_allclose(np.trace(ours), np.trace(theirs), rtol=1e-12)
         np.testing.assert_allclose(found.readings.ravel(), vibration, rtol=1e-12)
 
+
 BAD = [
     (
         "[slow_roll.A]",
@@ -176,8 +177,6 @@ BAD = [
         "a sensor of the runs table, not 'a' (did you mean 'A'?)",
     ),
     ("amplitude = 2.0", "amplitude = -2", "slow_roll.A.amplitude", "-2", "0 or more"),
-    ("amplitude = 2.0", "amplitude = nan", "slow_roll.A.amplitude", "nan", "a finite number"),
-    ("amplitude = 2.0", 'amplitude = "2"', "slow_roll.A.amplitude", "2", "a number, without quotes"),
     ("amplitude = 2.0", "amplitude_mm_s = 2", "slow_roll.A.amplitude_mm_s", "2", "an amplitude in um_pp"),
     ("amplitude = 2.0", "amplitude_um_pk = 2", "slow_roll.A.amplitude_um_pk", "2", "um (peak)"),
     ("amplitude = 2.0\n", "", "slow_roll.A.amplitude", None, "the amplitude at slow speed"),
@@ -190,9 +189,7 @@ BAD = [
     ),
     ("phase_deg = 35\n", "", "slow_roll.A.phase_deg", None, "the phase at slow speed"),
     ("phase_deg = 35", "phase_deg = 400", "slow_roll.A.phase_deg", "400", "from -360 to 360"),
-    ("phase_deg = 35", "phase_deg = 35\nspeed = 2", "slow_roll.A.speed", "2", "a known key"),
     (VECTORS, "[slow_roll]\n", "slow_roll", None, "a table of vectors, [slow_roll.SENSOR]"),
-    (VECTORS, "[slow_roll]\nA = 3\n", "slow_roll.A", "3", "a table of settings, [slow_roll.A]"),
     (VECTORS, "slow_roll = 3\n", "slow_roll", "3", "a table of vectors, [slow_roll.SENSOR]"),
     (
         VECTORS,
