@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from docs_blocks import blocks, commands, first_difference, run_page
+from docs_blocks import blocks, commands, run_page
 
 from rotorid.base.compiled import COMPILED
 from rotorid.samples import sample_data
@@ -72,22 +72,6 @@ def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplac
                     r"--(?:plot|output|report|model|state-space|template) (\S+)", command
                 ):
                     assert (workplace / target).stat().st_size > 0, command
-
-
-@pytest.mark.parametrize(
-    ("expected", "wrong"),
-    [
-        (["a 1", "b 2"], None),
-        (["a 1", "...", "d 4"], None),
-        (["...", "b    2", "c 3"], None),
-        (["a 1", "c 3"], "c 3"),
-        (["b 2", "...", "a 1"], "a 1"),
-        (["a 2"], "a 2"),
-        (["...", "a 1", "x"], "x"),
-    ],
-)
-def test_a_line_that_is_not_printed_in_its_place_is_found(expected, wrong):
-    assert first_difference(expected, "a 1\n\nb  2\nc 3\nd 4\n") == wrong
 
 
 def test_a_wrong_number_on_a_page_is_found(tmp_path, workplace, cli, capsys):

@@ -5,31 +5,25 @@ from __future__ import annotations
 import argparse
 import functools
 import multiprocessing
+import os
 import resource
 import sys
 import tempfile
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
 from fuzz.examining import CHANGED, FINDING, examine
 
+PATIENCE = 300
+"""Seconds without any outcome after which a process has died, or waits for something."""
 MOST_MB = 1000
 
 
-@functools.cache
-def place():
-    """A folder of each process, which goes with it."""
-    folder = tempfile.TemporaryDirectory(prefix="fuzz")
-    return folder, Path(folder.name)
-
-
-def work(number, seed):
+def work(number, seed, folder):
     """Examine a mutant in a process of its own."""
-    outcome = examine(number, seed, place()[1])
+    outcome = examine(number, seed, Path(folder) / str(os.getpid()))
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1000
     return replace(outcome, result=FINDING, why=f"{memory} MB") if memory > MOST_MB else outcome
 
@@ -45,16 +39,20 @@ def main():
     chosen = parser.parse_args()
     numbers = range(chosen.first, chosen.first + chosen.mutants)
     begun, found = time.monotonic(), []
-    pool = ProcessPoolExecutor(chosen.jobs, multiprocessing.get_context("fork"))
-    futures = [pool.submit(work, number, chosen.seed) for number in numbers]
-    try:
-        for future in as_completed(futures, 60 * chosen.minutes):
-            found.append(future.result())
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz") as folder,
+        multiprocessing.get_context("fork").Pool(chosen.jobs) as pool,
+    ):
+        examined = functools.partial(work, seed=chosen.seed, folder=folder)
+        outcomes = pool.imap_unordered(examined, numbers)
+        while len(found) < len(numbers) and time.monotonic() - begun < 60 * chosen.minutes:
+            try:
+                found.append(outcomes.next(PATIENCE))
+            except multiprocessing.TimeoutError:
+                print(f"nothing for {PATIENCE} s: a process has died, or waits for something")
+                break
             if found[-1].result == FINDING:
                 print(found[-1], flush=True)
-    except (BrokenProcessPool, TimeoutError) as error:
-        print(f"{type(error).__name__}: {error}")
-    pool.shutdown(wait=False, cancel_futures=True)
     print("\nAccepted files with another answer, each as its content written plainly gives it:")
     for outcome in sorted((o for o in found if o.result == CHANGED), key=lambda o: o.number):
         print(outcome)

@@ -1,14 +1,12 @@
 """Sheets of fit and identify: the document's numbers, the model's file, what is not determined."""
 
 import html
-import json
 
 import numpy as np
 import pytest
 from documents import check_hygiene
 from sheets import ESTIMATES, disagreements, make, read_sheet, rows_of
 
-from rotorid.base.answer import LINES
 from rotorid.report.document import NOTHING
 from rotorid.samples import sample_data
 from rotorid.timedomain import Record
@@ -104,7 +102,4 @@ def test_names_and_files_cannot_break_the_page(tmp_path):
     assert "<script>alert" not in sheet.text
     assert "<b>r" not in sheet.text
     assert "&lt;/pre&gt;&lt;script&gt;alert(1)" in sheet.text
-    assert "Errors</dt><dd>stated</dd>" in sheet.text
-    assert json.loads(json.dumps(found.document))["stopped_by"] is None
-    assert len(found.summary().splitlines()) <= LINES
     check_hygiene(found.figure(), unitless=("",))

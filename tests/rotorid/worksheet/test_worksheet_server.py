@@ -108,17 +108,6 @@ def test_what_a_page_should_not_ask_for_is_one_sentence(shared):
     assert served.state()["results"]["answer"] is not None
 
 
-def test_nothing_outside_the_folder_is_read(tmp_path, serve):
-    folder = copy(tmp_path)
-    shutil.copy(folder / "runs.csv", tmp_path / "outside.csv")
-    job = folder / "job.toml"
-    job.write_text(job.read_text().replace('"runs.csv"', '"../outside.csv"'))
-    results = serve(job).settled()["results"]
-    assert results["answer"] is None
-    (problem,) = results["problems"]
-    assert "outside the folder" in problem["text"]
-
-
 def test_kill_loses_no_finished_cell(tmp_path, serve):
     job = copy(tmp_path) / "job.toml"
     served = serve(job)
@@ -138,19 +127,6 @@ def test_kill_loses_no_finished_cell(tmp_path, serve):
     assert not [path for path in job.parent.iterdir() if path.name.endswith(".tmp")]
     again = serve(job).settled()
     assert again["results"]["answer"] is not None
-
-
-def test_changes_from_outside_are_noticed(shared):
-    served = shared()
-    job = served.job
-    state = served.settled()
-    runs = job.parent / "runs.csv"
-    runs.write_text(runs.read_text().replace("3.36,89", "3.36,95"))
-    state = served.noticed(state["version"])
-    assert "runs.csv was changed by another program" in state["notice"]
-    assert state["tables"]["runs"]["rows"][0]["cells"][-1] == "95"
-    found = state["results"]["answer"]["document"]
-    assert found["corrections"] == command(job)["corrections"]
 
 
 @pytest.mark.full

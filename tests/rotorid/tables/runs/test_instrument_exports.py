@@ -411,21 +411,6 @@ def test_other_names_of_columns(tmp_path):
             "job.toml, key columns.speed_mph: found 'Drehzahl', expected a known key (did you mean "
             "'speed_rpm'?); known are run, speed_rpm, sensor, amplitude, phase_deg and repeat",
         ),
-        (
-            "amplitude_um_pp",
-            "amplitude_um_pk",
-            "job.toml, key columns.amplitude_um_pk: found 'Ausschlag', expected um (peak), um_pp (peak to "
-            "peak) or um_rms, not um_pk; known vibration units are m, mm, um, mil, in, m_s, mm_s, in_s, g, "
-            "m_s2 or mm_s2",
-        ),
-        ('"Lauf"', "7", "job.toml, key columns.run: found '7', expected a text in quotes"),
-        (
-            'sensor = "Messstelle"',
-            "",
-            f"runs.csv, row 2, column Messstelle: found 'Messstelle', expected {KNOWN}\n"
-            "runs.csv, row 2, column sensor: expected a column sensor; the columns are Lauf, Drehzahl, "
-            "Messstelle, Ausschlag and Phase",
-        ),
     ],
 )
 def test_names_that_do_not_fit_are_explained(tmp_path, old, new, message):
