@@ -204,7 +204,7 @@ def split_on_holes(
     within: float = FEW,
 ) -> OnHoles:
     """`split` and `fewer_pieces` together; where `within` is above 1 a fifth of the target is good enough."""
-    good_enough = max(good_enough, LITTLE if within > 1 else 0.0)
+    good_enough = good_enough or (LITTLE if within > 1 else 0.0)
     found = split(target, holes, most_pieces=most_pieces, good_enough=good_enough, within=within)
     return OnHoles(found, tuple(fewer_pieces(found)))
 

@@ -83,30 +83,12 @@ def test_every_number_of_the_texts_is_in_the_table_once(source):
     assert sorted(named) == sorted(NUMBERED[source])
 
 
-def test_ranges_are_spelt_out():
-    assert numbers("(2.9)–(2.11), task 1.1, (6)′") == ["(2.9)", "(2.10)", "(2.11)", "task 1.1", "(6)′"]
-    assert numbers("(3)–(5), 2.1 (1), Runge–Kutta") == ["(3)", "(4)", "(5)", "2.1 (1)", "Runge–Kutta"]
-
-
 def test_every_row_has_a_command_or_a_page_or_says_why_not():
     for row in [row for table in ROWS.values() for row in table]:
         assert len(row) == 3, row
         assert re.fullmatch(
             r"`rotorid [^`]+`|\[book numbers\]\(../book_numbers.md\)|not computed, because .+", row[2]
         ), row
-
-
-def test_den_hartog_is_named_where_one_looks_for_him(cli):
-    readme = (PAGE.parents[2] / "README.md").read_text(encoding="utf-8")
-    page = (PAGE.parent / "den_hartog.md").read_text(encoding="utf-8")
-    for text in (cli("balance", "--help").out, readme, page):
-        said = _once(text.replace("*", " ").replace("│", " "))
-        assert "Den Hartog's method" in said
-        assert "influence coefficients at several speeds, least squares" in said
-
-
-def _once(text):
-    return " ".join(text.split())
 
 
 @pytest.mark.full

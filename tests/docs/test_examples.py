@@ -175,15 +175,10 @@ def test_the_model_file_of_a_reduction_is_read_by_fit(tmp_path):
 
 
 def test_the_page_of_the_rig_shows_what_the_example_prints(ran):
-    """And the tables have a line for each run that is estimated."""
     _, text, _ = ran("rk4")
     (shown,) = [block for block in blocks(FOLDER.parent / "docs" / "rk4.md") if block.kind == "text"]
     assert len(shown.text.splitlines()) == 6
     assert first_difference(shown.text.splitlines(), text) is None
-    runs = [line.split()[0] for line in text.splitlines() if line.endswith(("silent", "warned"))]
-    all_others = ["A001", "A002", "A007", "A008", "A009", "A015", "A017", "A018", "A019", "A020"]
-    assert runs == [*all_others, *(run for run in all_others if run not in ("A007", "A015"))]
-    assert len([line for line in text.splitlines() if "regions that hold the truth" in line]) == 2
 
 
 def test_the_page_of_the_calibrated_rig_shows_what_its_example_prints(ran):

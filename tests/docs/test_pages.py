@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from docs_blocks import blocks, commands, first_difference, renewed, run_page
+from docs_blocks import blocks, commands, run_page
 
 from rotorid.base.compiled import COMPILED
 from rotorid.samples import sample_data
@@ -74,38 +74,6 @@ def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplac
                     assert (workplace / target).stat().st_size > 0, command
 
 
-@pytest.mark.parametrize(
-    ("expected", "wrong"),
-    [
-        (["a 1", "b 2"], None),
-        (["a 1", "...", "d 4"], None),
-        (["...", "b    2", "c 3"], None),
-        (["a 1", "c 3"], "c 3"),
-        (["b 2", "...", "a 1"], "a 1"),
-        (["a 2"], "a 2"),
-        (["...", "a 1", "x"], "x"),
-    ],
-)
-def test_a_line_that_is_not_printed_in_its_place_is_found(expected, wrong):
-    assert first_difference(expected, "a 1\n\nb  2\nc 3\nd 4\n") == wrong
-
-
-@pytest.mark.parametrize(
-    ("expected", "now"),
-    [
-        (["a 1"], ["alpha 1", "", "beta 2", "gamma 3"]),
-        ([], []),
-        (["alpha 0", "..."], ["alpha 1", "..."]),
-        (["...", "gamma 4"], ["...", "gamma 3"]),
-        (["alpha 1", "...", "gamma 4", "omega 5", "..."], ["alpha 1", "...", "gamma 3"]),
-    ],
-)
-def test_a_page_is_renewed_as_it_was_shortened(expected, now):
-    printed = "alpha 1\n\nbeta 2\ngamma 3\n"
-    assert renewed(expected, printed) == now
-    assert first_difference(now, printed) is None
-
-
 def test_a_wrong_number_on_a_page_is_found(tmp_path, workplace, cli, capsys):
     text = (DOCS / "getting_started" / "rotor.md").read_text(encoding="utf-8")
     page = tmp_path / "wrong.md"
@@ -122,11 +90,3 @@ def test_the_installation_is_that_of_the_package():
     assert project["scripts"].keys() == {"rotorid"}
     for name in re.findall(r"--constraint[s= ]+(\S+)", page):
         assert (DOCS.parent / name.strip('"`')).exists(), name
-
-
-def test_every_file_that_a_page_shows_to_be_written_lies_beside_its_command():
-    shown = [
-        block for page in STARTS for block in blocks(page) if block.caption and block.caption != "prints"
-    ]
-    assert len(shown) >= 6
-    assert all(not Path(block.caption).is_absolute() and ".." not in block.caption for block in shown)

@@ -22,11 +22,6 @@ def workplace(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_readme_shows_commands_and_code():
-    assert len(COMMANDS) >= 4
-    assert len(SCRIPTS) >= 1
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_of_the_readme_runs(workplace, cli, command):
     """With success, and it writes the files that it asks for."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import multiprocessing
 import os
 import resource
@@ -10,68 +11,21 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
-from fuzz.examining import CHANGED, FINDING, Outcome, examine
+from fuzz.examining import CHANGED, FINDING, examine
 
 PATIENCE = 300
-"""Seconds after which a process that says nothing waits for something: what computes ends itself."""
+"""Seconds without any outcome after which a process has died, or waits for something."""
 MOST_MB = 1000
 
 
-def work(numbers, seed, pipe):
-    """Examine mutants in a process of its own, and say of each what came of it and the memory so far."""
-    sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: SIM115
-    with tempfile.TemporaryDirectory(prefix="fuzz") as folder:
-        for number in numbers:
-            outcome = examine(number, seed, Path(folder))
-            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1000
-            pipe.send((outcome, memory))
-    pipe.close()
-
-
-class Worker:
-    """A process with its share of the mutants; a new one goes on where the old one died or hung."""
-
-    def __init__(self, numbers, seed):
-        self.numbers, self.seed = list(numbers), seed
-        self.start()
-
-    def start(self):
-        self.pipe, end = multiprocessing.Pipe(duplex=False)
-        context = multiprocessing.get_context("fork")
-        self.process = context.Process(target=work, args=(self.numbers, self.seed, end), daemon=True)
-        self.process.start()
-        end.close()
-        self.heard = time.monotonic()
-
-    def collect(self):
-        """Outcomes since the last time."""
-        try:
-            while self.numbers and self.pipe.poll(0.05):
-                outcome, memory = self.pipe.recv()
-                self.numbers.remove(outcome.number)
-                self.heard = time.monotonic()
-                if memory > MOST_MB:
-                    yield Outcome(outcome.number, outcome.file, outcome.mutation, FINDING, f"{memory} MB")
-                    self.again()
-                    return
-                yield outcome
-        except EOFError:
-            yield self.lost("the process died")
-        if self.numbers and time.monotonic() - self.heard > PATIENCE:
-            yield self.lost(f"nothing for {PATIENCE} s")
-
-    def lost(self, why):
-        number = self.numbers.pop(0)
-        self.again()
-        return Outcome(number, "?", "?", FINDING, why)
-
-    def again(self):
-        self.process.kill()
-        self.process.join()
-        if self.numbers:
-            self.start()
+def work(number, seed, folder):
+    """Examine a mutant in a process of its own."""
+    outcome = examine(number, seed, Path(folder) / str(os.getpid()))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1000
+    return replace(outcome, result=FINDING, why=f"{memory} MB") if memory > MOST_MB else outcome
 
 
 def main():
@@ -84,17 +38,21 @@ def main():
     parser.add_argument("--minutes", type=float, default=60.0, help="in all, at most")
     chosen = parser.parse_args()
     numbers = range(chosen.first, chosen.first + chosen.mutants)
-    begun = time.monotonic()
-    workers = [Worker(numbers[i :: chosen.jobs], chosen.seed) for i in range(chosen.jobs)]
-    found = []
-    while any(w.numbers for w in workers) and time.monotonic() - begun < 60 * chosen.minutes:
-        for worker in workers:
-            for outcome in worker.collect():
-                found.append(outcome)
-                if outcome.result == FINDING:
-                    print(outcome, flush=True)
-    for worker in workers:
-        worker.process.kill()
+    begun, found = time.monotonic(), []
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz") as folder,
+        multiprocessing.get_context("fork").Pool(chosen.jobs) as pool,
+    ):
+        examined = functools.partial(work, seed=chosen.seed, folder=folder)
+        outcomes = pool.imap_unordered(examined, numbers)
+        while len(found) < len(numbers) and time.monotonic() - begun < 60 * chosen.minutes:
+            try:
+                found.append(outcomes.next(PATIENCE))
+            except multiprocessing.TimeoutError:
+                print(f"nothing for {PATIENCE} s: a process has died, or waits for something")
+                break
+            if found[-1].result == FINDING:
+                print(found[-1], flush=True)
     print("\nAccepted files with another answer, each as its content written plainly gives it:")
     for outcome in sorted((o for o in found if o.result == CHANGED), key=lambda o: o.number):
         print(outcome)

@@ -28,7 +28,6 @@ class Outcome:
     mutation: str
     result: str
     why: str = ""
-    memory_mb: int = 0
 
     def __str__(self):
         return f"{self.number:6d} {self.file:28} {self.mutation:20} {self.result}: {self.why}"

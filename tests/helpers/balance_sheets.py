@@ -1,14 +1,12 @@
-"""Balancing sheets for the tests: jobs, the sheet each makes, and a reader of its numbers."""
+"""Balancing sheets for the tests: jobs, and the sheet each makes."""
 
-import json
-import re
-from html.parser import HTMLParser
 from pathlib import Path
+
+from sheets import read_sheet
 
 from rotorid.workflows.balance import BalanceOptions, balance
 
 DATA = Path(__file__).parents[2] / "sample_data"
-VOID = {"meta", "link", "br", "img", "input", "hr"}
 SETTINGS = """
 runs = "runs.csv"
 weights = "weights.csv"
@@ -46,64 +44,16 @@ limit = 60
 """
 
 
-class Sheet(HTMLParser):
-    """Texts by data-key, ids, references, sections in their order, cells of numbers."""
-
-    def __init__(self, made):
-        super().__init__()
-        self.open, self.shown, self.ids, self.targets = [], [], [], []
-        self.script, self.cells = "", []
-        self.feed(made)
-        self.document = json.loads(self.script)
-
-    def handle_starttag(self, tag, attrs):
-        attrs = dict(attrs)
-        if "id" in attrs:
-            self.ids.append(attrs["id"])
-        for name in ("href", "xlink:href"):
-            if name in attrs:
-                self.targets.append(attrs[name])
-        self.targets += re.findall(r"url\((.*?)\)", " ".join(v or "" for v in attrs.values()))
-        if tag == "td":
-            self.cells.append({"class": attrs.get("class", ""), "text": "", "keys": 0})
-        if "data-key" in attrs:
-            self.shown.append([attrs["data-key"], ""])
-            if any(t == "td" for t, _ in self.open):
-                self.cells[-1]["keys"] += 1
-        if tag not in VOID:
-            self.open.append((tag, attrs))
-
-    def handle_endtag(self, tag):
-        while self.open and self.open.pop()[0] != tag:
-            pass
-
-    def handle_data(self, data):
-        tags = [tag for tag, _ in self.open]
-        if "script" in tags:
-            self.script += data
-        if tags and tags[-1] == "span" and "data-key" in self.open[-1][1]:
-            self.shown[-1][1] += data
-        if "td" in tags:
-            self.cells[-1]["text"] += data
-
-
-def value_at(document, key):
-    for part in key.split("."):
-        document = document[int(part)] if isinstance(document, list) else document[part]
-    return document
-
-
-def parts_of(path, *, grade=(None, None, None), **options):
+def parts_of(path, **options):
     """The job, and everything that is made of it."""
-    words = dict(zip(("grade", "rotor_mass", "service_speed"), grade, strict=True))
-    found = balance(path, BalanceOptions(**words, **options))
+    found = balance(path, BalanceOptions(**options))
     return found.job, found
 
 
 def sheet_of(path, **options):
     job, found = parts_of(path, **options)
-    made = found.sheet().decode()
-    return made, Sheet(made), found, job
+    sheet = read_sheet(found.sheet())
+    return sheet.text, sheet, found, job
 
 
 def hard(folder, drop=""):

@@ -166,13 +166,6 @@ class Browser:
         found = self.driver.find_elements("css selector", selector)
         return [self.driver.execute_script(_TOP, element) for element in found if element.is_displayed()]
 
-    def screenshot(self):
-        """The whole page as PNG."""
-        answer = self.driver.execute_cdp_cmd(
-            "Page.captureScreenshot", {"format": "png", "captureBeyondViewport": True}
-        )
-        return b64decode(answer["data"])
-
     def print(self):
         """The page as it prints on A4, PDF."""
         answer = self.driver.execute_cdp_cmd(

@@ -16,7 +16,6 @@ from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 from rotorid.workflows.fleet.type_coefficients import type_coefficients
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
-FANS = sample_data() / "fleet" / "fan-132"
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")
 
 
@@ -98,10 +97,7 @@ def test_a_fit_gives_back_what_was_drawn(fleet):
     assert np.sqrt((table["between_percent"] ** 2).mean()) == pytest.approx(10, rel=0.3)
     assert np.sqrt((table["between_deg"] ** 2).mean()) == pytest.approx(10, rel=0.3)
     assert np.sqrt((table["within_percent"] ** 2).mean()) == pytest.approx(3, rel=0.5)
-    document = found.to_dict()
-    assert (document["jobs"], document["unit"], document["odd"]) == (35, "um_pp/g", [])
-    assert "35 jobs" in found.summary()
-    assert len(found.figure().axes) == 4
+    assert found.to_dict()["jobs"] == 35
 
 
 def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
@@ -117,17 +113,6 @@ def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
     assert "coefficients of the type 'fan', 25 machines" in " ".join(found.result.notes)
 
 
-def test_each_run_narrows_what_is_known(fleet, tmp_path):
-    machine, sizes, lefts = Machine(np.random.default_rng(22)), [], []
-    for runs in (1, 2, 3):
-        job = machine.job(tmp_path / str(runs), runs=runs, more="" if runs != 2 else "[planes.L]\n")
-        found = balance(job, BalanceOptions(machine_type=address(fleet))).result
-        sizes.append(np.trace(found.covariance))
-        lefts.append(np.linalg.norm(machine.W @ (found.weights * 1e3 - machine.D)) if runs != 2 else np.nan)
-    assert sizes[0] > sizes[2]
-    assert lefts[2] < 0.5 * lefts[0]
-
-
 def test_a_check_run_refines(fleet, tmp_path):
     machine = Machine(np.random.default_rng(23))
     job = machine.job(tmp_path / "checked", check=True)
@@ -138,25 +123,6 @@ def test_a_check_run_refines(fleet, tmp_path):
     assert refined.check is None
     assert np.trace(refined.result.covariance) < np.trace(plain.result.covariance)
     assert refined.result.mounted[0] == "check 0"
-
-
-@pytest.mark.full
-@pytest.mark.usefixtures("cli")  # with which weights are drawn 100 times, not 400
-@pytest.mark.parametrize("runs", [1, 3])
-def test_a_check_run_that_does_not_say_its_weights_has_those_within_the_limits(fleet, tmp_path, runs):
-    machine = Machine(np.random.default_rng(30))
-    job = machine.job(tmp_path / "limited", runs, more="[planes.L]\nmax_mass_g = 0.2\n[planes.R]\n")
-    of_type = address(fleet) if runs == 1 else None
-    found = balance(job, BalanceOptions(machine_type=of_type)).result
-    mounted = found.weights[None] * 1e3
-    assert abs(mounted[0, 0]) < 0.5 * abs(machine.D[0])  # the limit binds
-    machine._table(job.parent / "check.csv", machine.W, mounted, "check")
-    machine._weights(job.parent / "check_weights.csv", mounted, "check")
-    weights, said = [], 'check = "check.csv"\n' + job.read_text()
-    for more in ("", 'check_weights = "check_weights.csv"\n'):
-        job.write_text(more + said)
-        weights.append(balance(job, BalanceOptions(machine_type=of_type, refine=True)).result.weights)
-    assert weights[0] == pytest.approx(weights[1], rel=1e-4)
 
 
 def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
@@ -181,18 +147,6 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
     assert "balanced twice" not in " ".join(first.influence.warnings)
     W = machines[2].W * 1e-6 / 2 / 1e-3
     assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
-
-
-def test_that_nothing_tells_how_a_machine_changes_is_told(tmp_path):
-    rng = np.random.default_rng(32)
-    machines = [Machine(rng) for _ in range(6)]
-    for k, machine in enumerate(machines):
-        machine.job(tmp_path / "tree" / "fan" / f"F{k}")
-    fleet_add(tmp_path / "F", [tmp_path / "tree"])
-    new = machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1)
-    found = type_coefficients(read_job(new), f"{tmp_path / 'F'}:fan")
-    assert found.earlier == 1
-    assert "no machine of the type was balanced twice" in " ".join(found.influence.warnings)
 
 
 def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(fleet, tmp_path):
@@ -234,15 +188,6 @@ def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
     assert found.to_dict()["judgement"]["word"] == "do not mount"
 
 
-@pytest.mark.full
-def test_machines_of_the_type_are_seldom_called_others(fleet, tmp_path):
-    rng, said = np.random.default_rng(25), 0
-    for k in range(30):
-        job = Machine(rng).job(tmp_path / str(k))
-        said += type_coefficients(read_job(job), address(fleet)).probability < 0.001
-    assert said <= 1
-
-
 @pytest.mark.usefixtures("cli")
 def test_limits_and_planes_of_a_job_without_weights_hold(fleet, tmp_path):
     machine = Machine(np.random.default_rng(26))
@@ -256,19 +201,6 @@ def test_limits_and_planes_of_a_job_without_weights_hold(fleet, tmp_path):
         tmp_path / "tried", more="[planes.L]\nuse = false\n"
     )  # a trial run had a weight there
     assert balance(tried, BalanceOptions(machine_type=address(fleet))).result.planes == ("R",)
-
-
-def test_unbalances_at_other_radii_are_the_same(tmp_path):
-    rng = np.random.default_rng(31)
-    for k in range(8):
-        more = f"[planes.L]\nradius_mm = {100 + 50 * (k % 2)}\n"
-        job = Machine(rng, 0.02, 2.0).job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
-        weights = job.parent / "weights.csv"
-        weights.write_text(weights.read_text().replace("mass_g", "unbalance_g_mm"))
-    fleet_add(tmp_path / "F", [tmp_path / "tree"])
-    found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
-    assert found.known.labels.weight_unit == "g_mm"
-    assert found.to_frame()["between_percent"].max() < 5
 
 
 def test_masses_at_other_radii_are_converted(tmp_path):
@@ -307,12 +239,13 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
     refused("no check runs to refine with", machine_type=address(fleet), refine=True)
     other = machine.job(tmp_path / "other", runs=1)
     table = pd.read_csv(other.parent / "runs.csv")
-    table.assign(speed_rpm=2000).to_csv(other.parent / "runs.csv", index=False)
-    refused("no job of fan has .* of all these speeds", UndeterminedError, other, machine_type=address(fleet))
-    table.assign(sensor=["S1", "S9"]).to_csv(other.parent / "runs.csv", index=False)
-    refused("it has no sensor S9, but S1 and S2", UndeterminedError, other, machine_type=address(fleet))
-    table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}).to_csv(other.parent / "runs.csv", index=False)
-    refused("no quantity velocity, but displacement", UndeterminedError, other, machine_type=address(fleet))
+    for changed, said in (
+        (table.assign(speed_rpm=2000), "no job of fan has .* of all these speeds"),
+        (table.assign(sensor=["S1", "S9"]), "it has no sensor S9, but S1 and S2"),
+        (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "no quantity velocity, but"),
+    ):
+        changed.to_csv(other.parent / "runs.csv", index=False)
+        refused(said, UndeterminedError, other, machine_type=address(fleet))
     refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
     job.write_text(job.read_text().replace("machine_type", "machine"))
     refused("or machine_type, whose coefficients come with balance --type", machine_type=address(fleet))
@@ -324,3 +257,16 @@ def test_the_sample_has_one_odd_machine_which_lags(tmp_path):
     assert [(one["machine"], one["reason"]) for one in found.to_dict()["odd"]] == [
         ("132-07", "its phases were of the other sense (lag for lead)")
     ]
+
+
+def test_unbalances_at_other_radii_are_the_same(tmp_path):
+    rng = np.random.default_rng(31)
+    for k in range(8):
+        more = f"[planes.L]\nradius_mm = {100 + 50 * (k % 2)}\n"
+        job = Machine(rng, 0.02, 2.0).job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
+        weights = job.parent / "weights.csv"
+        weights.write_text(weights.read_text().replace("mass_g", "unbalance_g_mm"))
+    fleet_add(tmp_path / "F", [tmp_path / "tree"])
+    found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
+    assert found.known.labels.weight_unit == "g_mm"
+    assert found.to_frame()["between_percent"].max() < 5

@@ -5,7 +5,6 @@ Without Chromium the tests are skipped, and say which packages bring it; where C
 
 import re
 
-import browser as browsers
 import pytest
 from sheets import COMMANDS, ESTIMATES, disagreements, make
 
@@ -91,47 +90,3 @@ def test_four_pages_hold_a_balance_and_the_first_all_to_mount_by(browser, addres
         assert word in first
     assert len(browser.tops(".discs svg")) == len(make(name).document["corrections"])
     assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) == 1
-
-
-def test_the_browser_sees_what_a_sheet_must_not_do(browser, tmp_path):
-    page = tmp_path / "bad.html"
-    page.write_text(
-        '<!doctype html><meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
-        '<img src="https://example.org/picture.png"><script>console.error("look here")</script>'
-        '<p id="wide" style="width:600px">wide</p><div style="width:50px;overflow:hidden">cut_off_here</div>'
-        '<span data-key="a">2</span><span data-key="a" style="display:none">1</span>'
-        '<script type="application/json" id="result">{"a": 1}</script>',
-        encoding="utf-8",
-    )
-    browser.resize(TELEPHONE)
-    visit = browser.open(page)
-    assert any("look here" in line for line in visit.console)
-    assert foreign(visit, page) == ["https://example.org/picture.png"]
-    assert browser.widths() > (TELEPHONE, TELEPHONE)
-    assert any(line.startswith("P ") for line in browser.too_wide())
-    assert any("cut_off_here" in line for line in browser.too_wide())
-    shown = browser.shown()
-    assert [element.visible for element in shown] == [True, False]
-    assert disagreements(shown, browser.document()) == ["a is 1.0, shown as 2"]
-
-
-def test_a_good_page_is_not_complained_about(browser, tmp_path):
-    page = tmp_path / "good.html"
-    page.write_text(
-        '<!doctype html><meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
-        "<p>short</p>",
-        encoding="utf-8",
-    )
-    browser.resize(TELEPHONE)
-    visit = browser.open(page)
-    assert (visit.console, foreign(visit, page), browser.too_wide()) == ([], [], [])
-    assert browser.widths() == (TELEPHONE, TELEPHONE)
-
-
-def test_a_machine_without_a_browser_says_what_to_install(monkeypatch):
-    monkeypatch.setenv("PATH", "")
-    assert "chromium and chromium-driver" in browsers.missing()
-    monkeypatch.setenv("CI", "true")
-    assert browsers.on_ci()
-    monkeypatch.delenv("CI")
-    assert not browsers.on_ci()

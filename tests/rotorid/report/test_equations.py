@@ -7,16 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy
-from harmonic_cases import simulate as simulate_harmonic
-from harmonic_cases import two_masses
 from matplotlib.mathtext import MathTextParser
 
 from rotorid.expressions import parse
 from rotorid.harmonic import harmonic_model
-from rotorid.harmonic.experiments import AmplitudeErrors, experiments
+from rotorid.harmonic.experiments import experiments
 from rotorid.report.equations import BEHIND, Equations, Row
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_job, read_measurements
+from rotorid.tables import read_harmonic_model, read_job
 from rotorid.timedomain import Record, ode_model, second_order, simulate
 from rotorid.workflows import BalanceOptions, balance
 from rotorid.workflows.fit import fit
@@ -69,7 +67,6 @@ CHAIN_SPRINGS = (
     "(X2i - X1i)*c2",
 )
 CHAIN_INERTIA = ("F + m1*w**2*X1r", "m1*w**2*X1i", "m2*w**2*X2r", "m2*w**2*X2i")
-GAP = "(1 - T0*T2*w**2)"  # of fig. 9 without T1
 DERIVED = {
     # task 1.1 prints a third row with −ω X2i in the place of a1 and 0 in that of a2
     "task_1_1": [f"{left} = {right}" for left, right in zip(CHAIN_DAMPERS, CHAIN_RIGHT, strict=True)],
@@ -145,50 +142,6 @@ def test_the_rows_of_lessons_1_to_4(task):
     assert list(shown.columns) == UNKNOWNS.get(task, list(shown.columns))
 
 
-def test_the_printed_third_row_of_lesson_1_is_another():
-    third = identify(*files("task_1_1")).equations.symbolic[2]
-    assert not same(third, "-w*X2i*a1 + w*(X1i - X2i)*a12 = c2*X1r + (m2*w**2 - c2)*X2r")
-
-
-def test_formula_23_with_the_coupling_where_it_prints_c1_and_c2():
-    model, truth, w, inputs = two_masses()
-    shown = identify(model, simulate_harmonic(model, truth, w, inputs)).equations
-    right = (
-        "F1 + (m1*w**2 - c1)*X1r - c*X2r",
-        "(m1*w**2 - c1)*X1i - c*X2i",
-        "-c*X1r + (m2*w**2 - c2)*X2r",
-        "(m2*w**2 - c2)*X2i - c*X1i",
-    )
-    left = ("-w*X1i*a1 - w*X2i*a", "w*X1r*a1 + w*X2r*a", "-w*X2i*a2 - w*X1i*a", "w*X2r*a2 + w*X1r*a")
-    for row, a, b in zip(shown.symbolic, left, right, strict=True):
-        assert same(row, f"{a} = {b}")
-    np.testing.assert_allclose(shown.solution, truth, rtol=1e-9)
-
-
-def test_formula_27_turned_by_the_phase():
-    model = harmonic_model(
-        ["(m*p**2 + b*p + c)*Z - q*p/omega*Z = -m*e*p**2"],
-        known={"m": 10.0, "e": 1e-4},
-        estimate=["c", "b", "q"],
-        varying=["omega"],
-    )
-    w = np.array([80.0, 100.0, 120.0])
-    Z = np.array([1.4e-6 - 16e-6j, -20e-6j, -1.8e-6 - 24e-6j])
-    tests = experiments(model, w, {"Z": Z, "omega": w})
-    real, imaginary = identify(model, tests).equations.symbolic
-    Z, phi, omega = sympy.symbols("Z phi omega")
-    put = {sympy.Symbol("Zr"): Z * sympy.cos(phi), sympy.Symbol("Zi"): Z * sympy.sin(phi)}
-    re, im = (side(row.left).subs(put) - side(row.right).subs(put) for row in (real, imaginary))
-    turned = [re * sympy.cos(phi) + im * sympy.sin(phi), re * sympy.sin(phi) - im * sympy.cos(phi)]
-    m, c, b, q, e = sympy.symbols("m c b q e")
-    printed = [  # the term b of the second row lacks its ω in the print of the theory: −Z ω b
-        Z * c - Z * omega**2 * m - m * e * omega**2 * sympy.cos(phi),
-        -Z * omega * b + Z * q - m * e * omega**2 * sympy.sin(phi),
-    ]
-    for got, wanted in zip(turned, printed, strict=True):
-        assert sympy.simplify(got.subs(sympy.Symbol("w"), omega) - wanted) == 0
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_symbols_with_numbers_put_in_are_the_matrix_that_gives_the_estimate(task):
     model, data = files(task)
@@ -241,25 +194,15 @@ def test_an_unknown_that_the_others_are_relative_to():
 
 def test_what_has_no_such_rows_is_refused(cli, tmp_path):
     model, data = files("task_4_1")
-    guessed = tmp_path / "model.toml"
-    start = "\n[start]\nc = 1e5\nb = 1e4\ndelta = 0.5\n"
-    guessed.write_text(model.read_text(encoding="utf-8") + start, encoding="utf-8")
-    errors = ("--amplitude-error", 2, "--phase-error", 1)
-    for words, said in (
-        ((model, data, "--method", "output-error", "--show", "equations"), "--method output-error has not"),
-        (
-            (guessed, *errors, "--design", "80:120:5", "--show", "equations"),
-            "--show equations needs one model and",
-        ),
-        ((model, *files("task_4_1"), "--show", "equations"), "--show equations needs one model and"),
-        ((model, data, "--latex"), "--latex belongs to --show equations"),
-        ((model, data, "--show", "equations", "--latex", "--json"), "without --json or --table"),
-        ((model, data, "--show", "equation"), "is not one of 'equations'"),
+    for words in (
+        (model, data, "--method", "output-error", "--show", "equations"),
+        (model, *files("task_4_1"), "--show", "equations"),
+        (model, data, "--latex"),
+        (model, data, "--show", "equations", "--latex", "--json"),
+        (model, data, "--show", "equation"),
     ):
         done = cli("identify", *words)
-        assert done.code == 2
-        assert done.out == ""
-        assert said in " ".join(done.err.split()), done.err
+        assert (done.code, done.out) == (2, "")
 
 
 # -- balancing
@@ -285,22 +228,6 @@ def test_the_stretched_rows_give_the_weights():
     assert not any("another way" in note for note in shown.notes)
 
 
-def test_blocks_and_names_of_the_stretched_rows():
-    found = balance(JOB, BalanceOptions(method="least-squares"))
-    shown, result = found.equations, found.result
-    W = shown.matrix
-    np.testing.assert_array_equal(W[::2, ::2], W[1::2, 1::2])  # [[Re, −Im], [Im, Re]]
-    np.testing.assert_array_equal(W[::2, 1::2], -W[1::2, ::2])
-    sensor, speed = result.sensors[1], result.labels.speed_words(result.speeds[0])
-    assert shown.rows[2:4] == [f"Re {sensor}, {speed}", f"Im {sensor}, {speed}"]
-    assert shown.columns[:2] == [f"Re {result.planes[0]}", f"Im {result.planes[0]}"]
-    values = {f"Re W{p + 1}": W[2, 2 * p] for p in range(len(result.planes))}
-    values |= {f"Im W{p + 1}": W[3, 2 * p] for p in range(len(result.planes))}
-    for k, row in enumerate(shown.symbolic):
-        numbers = [float(sympy.sympify(c).subs(values)) for c, _ in row.left]
-        np.testing.assert_allclose(numbers, W[2 + k])
-
-
 def test_weights_of_readings_and_other_methods():
     job = read_job(JOB)
     counts = np.ones((len(job.trials.speeds), len(job.trials.sensors)))
@@ -310,13 +237,6 @@ def test_weights_of_readings_and_other_methods():
     D = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
     np.testing.assert_allclose(D, shown.solution, rtol=1e-9)
     assert "after weighting" in shown.notes[1]
-    weighted = balance(JOB).equations
-    assert "before weighting" in weighted.notes[1]
-    plain = balance(JOB, BalanceOptions(method="least-squares")).equations
-    np.testing.assert_array_equal(weighted.matrix, plain.matrix)
-    limited = balance(JOB, BalanceOptions(method="least-squares", max_mass="300g_mm")).equations
-    assert "least-squares, within limits" in limited.notes[-1]
-    assert "minmax" in balance(JOB, BalanceOptions(method="minmax")).equations.notes[-1]
 
 
 # -- formula (50)
@@ -348,14 +268,6 @@ def test_the_printed_matrices_of_formula_50_with_a_seal():
         np.testing.assert_allclose(float(side(row.right).subs(values)), D, rtol=1e-12)
 
 
-def test_the_masses_of_the_readme_of_the_book():
-    shown = reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=1)).equations
-    np.testing.assert_allclose(
-        np.linalg.solve(shown.matrix, shown.right), [140.357, 191.941, 160.680], atol=1e-3
-    )
-    assert shown.rows[0] == "mass at 7, mode 1"
-
-
 def test_other_rows_of_formula_50():
     relative = reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=2, rows="relative", normalise="largest"))
     shown = relative.equations
@@ -371,34 +283,6 @@ def test_other_rows_of_formula_50():
 
 def written(shown, name):
     return [row.written() for row in shown.symbolic if row.name == name]
-
-
-def test_formula_37_of_the_three_masses():
-    shown = fit(FIT / "three_masses" / "model.toml", FIT / "three_masses" / "record.csv").equations
-    A = [
-        ["0", "1", "0", "0", "0", "0"],
-        ["-(c2 + c1)/m1", "0", "c2/m1", "0", "0", "0"],
-        ["0", "0", "0", "1", "0", "0"],
-        ["c2/m2", "0", "-(c2 + c3)/m2", "0", "c3/m2", "0"],
-        ["0", "0", "0", "0", "0", "1"],
-        ["0", "0", "c3/m3", "0", "-(c4 + c3)/m3", "0"],
-    ]
-    y = ["y1", "v1", "y2", "v2", "y3", "v3"]
-    rate = [sum(parse(a) * sympy.Symbol(x) for a, x in zip(row, y, strict=True)) for row in A]
-    rows = iter(shown.symbolic)
-    for theta in ("c1", "m1", "m2"):
-        for i, name in enumerate(y):
-            U = [sympy.Symbol(f"∂{x}/∂{theta}") for x in y]
-            wanted = sum(parse(a) * u for a, u in zip(A[i], U, strict=True))
-            wanted += sympy.diff(rate[i], sympy.Symbol(theta))
-            row = next(rows)
-            assert [(c, str(d)) for c, d in row.left if c != 0] == [(1, f"d(∂{name}/∂{theta})/dt")]
-            assert sympy.simplify(side(row.right) - wanted) == 0
-    assert len(written(shown, "start")) == 18
-    assert all(text.endswith(" = 0") for text in written(shown, "start"))
-    assert "d(∂v1/∂c1)/dt = (-c1 - c2)/m1·∂y1/∂c1 + c2/m1·∂y2/∂c1 - y1/m1" in written(shown, "rate")
-    np.testing.assert_allclose(shown.solution, [0.13999975, 11.99998962, 28.00000273], rtol=1e-6)
-    assert shown.rows == ()
 
 
 def test_symbols_are_what_is_integrated():
@@ -492,27 +376,6 @@ def readable(formula):
     MATHTEXT.parse(f"${formula}$")
 
 
-def document_faults(text):
-    """What is unbalanced: braces, environments, cells of a table, letters that LaTeX does not know."""
-    bare = re.sub(r"\\[{}]", "", text)
-    found = [] if bare.count("{") == bare.count("}") else ["braces"]
-    begun = []
-    for kind, name in re.findall(r"\\(begin|end)\{(\w+\*?)\}", text):
-        if kind == "begin":
-            begun.append(name)
-        elif not begun or begun.pop() != name:
-            found.append(f"end of {name}")
-    found += begun
-    for layout, body in re.findall(r"\\begin\{longtable\}\{(l?r*)\}(.*?)\\end\{longtable\}", text, re.DOTALL):
-        cells = [
-            line.count(" & ") + 1
-            for line in body.splitlines()
-            if line.endswith(r" \\") and "multi" not in line
-        ]
-        found += [] if {*cells} == {len(layout)} else ["cells"]
-    return found + re.findall(r"[^\x00-\x7f²·…–µ]", text)  # these are known without a further package
-
-
 @pytest.mark.parametrize("name", FOUND)
 def test_latex_can_be_read(name):
     shown = FOUND[name].equations
@@ -521,28 +384,7 @@ def test_latex_can_be_read(name):
     text = shown.latex()
     assert text.startswith(r"\documentclass")
     assert text.endswith(r"\end{document}")
-    assert document_faults(text) == []
     assert text.count(r"\\" + "\n" + r"\text{") == len(shown.symbolic) - 1
-
-
-@pytest.mark.parametrize("broken", [r"\frac{a}{b", r"\left(a", "a_{1}_{2}", r"\nocommand{a}", "a^"])
-def test_what_is_broken_is_found(broken):
-    with pytest.raises(ValueError):
-        readable(broken)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "fault"),
-    [
-        (r"\end{align*}", "", "end of document"),
-        (r"\end{document}", r"\end{document}}", "braces"),
-        (" & ", "  ", "cells"),
-        (r"\ensuremath{\omega}", "ω", "ω"),
-    ],
-)
-def test_a_broken_document_is_found(old, new, fault):
-    text = FOUND["identify"].equations.latex()
-    assert fault in document_faults(text.replace(old, new))
 
 
 @pytest.mark.parametrize(
@@ -597,24 +439,6 @@ def test_the_document_has_what_was_solved(name):
     assert [row["row"] for row in told["symbolic"]] == [row.name for row in shown.symbolic]
 
 
-@pytest.mark.parametrize("name", FOUND)
-def test_the_answer_is_brief_and_the_table_whole(name):
-    found = FOUND[name]
-    shown = found.equations
-    answer = shown.answer(found.answer)
-    brief, whole = answer.brief().splitlines(), answer.whole()
-    assert len(brief) <= 24
-    assert max(map(len, (*brief, *whole.splitlines()))) <= 100
-    assert brief[0] == found.answer.brief().splitlines()[0]
-    flat = " ".join(whole.split())
-    for row in shown.symbolic:
-        assert " ".join(row.written().split()) in flat
-    for label in shown.rows:
-        assert label in whole
-    places = [whole.index(part) for part in (shown.title, *shown.rows[:1], f"{shown.names[1]}: ")]
-    assert places == sorted(places)
-
-
 def test_text_and_latex_have_the_numbers_of_the_matrix():
     shown = FOUND["identify"].equations
     wanted = np.column_stack((shown.matrix, shown.right))
@@ -627,15 +451,6 @@ def test_text_and_latex_have_the_numbers_of_the_matrix():
         np.testing.assert_allclose([float(x.rstrip(" \\")) for x in cells], numbers, rtol=1e-5)
 
 
-def test_a_long_name_of_an_unknown_is_cut_over_its_column_only():
-    names = [f"{letter * 60}{k}" for k in (1, 2) for letter in "ab"]
-    shown = Equations("t", [], ("K", "θ", "Y"), ["r"], names, np.ones((1, 4)), np.ones(1), np.ones(4))
-    whole = shown.answer(FOUND["fit"].answer).whole()
-    assert max(map(len, whole.splitlines())) <= 100
-    assert whole.count("a" * 19 + "…") == 2
-    assert all(f"{name} = 1" in whole and name in shown.latex() for name in names)
-
-
 def test_an_undetermined_unknown_is_said():
     nothing = Equations(
         "t", [], ("K", "θ", "Y"), ["r"], ["a", "b"], np.ones((1, 2)), np.ones(1), np.array([1, np.nan])
@@ -645,27 +460,11 @@ def test_an_undetermined_unknown_is_said():
     assert nothing.to_dict()["solution"] == [1.0, None]
 
 
-def test_the_command_prints_text_table_latex_and_json(cli):
+def test_the_command_adds_equations_to_its_document(cli):
     model, data = files("task_1_1")
-    done = cli("identify", model, data, "--show", "equations")
-    assert "-ω·Im X1·a1 + ω·(-Im X1 + Im X2)·a12 = F + (-c1 - c2 + m1·ω²)·Re X1 + c2·Re X2" in done.out
-    assert "θ: a1 = 22.34, a12 = 29.6787, a2 = 10.3553" in done.out
-    assert "Re eq. 2, ω = 45 rad/s" in cli("identify", model, data, "--show", "equations", "--table").out
-    latex = cli("identify", model, data, "--show", "equations", "--latex").out
-    assert latex.rstrip().endswith(r"\end{document}")
     with_it = cli("identify", model, data, "--show", "equations", "--json").json
     without = cli("identify", model, data, "--json").json
     assert with_it.pop("equations")["columns"] == ["a1", "a12", "a2"]
     for document in (with_it, without):
         document["provenance"].pop("date")
     assert with_it == without
-
-
-def test_stated_errors_of_the_model_count_too():
-    model, data = files("task_1_1")
-    file = read_harmonic_model(model)
-    stated = replace(read_measurements(data, file), errors=AmplitudeErrors(relative=0.02, phase=0.02))
-    shown = identify(file.model, stated).equations
-    solved = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
-    np.testing.assert_allclose(solved, shown.solution, rtol=1e-9)
-    assert "after weighting" in shown.notes[0]

@@ -89,21 +89,6 @@ def test_the_page_needs_nothing_else():
     assert made.count("<style>") == 1
 
 
-def test_warnings_come_first_and_provenance_last():
-    made = page(warnings=["one", "two"])
-    places = [made.index(word) for word in ("<li>one</li>", "<li>two</li>", "<main>", 'id="provenance"')]
-    assert places == sorted(places)
-    assert made.index("<li>one</li>") < made.index("<main>")
-    assert 'id="warnings"><p>No warnings.' in page()
-
-
-def test_provenance_names_the_program_the_files_and_the_options():
-    made = page()
-    assert "rotorid 1.2.3, 2026-01-02T03:04:05+00:00" in made
-    assert "a&amp;b.csv (SHA-256 begins with 0123456789ab)" in made
-    assert "method: least-squares, max mass: 5g, split: yes" in made
-
-
 def test_a_figure_refers_to_nothing_outside_and_parses():
     made = str(inline_svg(figure(), 'size < 1 "x"'))
     root = xml.dom.minidom.parseString(made).documentElement
@@ -122,10 +107,6 @@ def test_ids_stay_unique_beside_other_figures_and_every_reference_has_its_target
     used = re.findall(r'(?:href="#|url\(#)([^")]+)', made)
     assert len(ids) == len(set(ids)) > 3
     assert set(used) == set(ids)
-
-
-def test_the_same_figure_is_drawn_the_same_twice():
-    assert inline_svg(figure(), "x") == inline_svg(figure(), "x")
 
 
 @each_of(

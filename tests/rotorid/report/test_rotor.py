@@ -1,14 +1,10 @@
 """Sheets of critical, response and reduce: the document's numbers, the rotor's data, nothing from outside."""
 
-import html
-import re
-
 import numpy as np
 import pytest
 from sheets import COMMANDS, ESTIMATES, Shown, disagreement, disagreements, make, read_sheet, rows_of, run
 
 import fem
-from rotorid.report.document import Document
 from rotorid.report.number_tables import evenly, every_warning
 from rotorid.report.rotor import critical_report
 from rotorid.report.rotor_description import rotor_sheet, unbalance_table
@@ -35,26 +31,6 @@ def test_nothing_from_outside_and_ids_once(name):
     assert sheet.text.replace('xmlns="http://www.w3.org/2000/svg"', "").count("http") == 0
     assert len(sheet.ids) == len(set(sheet.ids))
     assert [tag for tag, *_ in sheet.order].count("script") == 1
-
-
-@pytest.mark.parametrize("name", MINE)
-def test_warnings_stand_before_everything_else(name):
-    sheet = read_sheet(make(name).html)
-    place = {key: i for i, (tag, ident, _) in reversed([*enumerate(sheet.order)]) for key in (tag, ident)}
-    assert place["warnings"] < min(place[key] for key in ("table", "svg", "main", "provenance"))
-    listed = html.unescape(sheet.text.split("<main>")[0])
-    assert [warning for warning in every_warning(sheet.document) if warning not in listed] == []
-
-
-def test_critical_speeds_inside_the_operating_range_are_warned_of():
-    sheet = read_sheet(make("critical").html)
-    rows = sheet.document["operating"]["critical_speeds"]
-    inside = [k for k, row in enumerate(rows, start=1) if row["inside"]]
-    assert inside == [1, 2]
-    said = re.findall(r"critical speed (\d+), [\d.]+ rpm, lies inside the operating range", sheet.text)
-    assert [int(k) for k in said] == inside
-    table = rows_of(sheet, "Where the frequency of free whirl")
-    assert [row[5] == "INSIDE" for row in table] == [row["inside"] for row in rows]
 
 
 def test_every_critical_speed_and_shape_is_shown():
@@ -145,19 +121,6 @@ def test_a_margin_that_is_too_small_is_a_warning(tmp_path):
         assert f"API 684 requires {peak['required_margin_percent']:.1f} %" in listed
 
 
-def test_two_speeds_have_a_sheet_without_peaks(tmp_path):
-    folder = sample_data() / "compressor"
-    made = run(
-        "response", folder / "rotor.toml", "--unbalance", folder / "unbalance.csv",
-        "--speeds", "3000,4000rpm",
-        report=tmp_path / "sheet.html",
-    )  # fmt: skip
-    sheet = read_sheet(made.html)
-    assert made.document["peaks"] == []
-    assert "<caption>Peaks" not in sheet.text
-    assert disagreements(sheet.shown, sheet.document) == []
-
-
 def test_a_free_rotor_has_rigid_body_modes_and_no_supports():
     modes = fem.critical_speeds(fem.Rotor([0.3, 0.3], 0.05, discs=[fem.Disc(2, 3.0)]), 1)
     sheet = read_sheet(critical_report(modes.to_dict(), modes, provenance=PROVENANCE))
@@ -211,45 +174,6 @@ def test_the_largest_shares_of_the_variance_are_shown():
             [100 * part / sum(parts.values()) for part in largest], abs=0.51
         )
         assert [parts[name] for name, _, _ in shares] == largest
-
-
-def test_stability_thresholds_of_both_models_are_shown():
-    sheet = read_sheet(make("reduce unstable").html)
-    assert {f"stability.{which}.threshold_rpm" for which in ("full", "small")} <= sheet.keys
-    assert "Modal damping of the first modes: 1 % and 0.5 % of critical." in sheet.text
-    # what its shaft or bearings drive whirls forward, in both models
-    row = next(row for row in sheet.text.split("<tr>") if ">direction</td>" in row)
-    assert re.findall(r"<td[^>]*>([^<]*)</td>", row) == ["direction", "forward", "forward"]
-
-
-def test_shares_of_bearings_are_shown_where_they_were_taken_apart():
-    sheet = read_sheet(make("reduce apart").html)
-    assert {f"separated.fractions.{i}.{s}" for i in range(3) for s in range(2)} <= sheet.keys
-    assert "no mass below 0" in sheet.text
-
-
-def test_measured_modes_have_no_rotor_on_the_sheet():
-    sheet = read_sheet(make("reduce measured").html)
-    assert "What it was computed from" not in sheet.text
-    assert next(s.text for s in sheet.shown if s.key == "rotor_frequencies_rad_s.2") == "–"
-
-
-def test_numbers_carry_their_place_and_factor():
-    show = Document({"a": [{"b": -1.25e-6}, None], "c": 2.2e-16}).show
-    assert show("a.0.b", 3, scale=1e6) == '<span data-key="a.0.b" data-scale="1000000.0">−1.25</span>'
-    assert show("a.1") == '<span data-key="a.1">–</span>'
-    assert show("c", decimals=3, sign=True) == '<span data-key="c">0.000</span>'
-    with pytest.raises(KeyError, match=r"nothing at a\.2"):
-        show("a.2")
-
-
-@pytest.mark.parametrize(
-    ("text", "value", "scale"),
-    [("135.24", 135.2404, 1.0), ("−3.2", -3.24e-6, 1e6), ("23900", 23941.0, 1.0), ("0.0°", 359.96, 1.0),
-     ("2.5e-07", 2.46e-7, 1.0), ("–", None, 1.0), ("forward", "forward", 1.0), ("12.5 g", 12.53, 1.0)],
-)  # fmt: skip
-def test_what_agrees(text, value, scale):
-    assert disagreement(Shown("a", text, scale), {"a": value}) is None
 
 
 @pytest.mark.parametrize(

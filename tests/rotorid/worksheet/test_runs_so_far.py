@@ -66,14 +66,6 @@ def test_rows_that_are_not_finished_are_left_out(tmp_path):
     assert by_place["1220", "probe 3"] == ("baseline", "trial 1", "trial 2", "trial 3")
 
 
-def test_speeds_that_count_as_one_are_one_channel(tmp_path):
-    job = changed(copy(tmp_path), "runs.csv", ("trial 1,1220,", "trial 1,1222,"))
-    found = runs_so_far(job)
-    assert len(found.channels) == 20
-    assert found.channels[0].speed == "1220"
-    assert len(found.channels[0].trials.runs) == 4
-
-
 def test_a_weight_that_does_little_is_said_to(tmp_path):
     rows = "run,speed_rpm,sensor,amplitude,phase_deg\nfirst,3000,A,{},{}\nt,3000,A,{},{}\n"
     folder = tmp_path

@@ -1,15 +1,8 @@
 """The worksheet under files, requests and interruptions that nobody means well."""
 
-import os
 import shutil
-import signal
-import subprocess
-import sys
-import threading
-import time
 
 import pytest
-from worksheet.served import Served
 
 from rotorid.samples import sample_data
 
@@ -20,48 +13,6 @@ def copy(tmp_path, sample="turbo_job"):
 
 def corrections(state):
     return state["results"]["answer"]["document"]["corrections"]
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("wait", [0.0, 1.5])
-@pytest.mark.skipif(os.name == "nt", reason="Ctrl+C as terminals of POSIX send it")
-def test_an_interrupt_ends_it_with_nothing_printed(tmp_path, wait):
-    listening = "signal.signal(signal.SIGINT, signal.default_int_handler)"  # off in what shells run aside
-    code = f"import os, signal; os.setsid(); {listening}; from rotorid.cli import main; main()"
-    command = [sys.executable, "-c", code, "worksheet", str(copy(tmp_path) / "job.toml"), "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    process.stdout.readline()
-    time.sleep(wait)
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.communicate(timeout=20) == ("", "")
-    assert process.returncode == 130
-
-
-@pytest.mark.full
-def test_an_interrupt_answers_the_windows_that_wait(tmp_path):
-    served = Served(copy(tmp_path) / "job.toml")
-    version, got = served.settled()["version"], []
-    waiting = threading.Thread(target=lambda: got.append(served.ask(f"/state?after={version}")[0]))
-    waiting.start()
-    time.sleep(0.5)
-    served.process.send_signal(signal.SIGINT)
-    assert served.process.communicate(timeout=20) == ("", "")
-    waiting.join(5)
-    assert got == [200]
-
-
-@pytest.mark.full
-def test_another_folder_of_the_same_name_is_computed_anew(tmp_path, serve):
-    folder = copy(tmp_path)
-    served = serve(folder / "job.toml")
-    state = served.settled()
-    shutil.copytree(folder, tmp_path / "copy")
-    folder.rename(tmp_path / "old")
-    (tmp_path / "copy").rename(folder)
-    row = state["tables"]["runs"]["rows"][0]
-    edit = {"table": "runs", "row": row["id"], "column": "phase_deg", "old": "89", "new": "120"}
-    assert served.edit(edit)[0] == 200
-    assert corrections(served.settled()) != corrections(state)
 
 
 @pytest.mark.parametrize("kind", ["loop", "folder", "outside"])

@@ -12,7 +12,7 @@ from repetitions import FULL
 from worksheet.served import command
 from worksheet.stranger import stranger
 from worksheet.typed_job import rows, type_job
-from worksheet.window import CONTROL, DOWN, ENTER, TAB, UP, Window
+from worksheet.window import CONTROL, Window
 
 from rotorid.samples import sample_data
 
@@ -22,8 +22,7 @@ EXAMINED = {"new": [*SIZES], "holes.toml": [1366], "checked.toml": [800]}
 """Widths at which axe looks at a page, three seconds at a large one; `make test-full`: at all of them."""
 if FULL:
     EXAMINED = {job: [*SIZES] for job in EXAMINED}
-PUSHED = 10.0  # seconds; a window that is told nothing asks again after 20
-FIRST, SECOND = (f'[data-cell="runs|baseline|1220|probe {k}|phase_deg"]' for k in (1, 2))
+FIRST = '[data-cell="runs|baseline|1220|probe 1|phase_deg"]'
 
 # Of what a finger should hit, the smaller side of it or of its label; what is out of sight is left out.
 _TARGETS = """
@@ -54,10 +53,6 @@ def windows(chromium):
 def turbo(tmp_path):
     """A copy of the job, ready to be changed."""
     return Path(shutil.copytree(sample_data() / "turbo_job", tmp_path / "turbo_job"))
-
-
-def phases(folder):
-    return [row["phase_deg"] for row in rows(folder / "runs.csv")]
 
 
 def corrections(job):
@@ -115,66 +110,6 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
 
 
 @pytest.mark.full
-def test_kill_in_the_middle_loses_no_finished_cell(turbo, serve, windows):
-    window = windows[0]
-    served = serve(turbo / "job.toml")
-    window.open(served.address)
-    window.type(FIRST, "101")
-    window.press(ENTER)
-    window.saved()
-    window.press(*"102", DOWN, *"103", ENTER)
-    served.kill()  # two cells may be on their way
-    window.press(*"104", UP)
-    window.wait(lambda: window.text("#saved").startswith("not saved"), "not saved")
-    assert " wait" in window.text("#saved")
-    assert phases(turbo)[0] == "101"
-
-    again = serve(turbo / "job.toml", "--port", str(served.port))
-    window.wait(lambda: "address" in window.text("#message"), "the token is an old one")
-    assert again.state()["tables"]["runs"]["rows"][0]["cells"][-1] == "101"
-    window.driver.get(again.address)  # of the same page: what waits there stays
-    window.saved()
-    assert phases(turbo)[:16:4] == ["101", "102", "103", "104"]
-    window.open(again.address)
-    assert (
-        window.texts('[data-cell^="runs|baseline|"][data-cell$="|probe 1|phase_deg"]') == phases(turbo)[:20:4]
-    )
-
-
-def test_two_windows_on_one_job_lose_nothing(shared, windows):
-    one, other = windows
-    served = shared(sample="bk_two_plane")
-    folder = served.job.parent
-    first, second = (f'[data-cell="runs|initial|3000|{k}|phase_deg"]' for k in (1, 2))
-    for window in windows:
-        window.open(served.address)
-    one.type(first, "90")
-    other.type(second, "91")
-    one.leave()
-    other.wait(lambda: other.text(first) == "90", "the cell of the other window", PUSHED)
-    assert other.text(second) == "91"  # not finished, and kept
-    assert phases(folder)[:2] == ["90", "296"]
-    other.press("5", TAB)
-    one.wait(lambda: one.text(second) == "915", "the cell of the other window", PUSHED)
-    assert phases(folder)[:2] == ["90", "915"]
-
-    one.type(first, "50")
-    other.type(first, "60")
-    other.leave()
-    other.saved()
-    assert one.text(first) == "50"
-    one.leave()
-    asked = f'[data-write="{first.split(chr(34))[1]}"]'
-    one.wait(lambda: "50" in "".join(one.texts(asked)), "the page asks")
-    assert "60" in one.text(asked.replace("write", "keep"))
-    assert phases(folder)[0] == "60"
-    one.push(asked)
-    other.wait(lambda: other.text(first) == "50", "the answer of the other window", PUSHED)
-    assert phases(folder)[0] == "50"
-    assert one.texts("[data-write]") == []
-
-
-@pytest.mark.full
 def test_a_wrong_token_another_origin_another_host(shared, windows):
     window = windows[0]
     served = shared()
@@ -226,58 +161,6 @@ def test_a_block_from_excel_is_one_step(shared, windows):
     window.wait(lambda: window.texts(cells) == held, "one step takes it back")
     window.saved()
     assert (turbo / "runs.csv").read_bytes() == before
-
-
-@pytest.mark.full
-def test_headings_of_a_block_are_no_readings(shared, windows):
-    window, served = windows[0], shared()
-    window.open(served.address)
-    window.clipboard("Amplitude\tPhase\r\nµm\t°\r\n3,5\t91\r\n")
-    window.go(FIRST.replace("phase_deg", "amplitude_um_pp"))
-    window.hold(CONTROL, "v")
-    window.wait(lambda: window.text(FIRST) == "91", "the block is there")
-    window.saved()
-    lines = (served.job.parent / "runs.csv").read_text().splitlines()
-    assert lines[1] == "baseline,1220,probe 1,3.5,91"
-
-
-@pytest.mark.full
-def test_material_is_removed_where_the_command_line_says(turbo, serve, windows):
-    """And what to add if the last run's weights stay, and the limits, stand beside the weights."""
-    window, job = windows[0], turbo / "checked.toml"
-    planes = '[planes.left]\nremove = true\n[sensors."probe 1"]\nlimit = 0.4\n'
-    job.write_text(job.read_text(encoding="utf-8") + planes, encoding="utf-8")
-    window.open(serve(job).address)
-    for name, options in (("answer", ()), ("trim", ("--refine",))):
-        window.wait(lambda name=name: window.texts(f'[data-doc="{name}"]'), name)
-        told, found = command(job, *options), window.document(name)
-        for listed in ("corrections", "add_to_mounted"):
-            for place, row in enumerate(told[listed]):
-                key, other = ("angle_deg", "remove_at_deg")[:: -1 if row["plane"] == "left" else 1]
-                assert float(found[f"{listed}.{place}.{key}"]) == row[key]
-                assert f"{listed}.{place}.{other}" not in found
-                assert found[f"{listed}.{place}.action"] == row["action"]
-        drilled = told["add_to_mounted"][0]
-        assert (drilled["remove_at_deg"] - drilled["angle_deg"]) % 360 == pytest.approx(180)
-        assert {row["verdict"] for row in told["verdict"]["rows"]} == {"pass", "fail"}
-        shown = {text for key, text in found.items() if key.startswith("verdict.rows.")}
-        assert {"pass", "fail"} < shown
-    assert window.text("#now .why").startswith("Fail")
-
-
-@pytest.mark.full
-def test_a_check_run_is_that_of_the_pieces_in_the_holes(shared, windows):
-    window, served = windows[0], shared("holes.toml")
-    job, turbo = served.job, served.job.parent
-    window.open(served.address)
-    window.wait(lambda: window.texts('[data-doc="pieces"]'), "pieces")
-    told = command(job, "--split")
-    window.driver.execute_script("document.querySelector('#add-check').click()")
-    window.wait(lambda: window.texts('#check [data-cell^="check_weights|"]'), "the pieces are mounted")
-    table = turbo / tomllib.loads(job.read_text(encoding="utf-8"))["check_weights"]
-    mounted = [[row["plane"], float(row["unbalance_g_mm"])] for row in rows(table)]
-    planes = told["mounting"]["planes"]
-    assert mounted == [[row["plane"], pytest.approx(row["mass"], rel=1e-4)] for row in planes]
 
 
 @pytest.mark.full

@@ -1,19 +1,14 @@
 """Model files and time records: what is read, and what is said about everything that cannot be used."""
 
-import itertools
 import re
 import warnings
 
 import numpy as np
 import pytest
 from cases import each_of
-from hypothesis import given
-from hypothesis import strategies as st
 
-from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_ode_model, read_record
 
-FOLDER = sample_data() / "fit"
 MODEL = """
 inputs = ["u"]
 [states]
@@ -65,15 +60,6 @@ def test_a_model_file_with_everything(model):
     np.testing.assert_allclose(model.x0([2.0, 0.1, 7.0]), [7.0, 0.0])
 
 
-@pytest.mark.parametrize("folder", sorted(p.name for p in FOLDER.iterdir() if (p / "model.toml").exists()))
-def test_sample_files_can_be_read(folder):
-    model = read_ode_model(FOLDER / folder / "model.toml")
-    for path in sorted((FOLDER / folder).glob("record*.csv")):
-        record = read_record(path, model)
-        assert set(record.outputs) == set(model.outputs)
-        assert len(record.t) > 30
-
-
 def test_without_states_the_outputs_are_functions_of_time(tmp_path):
     text = '[outputs]\ny = "a*exp(-b*t)"\n[estimate]\na = 1\nb = 2\n'
     assert read_ode_model(saved(tmp_path, "m.toml", text)).states == ()
@@ -108,13 +94,6 @@ def test_complaints_about_a_model_file_name_the_key(tmp_path, old, new, said):
     message = refusal(lambda: read_ode_model(path))
     assert re.search(said, message), message
     assert str(path) in message
-
-
-def test_all_problems_of_a_model_file_at_once(tmp_path):
-    text = MODEL.replace("k = 2", "k = true").replace('"2*v"', '"2*w"')
-    message = refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", text)))
-    assert "estimate.k" in message
-    assert "outputs.z" in message
 
 
 def test_a_model_file_without_parameters_or_states(tmp_path):
@@ -188,19 +167,6 @@ def test_a_gap_in_an_even_record_is_said(tmp_path, model):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         read_record(path, model, allow_missing=True)
-
-
-@given(st.lists(st.integers(-(10**6), 10**6), min_size=2, max_size=12))
-def test_exactly_the_increasing_times_are_accepted(tmp_path_factory, times):
-    folder = tmp_path_factory.mktemp("times")
-    model = read_ode_model(FOLDER / "limit_cycle" / "model.toml")
-    path = saved(folder, "r.csv", "t_s,x\n" + "".join(f"{t},1\n" for t in times))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TableWarning)
-        if all(a < b for a, b in itertools.pairwise(times)):
-            np.testing.assert_array_equal(read_record(path, model).t, times)
-        else:
-            assert "column t_s" in refusal(lambda: read_record(path, model))
 
 
 MATRICES = """

@@ -137,14 +137,6 @@ def test_stored_coefficients(folder, stored, job):
         np.testing.assert_allclose(again, correct(stored).weights, rtol=1e-12)
 
 
-def test_stored_coefficients_are_put_into_the_order_of_the_readings(folder, stored):
-    runs = [RUNS[0], *([line[0], 1003, *line[2:]] for line in RUNS[2:0:-1])]
-    read = job_from_files([write_csv(folder / "now.csv", runs)], influence=folder / "influence.csv")
-    assert read.trials.sensors == read.influence.sensors == ("B", "A")
-    np.testing.assert_allclose(read.influence.W, stored.W[:, ::-1], rtol=1e-14)
-    np.testing.assert_array_equal(read.influence.speeds, read.trials.speeds)
-
-
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
@@ -163,7 +155,6 @@ def test_coefficients_that_do_not_fit(folder, stored, column, value, words):
 
 BAD_JOBS = [
     ('phase = "lag"', 'phase = "leading"', "phase", "leading", "'lead' or 'lag' (did you mean 'lead'?)"),
-    ('phase = "lag"', "phase = 1", "phase", "1", "'lead' or 'lag'"),
     (
         'angles = "against rotation"',
         'angles = "with"',
@@ -193,18 +184,13 @@ BAD_JOBS = [
         "'speed_tolerance_percent'?",
     ),
     ("amplitude_percent = 2", 'amplitude_percent = "two"', "errors.amplitude_percent", "two", "a number"),
-    ("amplitude_percent = 2", "amplitude_percent = true", "errors.amplitude_percent", "true", "a number"),
     ("amplitude_percent = 2", "amplitude_percent = inf", "errors.amplitude_percent", "inf", "0 or more"),
-    ("amplitude_percent = 2", "amplitude = 2", "errors.amplitude", "2", "did you mean 'amplitude_percent'?"),
     ("floor = 0.1", "floor = -1", "errors.floor", "-1", "a finite number, 0 or more"),
-    ("[errors]", "[error]", "error", "a table", "did you mean 'errors'?"),
     ("[planes.1]", "[planes.3]", "planes.3", "3", "one of the job's planes, 1 and 2"),
     ("[sensors.A]", "[sensors.a]", "sensors.a", "a", "one of the job's sensors, A and B (did you mean 'A'?)"),
     ("[planes.1]", "[planes.1]\nmax_mas_g = 2", "planes.1.max_mas_g", "2", "did you mean 'max_mass_g'?"),
-    ("[planes.1]", "[plane.1]", "plane", "a table", "did you mean 'planes'?"),
     ('runs = "runs.csv"', "", "runs", None, "the runs table"),
     ('weights = "weights.csv"', "", "weights", None, "a weights table, or an influence table"),
-    ('runs = "runs.csv"', "runs = 3", "runs", "3", "a text in quotes"),
 ]
 
 
@@ -239,7 +225,6 @@ def test_what_is_no_job(folder):
 BAD_SETTINGS = [
     (2, "value", "leading", "leading", "'lead' or 'lag'"),
     (2, "key", "phas", "lag", "did you mean 'phase'?"),
-    (4, "value", "one", "one", "a number"),
     (5, "key", "errors.amplitude", "2", "did you mean 'amplitude_percent'?"),
     (5, "value", -2, "-2", "0 or more"),
     (5, "value", None, "", "a value for errors.amplitude_percent"),
@@ -247,7 +232,6 @@ BAD_SETTINGS = [
     (5, "key", "phase", "phase", "each setting once (row 2 has it too)"),
     (5, "key", "phase.x", "phase.x", "no parts of phase"),
     (5, "key", "planes.1.holes_deg.x", "a table", "numbers, not"),
-    (5, "key", "planes.1.remove", "2", "true or false"),
     (5, "key", "runs", "2", "the table in the sheet 'runs'"),
 ]
 
@@ -274,7 +258,5 @@ def test_bad_sheets_of_a_workbook(book, tmp_path):
     the_only(found, "job.xlsx", 1, "sensor", None, "a column sensor; the columns are name")
     path = write_book(tmp_path / "none.xlsx", {"weights": WEIGHTS})
     the_only(complaints(read_job, path), "none.xlsx", None, None, None, "a sheet 'runs'")
-    path = write_book(tmp_path / "none.xlsx", {"runs": RUNS})
-    the_only(complaints(read_job, path), "none.xlsx", None, "weights", None, "a weights table")
     found = complaints(book, settings=[["key", "value"], ["planes", 3]], planes=[["plane"], ["1"]])
     the_only(found, "job.xlsx", 2, "value", "3", "a table of settings")

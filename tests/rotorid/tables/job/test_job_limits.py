@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import Labels
 from rotorid.tables import job_from_files, read_job
@@ -90,32 +88,6 @@ def test_a_job_without_any(job):
     assert job(plane("use = true")).left_out == ()
 
 
-def test_a_workbook_says_the_same(job, tmp_path):
-    planes = [
-        ["plane", "max_mass_g", "radius_mm", "forbidden_deg", "use"],
-        ["1", 20, 150, "20-60; 350 - 10", None],
-        ["2", None, None, None, False],
-    ]
-    sensors = [["sensor", "limit", "weight"], ["A", 4, 2], ["B", "2000: 6", 0]]
-    sheets = {"runs": TWO_SPEEDS, "weights": WEIGHTS, "planes": planes, "sensors": sensors}
-    settings = [["key", "value"], ["speed_weights.2000", 0.5]]
-    book = read_job(write_book(tmp_path / "job.xlsx", {**sheets, "settings": settings}))
-    plain = job()
-    for name in ("max_weight", "residual"):
-        np.testing.assert_array_equal(getattr(book.limits, name), getattr(plain.limits, name))
-    assert book.limits.forbidden == plain.limits.forbidden
-    np.testing.assert_array_equal(book.row_weights, plain.row_weights)
-    assert (book.left_out, book.radii) == (plain.left_out, plain.radii)
-    no = replaced(planes, 3, "use", "no")
-    assert read_job(write_book(tmp_path / "job.xlsx", {**sheets, "planes": no})).left_out == ("2",)
-    maybe = replaced(planes, 3, "use", "maybe")
-    found = complaints(read_job, write_book(tmp_path / "job.xlsx", {**sheets, "planes": maybe}))
-    the_only(found, "job.xlsx", 3, "use", "maybe", "true or false")
-    empty = replaced(planes, 2, "forbidden_deg", "20 60")
-    found = complaints(read_job, write_book(tmp_path / "job.xlsx", {**sheets, "planes": empty}))
-    the_only(found, "job.xlsx", 2, "forbidden_deg", "20 60", "in a sheet 20-60; 300-340")
-
-
 @pytest.mark.parametrize(
     ("pair", "side", "first", "last"),
     [
@@ -134,16 +106,6 @@ def test_arcs(pair, side, first, last):
     assert np.degrees(start) == pytest.approx(first)
     assert np.degrees(width) == pytest.approx(last - first)
     assert labels.arc(start, width) == pytest.approx([pair[0] % 360, pair[1] % 360])
-
-
-@pytest.mark.parametrize("angles", ["with rotation", "against rotation"])
-def test_a_weight_between_from_and_to_is_in_the_arc(job, angles):
-    """Whatever the direction: weights as the job writes them, 25° and 55° inside, 15° and 65° outside."""
-    read = job(f'angles = "{angles}"\n' + plane("forbidden_deg = [20, 60]"))
-    ((start, width),) = read.limits.forbidden[0]
-    for degrees, inside in ((25, True), (55, True), (15, False), (65, False)):
-        turned = math.radians(degrees * read.trials.labels.angle_sign)
-        assert ((turned - start) % math.tau < width) is inside
 
 
 @pytest.mark.parametrize(
@@ -180,32 +142,19 @@ BAD_PLANES = [
         "max_mass_g, because the weights of the job are masses",
     ),
     ("max_mass_g = 0", "max_mass_g", "0", "a number above 0"),
-    ("max_mass_g = -1", "max_mass_g", "-1", "a number above 0"),
-    ('max_mass_g = "5"', "max_mass_g", "5", "a number, without quotes"),
-    ("max_mass_g = nan", "max_mass_g", "nan", "a number above 0"),
-    ("max_mass_stone = 1", "max_mass_stone", "1", "did you mean 'max_mass_"),
     ("max_mass = 1", "max_mass", "1", "did you mean 'max_mass_g'?"),
-    ("max_mass_g = 1\nmax_mass_kg = 1", "max_mass_kg", "1", "one key of them; max_mass_g says it already"),
-    ("radius_mm = 0", "radius_mm", "0", "a number above 0"),
-    ("radius_furlong = 1", "radius_furlong", "1", "did you mean 'radius_mm'?"),
     ("forbidden_deg = 20", "forbidden_deg", "20", "pairs [from, to]"),
-    ("forbidden_deg = []", "forbidden_deg", "[]", "pairs [from, to]"),
     ("forbidden_deg = [20, 60, 80]", "forbidden_deg", "[20, 60, 80]", "pairs [from, to]"),
-    ("forbidden_deg = [[20, 60], 80]", "forbidden_deg", "[[20, 60], 80]", "pairs [from, to]"),
     ("forbidden_deg = [20, 400]", "forbidden_deg", "[20, 400]", "from -360 to 360 degrees"),
-    ("forbidden_deg = [20, nan]", "forbidden_deg", "[20, nan]", "from -360 to 360 degrees"),
     ("forbidden_deg = [20, true]", "forbidden_deg", "[20, True]", "pairs [from, to]"),
     ("forbidden_deg = [20, 20]", "forbidden_deg", "[20, 20]", "of different angles"),
     ("forbidden_deg = [0, 360]", "forbidden_deg", "[0, 360]", "use = false leaves a plane out"),
     ("forbidden_deg = [[0, 200], [180, 10]]", "forbidden_deg", "[[0, 200], [180, 10]]", "some angle free"),
-    ("use = 0", "use", "0", "true or false, without quotes"),
     ("node = 3", "node", "3", "the rotor model of this node too"),
     ('station = "disc"', "station", "disc", "the rotor model of this station too"),
     ('node = 3\nstation = "disc"', "station", "disc", "either node or station, not both"),
     ("node = 0", "node", "0", "a whole number from 1"),
-    ("node = 1.5", "node", "1.5", "a whole number from 1"),
     ("station = 4", "station", "4", "the name of a station"),
-    ("radius_m = 1\nforbiden_deg = 3", "forbiden_deg", "3", "did you mean 'forbidden_deg'?"),
 ]
 
 
@@ -216,9 +165,7 @@ def test_bad_planes(job, lines, key, value, words):
 
 BAD_SENSORS = [
     ("limit = 0", "limit", "0", "an amplitude above 0"),
-    ("limit = -3", "limit", "-3", "an amplitude above 0"),
     ('limit = "3 um"', "limit", "3 um", "in a sheet"),
-    ("limit = {}", "limit", "a table", "a table of them by speed"),
     (
         'limit = { "1500" = 3 }',
         "limit",
@@ -236,7 +183,6 @@ BAD_SENSORS = [
     ('limit = "1000: 3; 1000: 4"', "limit", "1000: 3; 1000: 4", "each speed once"),
     ("weight = -1", "weight", "-1", "0 or more"),
     ("angle_deg = 400", "angle_deg", "400", "from -360 to 360"),
-    ("limits = 3", "limits", "3", "did you mean 'limit'?"),
     ("node = 3", "node", "3", 'rotor = "rotor.toml"'),
 ]
 
@@ -266,20 +212,6 @@ def test_nothing_left(job):
     the_only(found, "job.toml", None, "sensors", None, "at least one sensor with a weight above 0")
 
 
-def test_all_problems_at_once(job):
-    found = complaints(
-        job,
-        HEAD + "[planes.1]\nmax_mass_g = 0\nforbidden_deg = 3\n"
-        "[planes.3]\nradius_mm = 2\n[sensors.A]\nlimit = 0\n",
-    )
-    assert [p.column for p in found] == [
-        "planes.1.max_mass_g",
-        "planes.1.forbidden_deg",
-        "sensors.A.limit",
-        "planes.3",
-    ]
-
-
 def test_limits_of_the_command_line(job):
     read = job()
     both = limited(read, "5g", ["B=3"])
@@ -295,7 +227,6 @@ def test_limits_of_the_command_line(job):
     np.testing.assert_allclose(each.limits.max_weight, [0.0045359237, 0.003])
     np.testing.assert_allclose(each.limits.residual, [[10e-6, 10e-6], [10e-6, 10e-6]])
     np.testing.assert_allclose(limited(read, "1=3000g_mm", []).limits.max_weight[0], 0.02)
-    np.testing.assert_allclose(limited(read, "1=3000g·mm", []).limits.max_weight[0], 0.02)
     tables = [p for p in plain.files if p.suffix == ".csv"]
     assert limited(job_from_files(tables), "5", []).limits.max_weight.tolist() == [0.005, 0.005]
 
@@ -305,20 +236,14 @@ def test_limits_of_the_command_line(job):
     [
         ("five", [], "--max-mass 'five': expected a number, such as 5g"),
         ("0g", [], "--max-mass '0g': expected a value above 0"),
-        ("-3", [], "expected a value above 0"),
-        ("nan", [], "expected a finite number"),
         ("5stone", [], "expected a unit of weight"),
         ("3=5g", [], "there is no plane '3'; there are '1' and '2'"),
         ("=5g", [], "use 5g or left=5g,right=3g"),
-        ("1=", [], "--max-mass '': expected a number, such as 5g"),
         ("1=5g,1=3g", [], "--max-mass '1=5g,1=3g': 1 stands twice"),
-        ("5,5g", [], "a decimal sign is a point"),
         ("3000g_mm", [], "the weights of the job are in g, to which g_mm converts only with a radius_mm"),
         (None, ["a=3"], "there is no sensor 'a' (did you mean 'A'?); there are 'A' and 'B'"),
         (None, ["A=3mm_s"], "the readings are in um_pp, to which mm_s does not convert"),
-        (None, ["A=x"], "--limit 'x': expected a number, such as 20"),
         (None, ["A=0"], "expected a value above 0"),
-        (None, ["A"], "expected a number"),
     ],
 )
 def test_bad_limits_of_the_command_line(job, mass, limits, words):

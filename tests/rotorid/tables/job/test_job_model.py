@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import correct, estimate_influence
 from balancing.correction.check_run import compare_check
@@ -122,16 +122,6 @@ def test_bad_models(job, old, new, key, value, words):
     the_only(found, "job.toml", None, key, value, words)
 
 
-def test_problems_of_the_rotor_with_all_others(job, folder):
-    write_csv(folder / "shaft.csv", replaced(SHAFT, 2, "length_m", -1))
-    write_csv(folder / "runs.csv", replaced(RUNS, 2, "phase_deg", "x"))
-    found = complaints(job, TABLES + MODEL.replace("angle_deg = 45", "angle_deg = 450"))
-    assert {p.file.rpartition("/")[2] for p in found} == {"job.toml", "runs.csv", "shaft.csv"}
-    write_csv(folder / "runs.csv", RUNS)
-    found = complaints(job, TABLES + 'rotor = "none.toml"')
-    the_only(found, "none.toml", None, None, None, "a file that exists")
-
-
 def test_check_runs(job, folder):
     """In the job's order of nothing but names: speeds are those of the job, units convert."""
     read = job(TABLES + 'check = "check.csv"')
@@ -162,15 +152,6 @@ def test_a_check_with_nothing_mounted(job, folder):
     plain = compare_check(correct(influence), job(TABLES + 'check = "check.csv"').check, influence)
     assert plain.as_proposed is True
     assert np.abs(plain.predicted).max() < 1e-12 * np.abs(plain.before).max()
-
-
-def test_check_runs_of_a_workbook(folder):
-    settings = [["key", "value"], ["check", "check.csv"], ["rotor", "rotor.toml"]]
-    sheets = {"runs": RUNS, "weights": WEIGHTS, "settings": settings}
-    planes = [["plane", "node", "station"], ["1", None, "disc"], ["2", 3, None]]
-    read = read_job(write_book(folder / "job.xlsx", {**sheets, "planes": planes}))
-    assert read.check.sensors == ("B", "A")
-    assert read.plane_nodes == {"1": 2, "2": 3}
 
 
 BAD_CHECKS = [

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 
 import numpy as np
 import openpyxl
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, write_book, write_csv
 from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, differences
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
-from rotorid.tables import InputError, job_from_files, read_job, write_influence
+from rotorid.tables import job_from_files, read_job, write_influence
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.job_data import Overrides
-from rotorid.tables.job.job_from_excel import key_parts
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
 DATA = sample_data()
@@ -121,50 +117,6 @@ def test_digits_survive(tmp_path):
     assert cells(tmp_path / "sheet.xlsx", "runs")[1:] == runs[1:]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.lists(st.floats(1e-12, 1e12), min_size=6, max_size=6),
-    st.lists(st.floats(-360, 360).filter(lambda x: x == 0 or abs(x) > 1e-29), min_size=6, max_size=6),
-    st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=5).filter(
-        lambda name: name[0] not in "=@#" and name not in ("A", "B")
-    ),
-)
-def test_any_reading_and_name_comes_back(tmp_path, sizes, phases, name):
-    runs = [RUNS[0]]
-    for row, size, phase in zip(RUNS[1:], sizes, phases, strict=True):
-        runs.append([row[0], row[1], name if row[2] == "A" else "B", size, phase])
-    book = write_book(tmp_path / "in.xlsx", {"runs": runs, "weights": WEIGHTS})
-    csv = tmp_path / "runs.csv"
-    csv.write_text(csv_text(runs), encoding="utf-8")
-    try:
-        jobs = [(read_job(book), JobSource((book,)))]
-        files = (csv, write_csv(tmp_path / "weights.csv", WEIGHTS))
-        jobs.append((job_from_files(files), JobSource(files)))
-    except InputError:  # a quote in a CSV file, say; what is no job cannot become a workbook
-        return
-    for job, source in jobs:
-        there_and_back(job, source, tmp_path / "out.xlsx")
-
-
-def test_repeats_and_comments_come_back(folder, tmp_path):
-    repeated = [[*RUNS[0], "repeat", "note"]]
-    for k, shift in enumerate((0.0, 0.2, -0.1), start=1):
-        repeated += [[r, s, c, a + shift, p, k, f"page {k}"] for r, s, c, a, p in RUNS[1:]]
-    text = "# measured in June\n" + csv_text(repeated)
-    (folder / "runs.csv").write_text(text, encoding="utf-8")
-    path = folder / "job.toml"
-    path.write_text(f"# Pump 3\n{HEAD}# errors are guessed\n[errors]\nphase_deg = 2\n", encoding="utf-8")
-    job = read_job(path)
-    assert job.trials.readings.shape[0] == 3
-    back = there_and_back(job, JobSource((path,)), tmp_path / "sheet.xlsx")
-    assert back.trials.readings.shape[0] == 3
-    found = cells(tmp_path / "sheet.xlsx", "runs")
-    assert found[0][0] == "# measured in June"
-    assert found[2][5:] == ["1", "page 1"]
-    found = [row[0] for row in cells(tmp_path / "sheet.xlsx", "settings")]
-    assert found == ["# Pump 3", "# errors are guessed", "key", "errors.phase_deg"]
-
-
 def test_remarks_of_a_workbook_come_back(tmp_path):
     sheets = {
         "runs": [[*RUNS[0], "comment"], *[[*row, f"reading {k}"] for k, row in enumerate(RUNS[1:])]],
@@ -210,21 +162,11 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
         job_from_files(files, **said), JobSource(files, overrides=Overrides(**said)), tmp_path / "a.xlsx"
     )
     assert (back.conventions.labels.phase, back.conventions.labels.angles) == ("lag", "against rotation")
-    path = write_job(folder, PARTS["tolerance and errors"])
-    job = read_job(path, amplitude_error_percent=4.0)
-    back = there_and_back(
-        job, JobSource((path,), overrides=Overrides(amplitude_error_percent=4.0)), tmp_path / "b.xlsx"
-    )
-    assert back.trials.errors.amplitude == 0.04
-    assert back.trials.errors.floor == job.trials.errors.floor > 0
     stored = folder / "influence.csv"
     job = job_from_files(files[:1], influence=stored)
     back = there_and_back(job, JobSource(files[:1], stored), tmp_path / "c.xlsx")
     assert back.conventions.labels.phase == "lag"
     assert openpyxl.load_workbook(tmp_path / "c.xlsx").sheetnames[-1] == "influence"
-    assert [
-        w.replace(str(tmp_path / "c.xlsx") + " (sheet 'influence')", "X") for w in back.trials.warnings
-    ] == [w.replace(str(stored), "X") for w in job.trials.warnings]
 
 
 def test_limits_of_the_command_line_come_back(folder, tmp_path):
@@ -291,27 +233,6 @@ def test_names_with_points_quotes_and_signs(tmp_path):
     back = there_and_back(job, JobSource((tmp_path / "job.toml",)), tmp_path / "sheet.xlsx")
     assert back.planes == ("#1.0", "#2.0")
     assert back.trials.sensors == ('3.5" probe', "#2 it's")
-
-
-def test_parts_of_keys():
-    assert key_parts("slow_roll.probe 1.amplitude") == ["slow_roll", "probe 1", "amplitude"]
-    assert key_parts('slow_roll."probe 1.5".amplitude') == ["slow_roll", "probe 1.5", "amplitude"]
-    assert key_parts("planes.'a.b'") == ["planes", "a.b"]
-    assert key_parts('an "open quote.x') == ['an "open quote', "x"]
-
-
-def test_the_comparison_sees_every_part(folder):
-    both = read_job(write_job(folder, PARTS["holes"] + "[sensors.A]\nlimit = 3\n"))
-    assert differences(both, both) == ()
-    moved = dataclasses.replace(both.trials, readings=both.trials.readings * (1 + 2e-15))
-    assert differences(both, dataclasses.replace(both, trials=moved)) == ("trials.readings",)
-    assert differences(both, dataclasses.replace(both, key_phasor=1e-9)) == ("key_phasor",)
-    assert differences(both, dataclasses.replace(both, radii={"1": 0.1})) == ("radii",)
-    names = dataclasses.replace(both.holes["1"], names=("A", "2", "C"))
-    found = differences(both, dataclasses.replace(both, holes={**both.holes, "1": names}))
-    assert found == ("holes.1.names[3]",)
-    limits = dataclasses.replace(both.limits, residual=both.limits.residual * (1 + 1e-12))
-    assert differences(both, dataclasses.replace(both, limits=limits)) == ("limits.residual",)
 
 
 def test_too_much_for_a_workbook_is_refused(folder, tmp_path, monkeypatch):

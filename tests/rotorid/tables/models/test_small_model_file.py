@@ -1,7 +1,5 @@
 """Small models for motion as files."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -128,13 +126,10 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
         ("[1, 5, 9]", "[1, 5, 9.5]", r"key nodes: expected different whole numbers from 1 up"),
         ("[1, 5, 9]", "[0, 5, 9]", r"key nodes: expected different whole numbers from 1 up"),
         ("[1, 5, 9]", "[]", r"^[^\n]*key nodes: expected a list of finite numbers, one for each node$"),
-        ("[1, 5, 9]", "7", r"key nodes: expected a list of finite numbers"),
         ("masses_kg", "mass_kg", r"key masses_kg: expected a mass for each node"),
         ("80.5, 12", "80.5", r"key masses_kg: expected 3 finite numbers for 3 nodes"),
         ("80.5", "-80.5", r"key masses_kg: expected 0 or more"),
         ("80.5", "nan", r"key masses_kg: expected a list of finite numbers"),
-        ("80.5", "true", r"key masses_kg: expected a list of finite numbers"),
-        ("80.5", '"80.5"', r"key masses_kg: expected a list of finite numbers"),
         ("[-2e6, 4e6", "[-2.1e6, 4e6", r"key shaft_stiffness_N_per_m: expected a symmetric matrix"),
         (", [1e6, -2e6, 1e6]]", "]", r"key shaft_stiffness_N_per_m: expected 3 × 3 finite"),
         (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: expected a square matrix"),
@@ -145,17 +140,14 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
             r"key bearing\[1\].node: found '2', expected one of the nodes 1, 5 or 9",
         ),
         ("node = 9\n", "", r"key journal_bearing\[1\].node: expected one of the nodes 1, 5 or 9"),
-        ("node = 9\n", "node = [9]\n", r"key journal_bearing\[1\].node: found"),
         (
             "[-2e6, 4e6",
             "[-2e6, -4e6",
             r"key shaft_stiffness_N_per_m: .* no negative eigenvalue",
         ),
         ("node = 1\n", "node = 1.0\n", r"key bearing\[1\].node: found '1.0', expected one of the nodes"),
-        ("node = 5\n", "node = true\n", r"key unbalance\[1\].node: found 'true', expected one of the nodes"),
         ("clearance_um = 150", "clearance_um = 0", r"clearance_um.*above 0"),
         ("angle_deg = 90", "", r"unbalance\[1\].angle_deg: expected the angle"),
-        ("nodes", "gyroscopics_kg = [[1]]\nnodes", r"a known key \(gyroscopic_kg\?\)|did you mean"),
         (
             "stiffness_N_per_m = 1e7",
             "tilting_stiffness_N_m_per_rad = 1.0\nstiffness_N_per_m = 1e7",
@@ -181,8 +173,3 @@ def test_a_shaft_that_resists_a_shift_is_asked_about(tmp_path):
         read_small_model(written(tmp_path, few))
     alone = PLAIN.replace("[[1e6, -2e6", "[[1.1e7, -2e6").split("[[bearing]]")[0]
     assert read_small_model(written(tmp_path, alone)).motion().K[0, 0] == 1.1e7
-
-
-def test_a_model_that_was_changed_is_another(tmp_path):
-    model = replace(some(0), bow={})
-    assert b"[[bow]]" not in small_model_bytes(model)

@@ -2,15 +2,12 @@
 
 import itertools
 
-import openpyxl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, write_book, write_csv
 
 from rotorid.tables import read_rotor, read_trials
-from rotorid.tables.reader.excel_workbook import read_workbook
-from rotorid.tables.reader.grid import make_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import parse_text
 
@@ -43,34 +40,14 @@ def test_rows_of_a_table_are_never_taken_for_comments(rows, separator, quoted):
     assert problems == []
 
 
-@given(st.lists(st.tuples(CELLS, CELLS, CELLS), min_size=1, max_size=5))
-def test_rows_of_a_sheet_are_data_unless_a_remark_stands_alone(rows):
-    lines = list(enumerate([("# above", "", "x"), HEADER, *rows], start=1))
-    grid = make_grid("sheet", lines, "", Problems(), may_be_empty=True)
-    alone = [row[0] for row in rows if row[0].startswith("#") and not any(row[1:]) and row[0] != "#N/A"]
-    assert len(grid.comments) == 1 + len(alone) - sum(
-        cell in ("#A!", "#A?", "#NA!", "#AN!") for cell in alone
-    )
-    assert {row for row in rows if any(row[1:])} <= {cells for _, cells in grid.rows}
-
-
-@pytest.mark.parametrize("dress", ["plain", "quoted", "workbook"])
-def test_sensors_and_runs_that_begin_with_a_sign_count(tmp_path, dress):
+def test_sensors_and_runs_that_begin_with_a_sign_count(tmp_path):
     names = {"initial": "#0", "trial 1": "#1", "trial 2": "#2 again", "A": "#A", "B": "#12 B"}
     runs, weights = ([[names.get(cell, cell) for cell in line] for line in t] for t in (RUNS, WEIGHTS))
-    if dress == "workbook":
-        book = write_book(tmp_path / "job.xlsx", {"runs": runs, "weights": weights})
-        trials = read_trials(book, book)
-    else:
-        text = csv_text(runs)
-        if dress == "quoted":
-            text = "".join(f'"{line}"\n'.replace(",", '","') for line in text.splitlines())
-        (tmp_path / "runs.csv").write_text(text, encoding="utf-8")
-        trials = read_trials(tmp_path / "runs.csv", write_csv(tmp_path / "weights.csv", weights))
-    plain = read_trials(write_csv(tmp_path / "r.csv", RUNS), write_csv(tmp_path / "w.csv", WEIGHTS))
-    assert trials.sensors == ("#A", "#12 B")
-    assert trials.runs == ("#0", "#1", "#2 again")
-    assert (trials.readings == plain.readings).all()
+    book = write_book(tmp_path / "job.xlsx", {"runs": runs, "weights": weights})
+    tables = write_csv(tmp_path / "runs.csv", runs), write_csv(tmp_path / "weights.csv", weights)
+    for trials in (read_trials(*tables), read_trials(book, book)):
+        assert trials.sensors == ("#A", "#12 B")
+        assert trials.runs == ("#0", "#1", "#2 again")
 
 
 def test_an_element_that_begins_with_a_sign_is_part_of_the_shaft(tmp_path):
@@ -119,17 +96,3 @@ def test_nothing_is_printed_of_a_file_that_is_no_table(tmp_path, content):
         toml.write_text(text, encoding="utf-8")
         for problem in complaints(read_rotor, toml):
             assert "hidden" not in str(problem)
-
-
-def test_only_used_cells_of_a_workbook_are_read(tmp_path):
-    book = openpyxl.Workbook()
-    sheet = book.active
-    for line in RUNS:
-        sheet.append(line)
-    for row, column in ((1_048_576, 1), (9, 16_384), (500_000, 700)):
-        sheet.cell(row, column).number_format = "0.00"
-    sheet.cell(12, 1).value = "late"
-    book.save(tmp_path / "runs.xlsx")
-    (rows,) = read_workbook(tmp_path / "runs.xlsx", Problems()).values()
-    assert [number for number, _ in rows] == [1, 2, 3, 4, 5, 6, 7, 12]
-    assert sum(len(cells) for _, cells in rows) == 5 * len(RUNS) + 1

@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, csv_text, replaced, write_book, write_csv
 
 from balancing import estimate_influence
@@ -46,45 +44,6 @@ from rotorid.tables.runs.slow_roll import SlowRoll, subtract_slow_roll
 )
 def test_steps(cells, steps):
     np.testing.assert_allclose(written_steps(cells), steps, rtol=1e-12)
-
-
-def without_zeros(text):
-    mantissa, power, exponent = text.partition("e")
-    short = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
-    return short + power + exponent
-
-
-@given(
-    st.lists(st.integers(0, 99999), min_size=1, max_size=8),
-    st.integers(0, 4),
-    st.booleans(),
-)
-def test_fixed_decimals(numbers, decimals, comma):
-    """As they are written; and without zeros at the end, where the largest number shows all its digits."""
-    texts = [f"{number / 10**decimals:.{decimals}f}" for number in numbers]
-    texts = [text.replace(".", ",") for text in texts] if comma else texts
-    np.testing.assert_allclose(written_steps(texts), 10.0**-decimals, rtol=1e-12)
-    short = [without_zeros(text.replace(",", ".")) for text in texts]
-    assert (written_steps(short) >= 10.0**-decimals * (1 - 1e-12)).all()
-    largest = f"{(10 * max(numbers) + 1) / 10**decimals:.{decimals}f}"
-    np.testing.assert_allclose(written_steps([*short, largest]), 10.0**-decimals, rtol=1e-12)
-
-
-@given(
-    st.lists(st.tuples(st.integers(100, 999), st.integers(-6, 0)), min_size=1, max_size=8),
-    st.booleans(),
-)
-def test_fixed_significant_digits(numbers, scientific):
-    """Three digits, wherever the point is, and zeros at the end dropped or not."""
-    texts = [
-        f"{n * 10.0**power:.2e}" if scientific else f"{n * 10.0**power:.{-power}f}" for n, power in numbers
-    ]
-    true = [10.0**power for _, power in numbers]
-    np.testing.assert_allclose(written_steps(texts), true, rtol=1e-12)
-    full = f"{123 * 10.0 ** min(p for _, p in numbers):.2e}"
-    np.testing.assert_allclose(written_steps([*map(without_zeros, texts), full])[:-1], true, rtol=1e-12)
-    as_numbers = [float(text) for text in (*texts, full)]
-    np.testing.assert_allclose(written_steps(as_numbers)[:-1], true, rtol=1e-12)
 
 
 STEPS = np.broadcast_to(np.reshape([0.05e-6, np.deg2rad(1)], (2, 1, 1, 1, 1)), (2, 1, 3, 1, 2))

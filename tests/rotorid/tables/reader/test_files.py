@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from rotorid.tables import InputError, TableWarning, read_job, read_rotor, read_trials
-from rotorid.tables.reader.columns import Column, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import SPEED, VIBRATION, one_of
-
-FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+from rotorid.tables import TableWarning, read_trials
 
 
 @pytest.fixture
@@ -231,127 +223,3 @@ def test_wrong_sep_line(tmp_path, weights):
 def test_names_that_are_formulas_or_hide_characters(tmp_path, weights, name):
     path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "sensor", name))
     assert [(p.row, p.column) for p in complaints(read_trials, path, weights)][:1] == [(2, "sensor")]
-
-
-NAMES = st.text(st.characters(codec="utf-8", categories=["L", "N"]), min_size=1, max_size=8)
-# The workbooks are written by openpyxl here, which keeps 16 digits.
-VALUES = st.one_of(st.just(0.0), st.floats(min_value=1e-30, max_value=1e12)).map(lambda v: float(f"{v:.15g}"))
-ROWS = st.lists(st.tuples(NAMES, VALUES, VALUES), min_size=1, max_size=5)
-COLUMNS = (Column("name"), Column("amplitude", one_of(VIBRATION)), Column("speed", one_of(SPEED)))
-
-
-@FEW
-@given(ROWS)
-def test_random_tables_in_all_dialects(tmp_path, rows):
-    table = [["name", "amplitude_mm", "speed_rad_s"], *map(list, rows)]
-    written = {
-        "a.csv": csv_text(table).encode(),
-        "b.csv": csv_text(table, ";", comma=True).replace("\n", ";;\r\n").encode("utf-8-sig"),
-        "c.csv": ("sep=;\n" + csv_text(table, ";")).encode(),
-        "d.txt": csv_text(table, "\t").encode("utf-16"),
-        "f.txt": csv_text([*table, ["x", 0.5, 1.5]], "\t", comma=True).encode(),
-    }
-    for name, data in written.items():
-        (tmp_path / name).write_bytes(data)
-    write_book(tmp_path / "e.xlsx", {"table": table})
-    read = []
-    for name in (*written, "e.xlsx"):
-        problems = Problems()
-        result = read_table(tmp_path / name, "table", COLUMNS, problems)
-        problems.stop()
-        read.append(result)
-    for result in read:
-        assert result.texts("name")[: len(rows)] == read[0].texts("name")
-        n = len(rows)
-        np.testing.assert_array_equal(result.numbers("speed")[:n], [row[2] for row in rows])
-        np.testing.assert_array_equal(result.numbers("amplitude")[:n], [row[1] / 1000 for row in rows])
-
-
-GARBAGE = st.one_of(
-    st.binary(max_size=300),
-    st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass")),
-    st.text(alphabet='ab1,;\t"\n\r#= \u00a0.-eé', max_size=200).map(lambda t: t.encode("cp1252", "replace")),
-    st.tuples(st.integers(0, len(COMMA) - 1), st.binary(min_size=1, max_size=3)).map(
-        lambda cut: COMMA.encode()[: cut[0]] + cut[1] + COMMA.encode()[cut[0] :]
-    ),
-)
-
-
-@settings(FEW, max_examples=300)
-@given(GARBAGE, st.sampled_from([".csv", ".xlsx"]))
-@example(b"PK\x03\x04", ".xlsx")
-@example(b'"', ".csv")
-@example(b"\xff\xfe", ".csv")
-def test_garbage_gives_input_errors_only(tmp_path, data, suffix):
-    runs, weights = tmp_path / f"garbage{suffix}", tmp_path / "weights.csv"
-    runs.write_bytes(data)
-    write_csv(weights, WEIGHTS)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TableWarning)
-        try:
-            trials = read_trials(runs, weights)
-        except InputError as error:
-            trials, message = None, str(error)
-    if trials is None:
-        assert str(runs) in message or str(weights) in message
-    else:
-        # A byte that did no harm; nothing was made up.
-        assert np.isfinite(trials.readings).all()
-        assert trials.readings.size == 6
-
-
-@settings(FEW, max_examples=150)
-@given(st.data())
-def test_a_damaged_workbook_gives_input_errors_only(tmp_path, data):
-    whole, path = tmp_path / "whole.xlsx", tmp_path / "job.xlsx"
-    if not whole.exists():
-        write_book(whole, {"runs": RUNS, "weights": WEIGHTS})
-    content = bytearray(whole.read_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path.write_bytes(content[: data.draw(st.integers(len(content) // 2, len(content)))])
-    try:
-        size = read_trials(path, path).readings.size
-    except InputError as error:
-        size = 6 if str(path) in str(error) else 0
-    assert size == 6
-
-
-KEYS = st.sampled_from(
-    (
-        "runs weights influence phase angles errors planes sensors amplitude_percent floor A 1 rotor check",
-        "shaft material model disc bearing station node name mass_kg stiffness_N_per_m table seal shear",
-    )
-).flatmap(lambda words: st.sampled_from(words.split()))
-SCALARS = st.one_of(
-    st.sampled_from(
-        ['"lag"', '"runs.csv"', '"shaft.csv"', '"A"', '""', "true", "nan", "-inf", "1979-05-27", "[]"]
-    ),
-    st.integers(-3, 10**400).map(str),
-    st.floats().map(repr),
-)
-
-
-@settings(FEW, max_examples=200)
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(["{}", "[{}]", "[[{}]]", "[planes.{}]", "[errors.{}]"]), KEYS, KEYS, SCALARS
-        ),
-        max_size=5,
-    )
-)
-def test_random_toml_gives_input_errors_only(tmp_path, lines):
-    text = ""
-    for head, name, key, value in lines:
-        text += f"{key} = {value}\n" if head == "{}" else f"{head.format(name)}\n{key} = {value}\n"
-    path = tmp_path / "any.toml"
-    path.write_text(text)
-    write_csv(tmp_path / "runs.csv", RUNS)
-    write_csv(tmp_path / "shaft.csv", [["length_m", "diameter_m"], [1, 0.1]])
-    for read in (read_job, read_rotor):
-        try:
-            ending = str(read(path).__class__.__name__)
-        except InputError as error:
-            ending = str(error)
-        assert ending in ("Job", "Rotor") or "expected" in ending

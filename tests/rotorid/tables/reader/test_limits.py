@@ -52,33 +52,6 @@ def test_a_bomb_is_not_unpacked(book, monkeypatch, size, most):
     assert f"{size // 10**6} MB" in words(book)
 
 
-def test_rows_of_a_workbook_in_any_order_and_without_sizes(book):
-    def rewritten(change):
-        stream = io.BytesIO()
-        with zipfile.ZipFile(book) as old, zipfile.ZipFile(stream, "w") as new:
-            for part in old.infolist():
-                data = old.read(part)
-                new.writestr(part, change(data) if part.filename.endswith("sheet1.xml") else data)
-        return stream.getvalue()
-
-    def reversed_rows(data):
-        head, *rows = data.replace(b"</sheetData>", b"<row end").split(b"<row ")
-        rows, end = rows[:-1], rows[-1]
-        return (
-            head + b"".join(b"<row " + row for row in rows[::-1]) + b"</sheetData>" + end.removeprefix(b"end")
-        )
-
-    plain = read_workbook(book, Problems())
-    for change in (
-        reversed_rows,
-        lambda data: data.replace(b'<dimension ref="A1:E7"', b'<dimension ref="A1:B2"'),
-    ):
-        path = book.with_name("other.xlsx")
-        path.write_bytes(rewritten(change))
-        assert path.read_bytes() != book.read_bytes()
-        assert read_workbook(path, Problems()) == plain
-
-
 def test_a_formula_without_its_value_is_refused_and_one_with_it_is_read(tmp_path):
     made = openpyxl.Workbook()
     made.active.append(["x", "y"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from cases import each_of
-from keys_in_files import key_lines
 
 from rotorid.tables.reader import units, value_kinds
 from rotorid.tables.reader.problems import InputError, Problems
@@ -136,16 +135,3 @@ def test_schema():
     assert inner["required"] == ["size"]
     assert own["planes"]["additionalProperties"] == inner
     assert own["disc"]["items"] == inner
-
-
-def test_table_of_keys():
-    lines = key_lines(KEYS, "key of a job")
-    assert lines[:3] == [
-        "| key of a job | meaning | such as |",
-        "|---|---|---|",
-        "| `most_g`, `most_g_mm` | largest weight |  |",
-    ]
-    assert '| `kind` | which | `"one"`, `"two"` |' in lines
-    assert '| `taken` | what is there | `{ "3" = 10 }` |' in lines
-    assert "| `[planes.NAME]` | tables by name |  |" in lines
-    assert "| `[[disc]]` | many tables |  |" in lines

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from tables_data import complaints, csv_text, replaced, the_only, write_book, write_csv
+from tables_data import complaints, replaced, the_only, write_csv
 
 from fem import Disc, Rotor, Support
 from rotorid.tables import read_rotor, rotor_files
@@ -38,7 +36,7 @@ def test_a_rotor_table(table):
     assert table(TABLE) == SHAFT
 
 
-def test_other_units_and_dialects_give_the_same_rotor(table, tmp_path):
+def test_other_units_give_the_same_rotor(table):
     scale = (1, 1000, 1000, 1e-6, 1000)
     header = ["element", "length_mm", "diameter_mm", "support_stiffness_N_per_um", "mass_g"]
     small = [
@@ -46,11 +44,6 @@ def test_other_units_and_dialects_give_the_same_rotor(table, tmp_path):
         *([row[0], *(v * s for v, s in zip(row[1:], scale[1:], strict=True))] for row in TABLE[1:]),
     ]
     assert table(small) == SHAFT
-    path = tmp_path / "europe.csv"
-    path.write_bytes(("sep=;\r\n" + csv_text(TABLE, ";", comma=True)).encode("utf-8-sig"))
-    assert read_rotor(path) == SHAFT
-    assert read_rotor(write_book(tmp_path / "a.xlsx", {"first": TABLE, "second": [["x"]]})) == SHAFT
-    assert read_rotor(write_book(tmp_path / "b.xlsx", {"first": [["x"]], "Rotor": TABLE})) == SHAFT
 
 
 def test_every_column(table):
@@ -89,13 +82,8 @@ def test_a_last_row_of_length_0_attaches_to_the_right_end(table):
 BAD_CELLS = [
     ("length_m", 0, "a length above 0 (0 only in the last row"),
     ("length_m", -1, "a length above 0"),
-    ("length_m", "", "a number"),
-    ("length_m", "nan", "a finite number"),
     ("diameter_m", 0, "a diameter above 0"),
-    ("diameter_m", "", "a number"),
-    ("diameter_m", "110 mm", "write the unit in the header"),
     ("mass_kg", -5, "0 (nothing attached) or more"),
-    ("mass_kg", "inf", "a finite number"),
     ("support_stiffness_N_per_m", "rigid", "a number"),
     ("support_stiffness_N_per_m", -1, "0 (nothing attached) or more"),
 ]
@@ -150,23 +138,6 @@ def test_a_bore_larger_than_the_shaft(table):
         (2, "110", "less than the outer diameter"),
         (3, "110", "less than the outer diameter"),
     ]
-
-
-BAD_COLUMNS = [
-    ("length_m", "lenght_m", "did you mean 'length_m'?"),
-    ("length_m", "length", "one of the units m, mm, um, mil or in, which is missing"),
-    ("length_m", "length_ft", "not 'ft'"),
-    ("diameter_m", "diametr_m", "did you mean 'diameter_m'?"),
-    ("mass_kg", "mas_kg", "did you mean 'mass_kg'?"),
-    ("mass_kg", "mass_t", "one of the units kg, g, mg, oz or lb"),
-    ("support_stiffness_N_per_m", "stiffness_N_per_m", "did you mean 'support_stiffness_N_per_m'?"),
-    ("support_stiffness_N_per_m", "support_stiffness", "which is missing"),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "words"), BAD_COLUMNS)
-def test_bad_columns(table, old, new, words):
-    the_only(complaints(table, replaced(TABLE, 1, old, new)), "rotor.csv", 1, new, new, words)
 
 
 def test_missing_column_and_no_element(table):
@@ -244,8 +215,6 @@ def test_rows_of_the_table_override_the_material(file, tmp_path):
 
 BAD_FILES = [
     ("shear = false", 'shear = "no"', "model.shear", "no", "true or false, without quotes"),
-    ("shear = false", "shaer = false", "model.shaer", "false", "did you mean 'shear'?"),
-    ("[material]", "[materials]", "materials", "a table", "did you mean 'material'?"),
     (
         "youngs_modulus_Pa = 2e11",
         "youngs_modulus = 2e11",
@@ -268,7 +237,6 @@ BAD_FILES = [
         "a finite number, 0 or more",
     ),
     ("poisson_ratio = 0.28", "poisson_ratio = 2", "material.poisson_ratio", "2", "a number from -1 to 0.5"),
-    ("mass_kg = 4", 'mass_kg = "4"', "disc[1].mass_kg", "4", "a number, without quotes"),
     ("mass_kg = 4", "mass_kg = -4", "disc[1].mass_kg", "-4", "0 or more"),
     ("mass_kg = 4", "", "disc[1].mass_kg", None, "the mass of the disc"),
     ('node = "thrust"', 'node = "trust"', "disc[1].node", "trust", "did you mean 'thrust'?"),
@@ -283,7 +251,6 @@ BAD_FILES = [
         "did you mean 'damping_N_s_per_m'?",
     ),
     ('shaft = "shaft.csv"', "", "shaft", None, "the file of the shaft"),
-    ('shaft = "shaft.csv"', "shaft = 3", "shaft", "3", "a text in quotes"),
 ]
 
 
@@ -312,9 +279,3 @@ def test_rotor_files_that_are_none(file, tmp_path):
     the_only(complaints(file, "disc = 3\nshaft='shaft.csv'"), "rotor.toml", None, "disc", "3", "[[disc]]")
     (tmp_path / "x.toml").write_bytes("shaft = 'Welle süd.csv'".encode("cp1252"))
     the_only(complaints(read_rotor, tmp_path / "x.toml"), "x.toml", None, None, None, "in UTF-8")
-
-
-def test_problems_of_the_file_and_of_its_table_together(file, tmp_path):
-    write_csv(tmp_path / "shaft.csv", replaced(TABLE, 2, "length_m", math.nan))
-    problems = complaints(file, FILE.replace("mass_kg = 4", "mass_kg = -4"))
-    assert [(p.row, p.column) for p in problems] == [(2, "length_m"), (None, "disc[1].mass_kg")]

@@ -8,13 +8,10 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-import fem
 from balancing import estimate_influence
-from rotorid.tables import influence_frame, read_influence, read_trials, write_influence, write_table
+from rotorid.tables import read_influence, read_trials, write_influence, write_table
 from rotorid.tables.reader.table_writing import write_bytes
 
 HEADER = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_deg"]
@@ -85,39 +82,6 @@ def test_round_trip(tmp_path, suffix, phase, angles):
     )
 
 
-SIZES = st.floats(min_value=1e-9, max_value=1e9)
-
-
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(st.tuples(SIZES, st.floats(0, 359.9)), min_size=1, max_size=4), st.floats(1e-3, 1e6))
-def test_written_tables_lose_no_digit(tmp_path, coefficients, speed):
-    size, phase = zip(*coefficients, strict=True)
-    frame = pd.DataFrame({"speed_rad_s": speed, "influence": size, "phase_deg": phase})
-    for name in ("a.csv", "a.xlsx"):
-        write_table(tmp_path / name, frame)
-    lines = (tmp_path / "a.csv").read_text().splitlines()[1:]
-    assert [tuple(map(float, line.split(","))) for line in lines] == list(
-        frame.itertuples(index=False, name=None)
-    )
-    read = pd.read_excel(tmp_path / "a.xlsx").astype(float)
-    pd.testing.assert_frame_equal(read, frame, check_exact=True)
-
-
-def test_coefficients_of_a_rotor_model_are_a_stored_table(tmp_path):
-    rotor = fem.Rotor(
-        length=np.full(4, 0.25),
-        outer_diameter=0.05,
-        supports=(fem.Support(1, 1e7, 1e4), fem.Support(5, 1e7, 1e4)),
-    )
-    model = fem.influence(rotor, [2, 4], [1, 3, 5], [100.0, 300.0])
-    frame = influence_frame(model)
-    assert list(frame.columns) == ["speed_rad_s", "sensor", "plane", "influence_m_per_kg_m", "phase_deg"]
-    write_table(tmp_path / "model.csv", frame)
-    read = read_influence(tmp_path / "model.csv")
-    assert (read.sensors, read.planes) == (("1", "3", "5"), ("2", "4"))
-    np.testing.assert_allclose(read.W, model.W, rtol=1e-13)
-
-
 def test_no_vibration_unit(stored, tmp_path):
     influence = stored(replaced(TABLE, 1, "influence_um_pp_per_g", "influence_per_oz_in"))
     assert (influence.labels.vibration_unit, influence.labels.weight_unit) == ("", "oz_in")
@@ -130,8 +94,6 @@ BAD_COLUMNS = [
     ("influence_um_pp_per_g", "influence_um_g", "influence_<vibration unit>_per_<weight unit>"),
     ("influence_um_pp_per_g", "influence_um_per_gram", "a unit of weight: kg, g"),
     ("influence_um_pp_per_g", "influence_um_pk_per_g", "um_pp (peak to peak)"),
-    ("influence_um_pp_per_g", "influnce_um_pp_per_g", "did you mean 'influence_um_pp_per_g'?"),
-    ("plane", "plain", "did you mean 'plane'?"),
 ]
 
 
@@ -142,10 +104,8 @@ def test_bad_columns(stored, old, new, words):
 
 BAD_CELLS = [
     ("influence_um_pp_per_g", -1, "a coefficient of 0 or more"),
-    ("influence_um_pp_per_g", "nan", "a finite number"),
     ("phase_deg", 400, "a phase from -360 to 360 degrees"),
     ("speed_rpm", 0, "a speed above 0"),
-    ("sensor", "", "a name"),
 ]
 
 

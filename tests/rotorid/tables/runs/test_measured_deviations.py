@@ -81,12 +81,6 @@ def test_another_unit_of_the_same_kind(read):
     np.testing.assert_allclose(read(peak).covariance, read().covariance, rtol=1e-12)
 
 
-def test_a_label_serves_too(read):
-    rename = {"amplitude_um_pp": "amplitude_V", "amplitude_std_um_pp": "amplitude_std_V"}
-    volts = [[rename.get(name, name) for name in MEASURED[0]], *MEASURED[1:]]
-    np.testing.assert_allclose(read(volts).covariance, read().covariance * 4e12, rtol=1e-12)
-
-
 def test_at_amplitude_zero_it_is_alike_in_all_directions(read):
     zero = replaced(MEASURED, 2, "amplitude_um_pp", 0.0)
     np.testing.assert_allclose(
@@ -131,15 +125,6 @@ def test_a_table_of_vectors_is_a_runs_table(read):
     assert vectors.warnings == plain.warnings
 
 
-@pytest.mark.parametrize(
-    "name", ["order1_amplitude_um", "turn", "times_s", "order2", "order_2_amplitude_um", "gaps_um"]
-)
-def test_other_columns_are_unknown_as_before(read, name):
-    (problem,) = complaints(read, replaced(VECTORS, 1, "time_s", name))
-    assert (problem.row, problem.column) == (1, name)
-    assert problem.expected.startswith("a known column")
-
-
 def test_balance_names_them(job, cli):
     errors = cli("balance", job(VECTORS), "--json").json["errors"]
     squares = [
@@ -163,9 +148,3 @@ def test_check_runs_and_slow_roll_read_them(job, tmp_path):
     np.testing.assert_array_equal(found.trials.covariance, plain.trials.covariance)
     np.testing.assert_array_equal(found.check.covariance, plain.check.covariance)
     np.testing.assert_allclose(np.abs(found.slow_roll), 0.25e-6)
-
-
-def test_many_speeds_of_one_run(read):
-    rows = [[*row[:1], speed, *row[2:]] for speed in (900, 1000, 1100) for row in MEASURED[1:]]
-    trials = read([MEASURED[0], *rows])
-    assert trials.covariance.shape == (2, 2, 1, 3, 3, 2)

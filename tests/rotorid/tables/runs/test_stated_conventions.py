@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import Labels, correct, estimate_influence
 from balancing.data.conventions import opposite
@@ -120,17 +120,6 @@ def test_the_key_phasor_counts_as_the_angles_do(folder):
     assert read_job(folder / "job.toml").key_phasor == 0.0
 
 
-def test_a_workbook(folder):
-    settings = [["key", "value"], ["angles", "clockwise"], ["rotation", "counter-clockwise"]]
-    settings += [["view", "free end"], ["key_phasor.angle_deg", 30]]
-    sheets = {"runs": RUNS, "weights": WEIGHTS, "settings": settings}
-    read = read_job(write_book(folder / "job.xlsx", sheets))
-    assert (read.conventions.labels.angle_sign, read.key_phasor) == (-1, -30.0)
-    assert read.trials.labels.turning_in_words() == (
-        "angles from the mark clockwise seen from the free end, the rotor turns counter-clockwise"
-    )
-
-
 def test_stored_coefficients_know_nothing_of_clocks(job, folder):
     """The table says with or against, which needs no end from which the rotor is seen."""
     influence = estimate_influence(job('angles = "counter-clockwise"\n' + CLOCKWISE).trials)
@@ -163,15 +152,14 @@ def test_words():
     assert resolve_angles("clockwise", "counter-clockwise") == "against rotation"
     with pytest.raises(ValueError, match="'clockwise' or 'counter-clockwise', not 'left'"):
         check_angles("left")
-    for bad, words in (
-        ({"phase": "late"}, "phase must be 'lead' or 'lag', not 'late'"),
-        ({"angles": "clockwise"}, "angles must be 'with rotation' or 'against rotation', not 'clockwise'"),
-        ({"rotation": "left"}, "rotation must be 'clockwise' or 'counter-clockwise', not 'left'"),
-        ({"rotation": "clockwise", "view": "top"}, "view must be 'drive end' or 'free end', not 'top'"),
-        ({"view": "free end"}, "a view from the free end cannot be understood without"),
-        ({"clock": True}, "angles that count clockwise or counter-clockwise cannot be understood without"),
+    for bad in (
+        {"phase": "late"},
+        {"angles": "clockwise"},
+        {"rotation": "left"},
+        {"view": "free end"},
+        {"clock": True},
     ):
-        with pytest.raises(ValueError, match=words):
+        with pytest.raises(ValueError):
             Labels(**bad)
 
 
@@ -194,12 +182,3 @@ def test_seen_from_the_other_end(angles, rotation):
         turn = 1 if labels.angle_words == "counter-clockwise" else -1
         drawn = np.exp(1j * labels.drawn(np.angle(weight)))
         assert drawn == pytest.approx(np.exp(1j * turn * np.radians(shown)), rel=1e-12)
-
-
-def test_captions():
-    assert Labels().turning_in_words() == "angles from the mark with the rotation"
-    turning = Labels(angles="against rotation", rotation="clockwise")
-    assert turning.turning_in_words() == "angles from the mark against the rotation, which is clockwise"
-    seen = Labels(rotation="clockwise", view="drive end")
-    assert seen.turning_in_words().endswith("which is clockwise seen from the drive end")
-    assert (Labels().drawn_sign, turning.drawn_sign) == (1, -1)

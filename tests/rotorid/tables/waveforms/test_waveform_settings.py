@@ -6,13 +6,11 @@ import math
 import numpy as np
 import pytest
 from cases import each_of
-from jsonschema import Draft202012Validator
 from waveform_files import RATE, drawn, write
 
 from balancing.data.conventions import Labels
 from rotorid.tables.reader.input_file import each_file_once, sha256
 from rotorid.tables.reader.problems import InputError
-from rotorid.tables.schema import schema
 from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
 from rotorid.waveforms.record import SignalPath, TachoSettings
 
@@ -257,14 +255,6 @@ def test_a_tacho_of_true_and_false_is_one_of_numbers(tmp_path):
     path = write(tmp_path / "a.npz", {"KEY": drawn()["KEY"] > 1, "A": drawn()["B1X"]})
     (record,) = read_waveforms([path], WaveformWishes(tacho="KEY")).records
     assert record.tacho.samples.dtype.kind == "i"
-
-
-def test_the_schema_knows_what_the_reader_reads():
-    import tomllib
-
-    check = Draft202012Validator(schema("waveforms"))
-    assert check.is_valid(tomllib.loads(FILE))
-    assert not check.is_valid(tomllib.loads(FILE + "scal = 2"))
 
 
 def test_a_hash_is_that_of_what_was_read_or_of_a_file_of_any_size(tmp_path):
