@@ -14,7 +14,7 @@ from fem.model.calibration import Calibration
 from fem.model.disc import STEEL_DENSITY, Disc
 from fem.model.node_forces import NodeForce, in_order
 from fem.model.supports import Pedestal, Support
-from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.arrays import BoolArray, FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
@@ -246,6 +246,12 @@ SHORTEST = 3000
 _MAY_BE_ZERO = ("inner_diameter", "density", "material_damping")
 
 
+def too_short(length: FloatArray) -> BoolArray:
+    """Which elements are too short beside their longer neighbour, from lengths of shape (n,)."""
+    beside = np.concatenate(([0.0], length, [0.0]))
+    return np.asarray(SHORTEST * length < np.maximum(beside[:-2], beside[2:]))
+
+
 def _broadcast(rotor: Rotor) -> list[FloatArray]:
     """Checked, read-only arrays of equal length from what was given for each element."""
     arrays = []
@@ -274,8 +280,7 @@ def _broadcast(rotor: Rotor) -> list[FloatArray]:
     arrays = [np.broadcast_to(array, (n,)).copy() for array in arrays]
     read_only(*arrays)
     length, outer, inner = arrays[:3]
-    beside = np.concatenate(([0.0], length, [0.0]))
-    short = SHORTEST * length < np.maximum(beside[:-2], beside[2:])
+    short = too_short(length)
     if short.any():
         i = int(np.argmax(short))
         raise ValueError(

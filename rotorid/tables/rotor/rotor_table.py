@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from fem.model.node_forces import NodeForce
-from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor, Support
+from fem.model.rotor import SHORTEST, STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
+from fem.model.rotor import Support, too_short
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
@@ -87,6 +88,11 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
         "length",
         (length > 0) | ~elements,
         "a length above 0 (0 only in the last row, which then attaches to the right end)",
+    )
+    short = elements & (length > 0)
+    short[short] = too_short(length[short])
+    table.complain_where(
+        short, "length", f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
     )
     if not elements.any():
         expected = "at least one row with a length above 0"

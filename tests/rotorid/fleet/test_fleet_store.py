@@ -179,7 +179,7 @@ def test_show_tells_types_and_machines(tmp_path, cli):
         fleet_show(tmp_path / "F", FleetShowOptions(machine_type="fan-123"))
 
 
-def test_refusals(tree, cli):
+def test_refusals(tree, cli, monkeypatch):
     def refused(*words):
         found = cli("fleet", *words)
         assert (found.code, found.out) == (2, "")

@@ -1,5 +1,6 @@
 """The balancing sheet: its numbers are those of the document, and it can be used without the program."""
 
+import re
 import json
 
 import numpy as np

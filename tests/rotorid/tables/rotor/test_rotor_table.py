@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tables_data import complaints, replaced, the_only, write_csv
+from tables_data import complaints, replaced, the_only, write_book, write_csv
 
 from fem import Disc, Rotor, Support
 from rotorid.tables import read_rotor, rotor_files
