@@ -78,15 +78,6 @@ def test_check_runs_refine_the_coefficients(cli):
     assert "no check runs" in outcome.err
 
 
-def test_history_of_a_job_in_one_table(cli):
-    found = cli("balance", TURBO / "checked.toml", "--history", "--json")
-    assert found.code == 0, found.err
-    text = str(found.json["history"])
-    for run in ("baseline", "trial 1", "trial 3", "check"):
-        assert run in text
-    assert "check" in cli("balance", TURBO / "checked.toml", "--history").out
-
-
 def test_a_history_is_judged_by_the_limits_of_the_job(cli):
     command = ("balance", TURBO / "checked.toml", "--history", "--json")
     free = cli(*command).json["history"]
@@ -121,21 +112,6 @@ def test_pieces_do_not_go_with_ridge_or_truncation(cli):
         outcome = cli("balance", TURBO / "holes.toml", "--split", *option)
         assert outcome.code == 2
         assert "would undo" in outcome.err
-
-
-def test_the_judgement_is_that_of_the_check_run_where_there_is_one(cli):
-    text = cli("balance", TURBO / "checked.toml").out
-    assert text.startswith("As predicted: with the weights rms 28.4 → 0.413 µm pp (0.382 predicted). ")
-    assert "Mount these weights" not in text
-    assert "Note: --refine adds the check run" in text
-    assert "left      423.0  168.9°" in text
-    first, second, *_ = cli("balance", TURBO / "checked.toml", "--limit", "0.7").out.splitlines()
-    assert first == "Fail (check run check): 3 of 20 limits not kept."
-    assert second.startswith("As predicted: ")
-    refined = cli("balance", TURBO / "checked.toml", "--refine").out
-    assert refined.startswith("Mount these weights: ")
-    assert "  add if 'check' stays\n" in refined
-    assert "--refine" not in refined
 
 
 def test_limits_lead_the_prediction(cli):

@@ -85,15 +85,6 @@ def test_gravity_turns_everything_with_it(cli):
     )
 
 
-def test_the_picture_shows_loci_and_map():
-    found = bearings(ROTOR, BearingsOptions(speeds="1000:9000:2000rpm"))
-    axes = found.figure().axes
-    assert [ax.get_xlabel() for ax in axes[:2]] == ["x by clearance", "eccentricity by clearance"]
-    loci = [line for line in axes[0].get_lines() if line.get_label() in ("left", "right")]
-    x, y = loci[0].get_data()
-    assert np.hypot(x, y) == pytest.approx([at.eccentricity[0] for at in found.found])
-
-
 def test_other_forces_are_listed_and_explained():
     forces = [
         SqueezeFilm(1, "", **BEARING, centring_stiffness=1e7),
@@ -113,15 +104,6 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     found = bearings(light, BearingsOptions(speeds=[100.0]))
     assert found.found[0].eccentricity == pytest.approx(0)
     assert "no load" in [text.get_text() for text in found.figure().axes[0].texts]
-
-
-def test_one_speed_alone(cli, tmp_path):
-    outcome = cli("bearings", ROTOR, "--speeds", "3000rpm", "--plot", tmp_path / "one.png")
-    assert outcome.out.startswith("One speed: no threshold is sought.")
-    assert cli("bearings", ROTOR, "--speeds", "3000rpm", "--json").json["stability"] is None
-    outcome = cli("bearings", ROTOR, "--speeds", "3000rpm", "--output", tmp_path / "linear.toml")
-    assert (outcome.code, list(tmp_path.glob("*.toml"))) == (2, [])
-    assert "a table over speed needs two speeds at least (--speeds)" in outcome.err
 
 
 @pytest.mark.parametrize(
@@ -148,6 +130,7 @@ def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):
     [
         (("--speeds", "0:1000:500rpm"), "speed 0: the journal bearing 'left' at node 2 carries nothing"),
         ((*SPEEDS, "--gravity-direction", "400"), "--gravity-direction: '400.0' is no angle"),
+        (("--speeds", "3000rpm", "--output", "linear.toml"), "needs two speeds at least (--speeds)"),
         ((*SPEEDS, "--output", "linear.txt"), "the name must end in .csv, .xlsx, .toml"),
     ],
 )

@@ -13,7 +13,6 @@ import typer
 from cases import each_of
 
 from rotorid.cli import progress, terminal, verbose
-from rotorid.cli.choices import nearest_choice
 from rotorid.samples import sample_data
 
 JOB = sample_data() / "turbo_job" / "job.toml"
@@ -124,29 +123,6 @@ def test_values_with_the_nearest_name(cli, args, message):
     assert outcome.err.startswith("rotorid: ")
     assert message in outcome.err
     assert outcome.err.count("did you mean") == 1
-
-
-def test_a_name_like_no_other_gets_no_suggestion(cli):
-    for args in (["--planes", "xyz"], ["--method", "xyz"], ["--limit", "xyz=3"]):
-        outcome = cli("balance", JOB, *args)
-        assert outcome.code == 2
-        assert "did you mean" not in outcome.err
-        assert "left" in outcome.err or "minmax" in outcome.err or "probe 4" in outcome.err
-
-
-def test_the_words_of_a_choice():
-    assert nearest_choice("Value error, 'bode' is not one of 'a', 'b'") == "'bode' is not one of 'a', 'b'."
-    assert nearest_choice("anything else") == "anything else"
-
-
-def test_help_of_an_option_names_its_methods(cli):
-    for command, *methods in (
-        ("fit", "gauss-newton", "dop853", "cauchy"),
-        ("identify", "output-error", "huber"),
-    ):
-        said = words(cli(command, "--help").out)
-        for method in methods:
-            assert said.count(f"{method}: ") == 1
 
 
 @pytest.mark.full
@@ -282,16 +258,6 @@ def test_the_numbers_behind_an_identification_and_a_fit(cli):
     assert "time: fit " not in outcome.out
 
 
-def test_verbose_is_an_option_of_every_command(cli):
-    from rotorid.cli import app
-
-    commands = typer.main.get_command(app).commands
-    assert len(commands) >= 13
-    for name, command in commands.items():
-        for words in [[name, part] for part in getattr(command, "commands", ())] or [[name]]:
-            assert "--verbose" in cli(*words, "--help").out, words
-
-
 def test_notes_are_kept_only_for_those_who_ask(capsys):
     verbose.note({"rank": 3})
 
@@ -316,33 +282,3 @@ def test_an_exit_status_is_no_failure(capsys):
     with pytest.raises(typer.Exit):
         verbose.verbosely(command)(verbose=True)
     assert numbers(capsys.readouterr().err) == {"rank": "2"}
-
-
-def test_a_failing_command_says_only_what_is_wrong(cli):
-    outcome = cli("critical", "nowhere.csv", "--verbose")
-    assert outcome.code == 2
-    assert len(outcome.err.splitlines()) == 1
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("arguments", "number"),
-    [
-        (("critical", ROTOR), "unknowns_per_plane = 48"),
-        (("campbell", ROTOR, "--speeds", "0:200:100"), "estimated_relative_error = "),
-        (
-            ("influence", ROTOR, "--planes", 7, "--sensors", 2, "--speeds", "100"),
-            "elements = 23",
-        ),
-        (("tolerance", "--mass", "500kg", "--speed", "3000rpm", "--grade", "G2.5"), "specific_um = 7.95775"),
-        (
-            ("trial-weight", "--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "200mm"),
-            "load_N = 49",
-        ),
-    ],
-)
-def test_verbose_has_a_number_for_every_command(cli, arguments, number):
-    outcome = cli(*arguments, "--verbose")
-    assert outcome.code == 0, outcome.err
-    assert number in outcome.err
-    assert number not in outcome.out
