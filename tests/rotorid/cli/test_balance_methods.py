@@ -143,46 +143,6 @@ def test_check_run_is_compared(answers, tmp_path):
     assert "unbalance outside the planes" in bad["verdict"]
 
 
-def test_measured_and_computed_coefficients_together(answers, tmp_path):
-    keys = MODEL.read_text().split("[planes.left]")[1]
-    text = f"\n[planes.left]{keys}"
-    path = job_with(tmp_path, text)
-    path.write_text(
-        path.read_text().replace('weights = "weights.csv"', 'weights = "weights.csv"\nrotor = "rotor.csv"')
-    )
-    (tmp_path / "rotor.csv").write_text((MODEL.parent / "rotor.csv").read_text())
-    # by least squares: unbalance outside the planes has no part in its errors
-    both = answers(path, "--coefficients", "combined", "--model-error", "1", "--method", "least-squares")
-    alone = answers(path, "--method", "least-squares")
-    for a, b in zip(both["corrections"], alone["corrections"], strict=True):
-        assert a["mass_std"] < b["mass_std"]
-
-
-def test_unbalance_from_one_run(cli):
-    outcome = cli("unbalance", MODEL, "--stations", "6,9,12,15,18", "--json")
-    assert outcome.code == 0, outcome.err
-    assert outcome.json["provenance"]["options"]["stations"] == "6,9,12,15,18"
-    assert "determine all 5 stations" in cli("unbalance", MODEL, "--stations", "6,9,12,15,18").out
-    assert cli("unbalance", JOB, "--stations", "6").code == 2
-    assert cli("unbalance", MODEL, "--stations", "6", "--method", "modal").code == 2
-
-
-def test_ridge_truncation_subsets_and_trade_off(answers, cli, tmp_path):
-    free = answers(JOB)
-    soft = answers(JOB, "--ridge", "0.1")
-    assert np.abs(vectors(soft)).sum() < np.abs(vectors(free)).sum()
-    assert any("towards zero" in w for w in soft["warnings"])
-    fewer = answers(JOB, "--truncate", "2")
-    assert fewer["method"] == "truncated"
-    found = answers(JOB, "--best-planes", "2", "--trade-off")
-    assert found["best_planes"]["choices"] == len(found["best_planes"]["rows"]) == 3
-    assert len(found["trade_off"]["points"]) >= 10
-    assert cli("balance", JOB, "--ridge", "0.1", "--truncate", "2").code == 2
-    picture = tmp_path / "curve.png"
-    assert cli("balance", JOB, "--trade-off", "--plot", picture).code == 0
-    assert picture.stat().st_size > 10_000
-
-
 def runs(readings, planes=("a",), trials=None):
     """Tables of a baseline and one trial run per plane; readings[run][sensor] complex."""
     rows = ["run,speed_rpm,sensor,amplitude_um,phase_deg"]
@@ -245,42 +205,6 @@ def test_best_planes_are_used_and_leave_out_what_the_job_leaves_out(answers, tmp
     assert answers(job, "--best-planes", "2")["best_planes"]["choices"] == 1
 
 
-def test_scatter_of_a_weight_that_an_arc_holds(answers, tmp_path):
-    free = answers(JOB)["corrections"][0]
-    at = free["angle_deg"]
-    job = job_with(tmp_path, f"[planes.left]\nforbidden_deg = [[{at - 20:.3f}, {at + 40:.3f}]]\n")
-    held = answers(job)["corrections"][0]
-    assert held["angle_std_deg"] < 1e-3 < free["angle_std_deg"]
-    assert held["mass_std"] > 0
-
-
-@pytest.mark.parametrize(
-    ("method", "key", "criterion"), [("least-squares", "rms_after", "rms"), ("minmax", "max_after", "max")]
-)
-def test_a_trade_off_goes_from_no_weight_to_the_correction(answers, tmp_path, method, key, criterion):
-    found = answers(JOB, "--method", method, "--trade-off")
-    curve, points = found["trade_off"], found["trade_off"]["points"]
-    assert curve["criterion"] == criterion
-    totals = [point["total"] for point in points]
-    assert totals == sorted(totals)
-    for point in points:
-        assert point["total"] == pytest.approx(sum(row["mass"] for row in point["weights"]), abs=1e-6)
-    first, last = points[0], points[-1]
-    assert (first["total"], first["rms_after"], first["max_after"]) == pytest.approx(
-        (0.0, found["rms_before"], found["max_before"])
-    )
-    assert last[key] == pytest.approx(found[key], rel=1e-4)
-    values = [point[key] for point in points]
-    assert values == sorted(values, reverse=True)
-    # planes and speeds are those of the correction
-    part = answers(JOB, "--method", method, "--trade-off", "--planes", "right,left", "--speeds", "1220,3600")
-    assert part["trade_off"]["points"][0][key] == pytest.approx(part[key.replace("after", "before")])
-    assert part["trade_off"]["points"][-1][key] == pytest.approx(part[key], rel=1e-4)
-    for row, own in zip(part["trade_off"]["points"][-1]["weights"], part["corrections"], strict=True):
-        assert row["plane"] == own["plane"]
-        assert row["mass"] == pytest.approx(own["mass"], rel=0.01)
-
-
 @pytest.mark.parametrize("weights", ['[sensors."probe 4"]\nweight = 0\n', "speed_weights"])
 @pytest.mark.parametrize("method", FEW_DRAWS)
 def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, weights):
@@ -333,6 +257,9 @@ def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, met
         (("balance", JOB, "--max-mass", "heavy"), "heavy"),
         (("balance", JOB, "--model-error", "5"), "--coefficients computed"),
         (("balance", JOB, "--planes", ""), "names with commas"),
+        (("balance", JOB, "--ridge", "0.1", "--truncate", "2"), "--truncate"),
+        (("unbalance", JOB, "--stations", "6"), "rotor"),
+        (("unbalance", MODEL, "--stations", "6", "--method", "modal"), "--modes"),
         (("unbalance", MODEL, "--stations", "6,6"), "only once"),
         (("unbalance", MODEL, "--stations", "6,12", "--ridge", "0.1"), "--method ridge"),
     ],

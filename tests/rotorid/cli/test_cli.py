@@ -11,7 +11,6 @@ import pytest
 
 import fem
 from balancing import correct, estimate_influence
-from rotorid.reduction import reduce
 from rotorid.samples import sample_data
 from rotorid.tables import read_job, read_rotor
 
@@ -40,14 +39,6 @@ def test_provenance_names_version_files_hashes_date_and_options(cli):
     assert record["options"] == {"number": 2}
     assert record["version"] == "0.1.0"
     assert record["date"].endswith("+00:00")
-
-
-@pytest.mark.parametrize("modes", [1, 2, 3])
-def test_reduce_gives_the_masses_of_the_function(cli, modes):
-    document = cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", modes, "--json").json
-    found = reduce(read_rotor(ROTOR), (7, 12, 18), modes)
-    np.testing.assert_allclose(document["masses_kg"], found.masses.values, rtol=1e-9)
-    np.testing.assert_allclose(document["natural_frequencies_rad_s"], found.frequencies, rtol=1e-9)
 
 
 def test_balance_gives_the_weights_of_the_function(cli):
@@ -84,25 +75,6 @@ def test_saved_coefficients_balance_from_a_single_run(cli, tmp_path):
     for a, b in zip(full["corrections"], again["corrections"], strict=True):
         assert a["mass"] == pytest.approx(b["mass"], rel=1e-9)
         assert a["angle_deg"] == pytest.approx(b["angle_deg"], abs=1e-7)
-
-
-def test_influence_of_the_model_is_symmetric_and_feeds_balance(cli, tmp_path):
-    table = tmp_path / "w.csv"
-    options = ("--planes", "7,12", "--sensors", "7,12", "--speeds", "100:120:10", "--output", table)
-    document = cli("influence", ROTOR, *options, "--json").json
-    rows = document["rows"]
-    assert len(rows) == 3 * 2 * 2
-    W = {(r["speed"], r["sensor"], r["plane"]): r["influence"] for r in rows}
-    assert W[100.0, 7, 12] == pytest.approx(W[100.0, 12, 7], rel=1e-9)
-    readings = tmp_path / "runs.csv"
-    readings.write_text(
-        "run,speed_rad_s,sensor,amplitude_um,phase_deg\n"
-        + "".join(f"1,{s},{n},{10 + int(n)},{40 + s}\n" for s in (100, 110, 120) for n in (7, 12)),
-        encoding="utf-8",
-    )
-    result = cli("balance", readings, "--influence", table, "--json").json
-    assert [c["plane"] for c in result["corrections"]] == ["7", "12"]
-    assert result["rms_after"] < result["rms_before"]
 
 
 @pytest.mark.parametrize(
