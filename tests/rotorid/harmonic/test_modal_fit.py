@@ -90,41 +90,6 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
     np.testing.assert_allclose(result.shapes[0], shapes[:, 1], rtol=2e-3)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("errors", "masses", "read", "draws"),
-    [("stated", 3, 3, 60), ("share of", 3, 3, 60), ("stated", 4, 2, 60), ("size everywhere", 4, 1, 200)]
-    if FULL
-    else [("share of", 3, 3, 40), ("stated", 4, 2, 60), ("size everywhere", 4, 1, 120)],
-)
-def test_intervals_of_drawn_readings_hold_the_truth(errors, masses, read, draws):
-    """Random chains: 95 % of the intervals, within four standard deviations of such a count."""
-    rng, held, count = np.random.default_rng(7), np.zeros(3), 0
-    chosen = 0
-    for _ in range(draws):
-        M0, K0 = chain(rng.uniform(5, 20, masses), rng.uniform(5e3, 2e4, masses))
-        omega0, shapes = undamped(M0, K0)
-        damping = 10 ** rng.uniform(-3, -2) * omega0 / omega0[-1]
-        C = 2 * damping[0] / omega0[0] * K0
-        omega = around(omega0[:read], damping[:read])
-        exact = amplitudes(omega, M0, C, K0, np.eye(masses)[-1])
-        share = 0.01 * np.abs(exact).max() / np.abs(exact) if "size" in errors else 0.02
-        stated = AmplitudeErrors(0.02, 0.02) if errors == "stated" else None
-        result = fitted(omega, measured(omega, exact, stated, (rng, share)))
-        chosen += stated is not None or result.same.startswith(errors)
-        assert len(result.ends) == read
-        _, _, low, high = found(result)
-        truth = np.array([omega0[:read], damping[:read]])
-        held[:2] += ((low <= truth) & (truth <= high)).sum(axis=1)
-        factor = (high - low)[0, 0] / 2 / result.fit.std[0]
-        ratio = result.shapes[:, -1] / result.shapes[:, 0]
-        error = np.abs(ratio) * np.hypot(result.shape_std[:, -1], result.shape_std[:, 0])
-        held[2] += (np.abs(ratio - (shapes[-1] / shapes[0])[:read]) <= factor * error).sum()
-        count += read
-    assert chosen > 0.9 * draws
-    assert np.abs(held / count - 0.95).max() < 4 * np.sqrt(0.95 * 0.05 / count)
-
-
 def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli):
     """Lesson 7 whole: amplitudes around resonances, modes, stiffnesses; 40 drawn tests."""
     from rotorid.tables import read_harmonic_model, read_measurements
@@ -371,15 +336,6 @@ def test_one_stated_error_needs_the_other(cli):
     )
     assert outcome.code == 2
     assert "belong together" in outcome.err
-
-
-def test_the_sample_holds_what_the_command_writes(tmp_path, cli):
-    folder, output = sample_data() / "modes", tmp_path / "modes.csv"
-    words = ("--excitation", "force", "--amplitude-error", "2", "--phase-error", "1")
-    cli("modes", folder / "amplitudes.csv", *words, "--output", output)
-    new, stored = read_modes(output), read_modes(folder / "modes.csv")
-    np.testing.assert_allclose(new.frequencies, stored.frequencies, rtol=1e-9)
-    np.testing.assert_allclose(new.shapes, stored.shapes, rtol=1e-7)
 
 
 def test_one_wild_reading_of_a_sweep_is_no_mode():

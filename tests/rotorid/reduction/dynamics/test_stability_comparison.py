@@ -14,7 +14,6 @@ from whirl_rotors import machine, whirling_rotors
 
 import fem
 import rotorid
-from rotorid.plots import plot
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
@@ -408,30 +407,6 @@ def test_no_motion_is_left_out():
     both_ways = np.where(found.imag > 0, found, found.conj())
     distance = np.abs(both_ways[:, None] - expected) / np.abs(expected)
     assert distance.min(axis=0) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_plot():
-    import matplotlib
-
-    matplotlib.use("Agg")
-    cost = compare_stability(jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4), 900.0, steps=9)
-    lines = [line.get_ydata() for line in plot(cost).lines]
-    assert any(np.shape(y) == (10,) and np.allclose(y, cost.small_decrement) for y in lines)
-
-
-def test_outputs():
-    cost = compare_stability(jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4), 900.0, steps=9)
-    data = json.loads(json.dumps(cost.to_dict(), allow_nan=False))
-    assert data["small"]["threshold_rad_s"] == cost.small_threshold
-    assert data["modes_watched"] == {"full": cost.n_full, "small": 2}
-    frame = cost.to_frame()
-    assert frame.small_log_decrement.to_numpy() == pytest.approx(cost.small_decrement)
-    assert len(frame) == 10
-    text = cost.answer.whole()
-    assert f"{cost.small_threshold:.7g}" in text
-    assert f"loses stability at {cost.small_threshold * 30 / np.pi:.6g} rpm" in cost.answer.judgement
-    assert "forward" in text
-    assert not cost.small_decrement.flags.writeable
 
 
 @pytest.mark.parametrize(
