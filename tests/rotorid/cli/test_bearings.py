@@ -48,30 +48,6 @@ def test_the_threshold_does_not_depend_on_the_steps(cli):
     assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
 
 
-@pytest.mark.full
-def test_the_linear_rotor_is_read_by_the_other_commands(cli, tmp_path):
-    linear = tmp_path / "linear.toml"
-    speeds = ",".join(map(str, [*range(600, 9001, 400), 6405, 6409])) + "rpm"
-    outcome = cli("bearings", ROTOR, "--speeds", speeds, "--output", linear)
-    assert outcome.code == 0
-    assert outcome.out.count("written: ") == 4
-    rotor = read_rotor(linear)
-    assert [s.name for s in rotor.supports] == ["left", "right"]
-    made = bearings(ROTOR, BearingsOptions(speeds=speeds))
-    assert made.linear == rotor
-    assert cli("critical", linear, "-n", 1, "--json").code == 0
-    whirl = cli("campbell", linear, "--speeds", "600:9000:400rpm", "--json").json
-    # coefficients are linear between the speeds of the table: near the threshold they are close
-    assert whirl["unstable"][0]["speed_rpm"] == pytest.approx(made.stability.threshold * 30 / np.pi, rel=1e-6)
-    weights = tmp_path / "unbalance.csv"
-    weights.write_text("plane,unbalance_g_mm,angle_deg\n12,1000,0\n")
-    response = cli("response", linear, "--unbalance", weights, "--speeds", "800:6000:100rpm", "--json")
-    assert 1150 < response.json["largest"][0]["speed_rad_s"] * 30 / np.pi < 1400
-    table = tmp_path / "bearings.csv"
-    cli("bearings", ROTOR, *SPEEDS, "--output", table)
-    assert len(pd.read_csv(table)) == 18
-
-
 def test_gravity_turns_everything_with_it(cli):
     down, aside = (
         cli("bearings", ROTOR, *SPEEDS, "--gravity-direction", angle, "--json").json for angle in (-90, 0)

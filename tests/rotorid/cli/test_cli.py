@@ -80,12 +80,6 @@ def test_saved_coefficients_balance_from_a_single_run(cli, tmp_path):
 @pytest.mark.parametrize(
     "command",
     [
-        pytest.param(("critical", ROTOR), marks=pytest.mark.full),
-        pytest.param(("reduce", ROTOR, "--nodes", "7,12,18"), marks=pytest.mark.full),
-        pytest.param(
-            ("influence", ROTOR, "--planes", "7", "--sensors", "2,12", "--speeds", "50:700:5"),
-            marks=pytest.mark.full,
-        ),
         ("balance", TURBO),
     ],
 )

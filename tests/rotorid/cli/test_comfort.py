@@ -1,10 +1,7 @@
 """What makes the shell pleasant: nearest names, no colours where unwanted, progress, the numbers behind."""
 
 import json
-import os
-import pty
 import re
-import subprocess
 import sys
 import time
 
@@ -24,30 +21,6 @@ COLOURS = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS", "TERM", "CO
 def words(text):
     """A message without the frame and the line breaks that rich gives it."""
     return " ".join(text.replace("│", " ").split())
-
-
-def environment(**changes):
-    return {key: value for key, value in os.environ.items() if key not in COLOURS} | changes
-
-
-def at_terminal(*args, **changes):
-    """What `rotorid ARGS` writes to a terminal, standard error included."""
-    master, slave = pty.openpty()
-    with subprocess.Popen(
-        [sys.executable, "-m", "rotorid", *args], stdout=slave, stderr=slave, env=environment(**changes)
-    ):
-        os.close(slave)
-        parts = []
-        while True:
-            try:
-                part = os.read(master, 4096)
-            except OSError:  # Linux: the other end is closed
-                break
-            if not part:
-                break
-            parts.append(part)
-    os.close(master)
-    return b"".join(parts).decode()
 
 
 @pytest.mark.parametrize(
@@ -107,25 +80,6 @@ def test_values_with_the_nearest_name(cli, args, message):
     assert outcome.err.startswith("rotorid: ")
     assert message in outcome.err
     assert outcome.err.count("did you mean") == 1
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("args", [["critical", "--help"], ["balanec"]])
-def test_colours_only_where_they_are_wanted(args):
-    assert "\x1b[" in at_terminal(*args, TERM="xterm-256color")
-    for changes in ({"NO_COLOR": "1", "TERM": "xterm-256color"}, {"TERM": "dumb"}):
-        text = at_terminal(*args, **changes)
-        assert "\x1b" not in text
-        assert "balance" in text or "--mesh-check" in text
-    piped = subprocess.run(
-        [sys.executable, "-m", "rotorid", *args],
-        capture_output=True,
-        text=True,
-        env=environment(TERM="xterm-256color", PYTHONIOENCODING="utf-8"),
-        check=False,
-    )
-    assert "\x1b" not in piped.stdout + piped.stderr
-    assert "balance" in piped.stderr or "--mesh-check" in piped.stdout
 
 
 def test_plain_terminals(monkeypatch):

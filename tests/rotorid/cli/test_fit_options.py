@@ -54,26 +54,6 @@ def test_starting_values_and_iterations(cli):
     assert options == {"start": "m1=10, c1=0.2"}
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("--method", "quasilinearization", "--trajectory", "data"),
-        ("--method", "multiple-shooting", "--trajectory", "model"),
-        ("--method", "multiple-shooting", "--pieces", "4"),
-        ("--integrator", "dop853", "--rtol", "1e-08"),
-        ("--starts", "3", "--seed", "7"),
-    ],
-)
-def test_options_reach_the_fit_and_its_provenance(cli, arguments):
-    found = cli("fit", *files("quasilinearization"), *arguments, "--json").json
-    for name, truth in {"theta1": 1, "theta2": -1, "theta3": -1}.items():
-        assert values(found)[name] == pytest.approx(truth, rel=1e-6)
-    options = found["provenance"]["options"]
-    for option, value in zip(arguments[::2], arguments[1::2], strict=True):
-        assert str(options[option.strip("-")]) == value
-
-
 def test_seeds_choose_other_places(cli, tmp_path):
     model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
     none, zero, one = (

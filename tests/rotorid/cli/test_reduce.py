@@ -74,15 +74,6 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
     assert names == ["x7", "x12", "x18", "y7", "y12", "y18"]
 
 
-def test_the_small_compressor_has_both_planes_and_damped_supports(cli, tmp_path):
-    model = tmp_path / "model.toml"
-    outcome = cli("reduce", COMPRESSOR, "--place", "compromise", "--masses", 3, "--speed", "6000rpm",
-                  "--model", model, "--stability", "1000:12000rpm", "--json")  # fmt: skip
-    assert outcome.code == 0, outcome.err
-    assert "[states]" in model.read_text()
-    assert outcome.json["stability"]["full"]["status"] == outcome.json["stability"]["small"]["status"]
-
-
 @pytest.mark.parametrize(
     ("view", "ask"),
     [
@@ -174,25 +165,6 @@ def test_measured_shapes_are_compared_with_the_rotor():
     assert any("is its sign at node 18 right?" in text for text in turned.warnings)
     missed = reduce_rotor(rotor, (7, 12, 18), 2, measured=(omega[1:], shapes[:, 1:]))
     assert any("but of its mode 2 (MAC 1.00): is a mode missing?" in text for text in missed.warnings)
-
-
-def test_a_model_on_damped_bearings_can_be_driven(cli, tmp_path):
-    """Damped supports are states of first order; forces are inputs, and only the masses are measured."""
-    path = tmp_path / "model.toml"
-    ask = ("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--speed", "6000rpm", "--model", path)
-    assert cli(*ask, "--force", "14").code == 0
-    model = read_ode_model(path)
-    assert model.inputs == ("f_x14",)
-    assert set(model.outputs) == {f"{axis}{node}" for axis in "xy" for node in (8, 14, 20)}
-    assert all(name.startswith(("d_x", "d_y")) for name in model.parameters)
-    speed = 200 * np.pi
-    small = reduce_rotor(read_rotor(COMPRESSOR), (8, 14, 20), 1, speed=speed).small()
-    back = state_space(model, np.zeros(len(model.parameters)))
-    theirs, ours = np.sort_complex(back.eigenvalues), np.sort_complex(small.eigenvalues(speed))
-    np.testing.assert_allclose(theirs, ours, rtol=1e-9)
-    refused = cli(*ask, "--force", "15")
-    assert refused.code == 2
-    assert "no mass of the model stands at 15" in refused.err
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,6 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
-from repetitions import FULL
-from workbook_jobs import SAMPLES
 
 from rotorid.samples import sample_data
 from rotorid.tables import read_influence, write_influence
@@ -20,34 +18,6 @@ def answer(outcome):
     """The document of a result without what names files and dates."""
     assert outcome.code == 0, outcome.err
     return {key: value for key, value in outcome.json.items() if key != "provenance"}
-
-
-CALLS = [
-    *((sample, ()) for sample in SAMPLES),
-    ("turbo_job/holes", ("--split",)),
-    ("turbo_job/checked", ("--history",)),
-    ("turbo_job/checked", ("--refine",)),
-    ("turbo_job/job", ("--method", "minmax")),
-    ("bk_two_plane/job", ("--amplitude-error", "2", "--phase-error", "1", "--phase", "lag")),
-    ("left_in/job", ("--angles", "against rotation")),
-    ("turbo_job/job", ("--max-mass", "left=400,right=9oz_in", "--limit", "probe 1=20")),
-]
-ONCE = ("--amplitude-error", "--phase-error", "--phase", "--angles", "--max-mass", "--limit")
-"""What the workbook says from then on."""
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(("sample", "options"), CALLS)
-def test_a_workbook_gives_the_same_result(cli, tmp_path, sample, options):
-    job, sheet = DATA / f"{sample}.toml", tmp_path / "sheet.xlsx"
-    first = cli("balance", job, *options, "--output", sheet, "--json")
-    again = options if not options or options[0] not in ONCE else ()
-    assert answer(cli("balance", sheet, *again, "--json")) == answer(first)
-    if options and not FULL:
-        return  # a workbook of a workbook: those without options
-    second = tmp_path / "second.xlsx"
-    assert answer(cli("balance", sheet, *again, "--output", second, "--json")) == answer(first)
-    assert answer(cli("balance", second, *again, "--json")) == answer(first)
 
 
 def test_the_sheets_of_results(cli, tmp_path):
@@ -137,23 +107,6 @@ def test_the_form(cli, tmp_path):
     assert empty.err.count("\n") == 1
     assert "sheet 'runs'" in empty.err
     assert "none are filled in yet" in empty.err
-    book = openpyxl.load_workbook(form)
-    for name in ("runs", "weights"):
-        lines = (DATA / "bk_two_plane" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
-        header, *body = [line.split(",") for line in lines if not line.startswith("#")]
-        for place, title in enumerate(header, start=1):
-            book[name].cell(1, place).value = title
-            for number, row in enumerate(body, start=2):
-                text = title in ("run", "sensor", "plane")
-                book[name].cell(number, place).value = row[place - 1] if text else float(row[place - 1])
-    keys = [cell.value for cell in book["settings"]["A"]]
-    for key, value in (("phase", "lead"), ("angles", "with rotation")):
-        book["settings"].cell(keys.index(key) + 1, 2).value = value
-    book.save(form)
-    expected = answer(cli("balance", DATA / "bk_two_plane" / "job.toml", "--json"))
-    assert answer(cli("balance", form, "--json")) == expected
-    corrections = [(row["plane"], row["mass"], row["angle_deg"]) for row in expected["corrections"]]
-    assert corrections[0] == ("1", pytest.approx(2.951, rel=1e-3), pytest.approx(50.2, rel=1e-3))
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from harmonic_cases import chain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -257,19 +256,6 @@ def test_units_do_not_matter(length, mass, rate):
     np.testing.assert_allclose(found.values / scale, base.values, rtol=1e-9)
     np.testing.assert_allclose(found.std / scale, base.std, rtol=1e-6)
     assert found.condition_number == pytest.approx(base.condition_number, rel=1e-6)
-
-
-@pytest.mark.parametrize("errors", [None, AmplitudeErrors(0.02, 0.0175)], ids=["alike", "weighted"])
-def test_twenty_masses_from_forty_frequencies(errors):
-    equations, unknowns = chain(20)
-    model = harmonic_model(equations, estimate=unknowns)
-    rng = np.random.default_rng(8)
-    truth = np.repeat([10.0, 20.0, 1e5], 20) * rng.uniform(0.8, 1.2, 60)
-    w = np.linspace(5, 190, 40)
-    load = {"F": np.ones(40, dtype=complex)}
-    data = experiments(model, w, {**load, **model.predict(truth, w, load)}, errors=errors)
-    found = identify(model, data)
-    np.testing.assert_allclose(found.values, truth, rtol=1e-9)
 
 
 def test_experiments_check_themselves():

@@ -1,18 +1,14 @@
 """Modes from amplitudes: against closed forms and drawn readings, and what is said where they do not tell."""
 
-import csv
-
 import numpy as np
 import pytest
 from repetitions import FULL
 from scipy.linalg import eigh
 
-import fem
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.modal.modal_fit import fit_modes
 from rotorid.harmonic.modal.modal_readings import SteadyAnswers
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.workflows.vibration.modes import ModesOptions, modes
 
@@ -112,44 +108,6 @@ def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli
     for name, value, std in zip(result.parameters, result.values, result.std, strict=True):
         assert output[name]["value"] == pytest.approx(value, abs=0.05 * std)
         assert output[name]["std"] == pytest.approx(std, rel=0.05)  # the error of the reference counts, too
-
-
-def test_the_modes_of_a_rotor_reduce_it(tmp_path, cli):
-    """Run-up under unbalance of the 23-element rotor with dampers, read at three nodes: the same masses."""
-    rows = list(csv.reader((sample_data() / "rotor23.csv").read_text().splitlines()))
-    damped = tmp_path / "rotor.csv"
-    damped.write_text(
-        ",".join([*rows[0], "support_damping_N_s_per_m"])
-        + "\n"
-        + "\n".join(",".join([*row, "400" if float(row[3]) else "0"]) for row in rows[1:])
-    )
-    rotor, nodes = read_rotor(damped), [7, 12, 18]
-    exact = fem.critical_speeds(rotor, 3)
-    omega = around(exact.frequencies, [1.2e-5, 1.5e-4, 4e-4], 11)
-    unbalance = {6: 1e-3, 15: 0.5e-3j, 19: 3e-4}
-    Z = fem.unbalance_response(rotor, unbalance, omega, nodes=nodes).amplitudes
-    Z = 1e6 * Z.reshape(len(omega), 3)
-    rng = np.random.default_rng(2)
-    Z = Z * (1 + 0.01 * (rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)))
-    head = "speed_rpm," + ",".join(f"{n}_amplitude_um,{n}_phase_deg" for n in nodes)
-    cells = [
-        [w * 30 / np.pi, *np.stack((np.abs(z), np.degrees(np.angle(z))), 1).ravel()]
-        for w, z in zip(omega, Z, strict=True)
-    ]
-    table, output = tmp_path / "runup.csv", tmp_path / "modes.csv"
-    table.write_text("\n".join([head, *(",".join(map(str, row)) for row in cells)]))
-    words = ("--amplitude-error", "1", "--phase-error", "0.573")
-    document = cli("modes", table, "--excitation", "unbalance", *words, "--output", output, "--json").json
-    assert document["warnings"] == []
-    read = read_modes(output, rotor)
-    assert np.all(np.abs(read.frequencies - exact.frequencies) < 4 * read.frequency_std * read.frequencies)
-    reduced = cli(
-        "reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json"
-    ).json
-    computed = cli(
-        "reduce", sample_data() / "rotor23.csv", "--nodes", "7,12,18", "--modes", "2", "--json"
-    ).json
-    np.testing.assert_allclose(reduced["masses_kg"], computed["masses_kg"], rtol=0.05)
 
 
 def test_a_velocity_under_a_given_force_is_the_same_mode(tmp_path):

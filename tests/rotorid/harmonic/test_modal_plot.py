@@ -1,15 +1,13 @@
 """The picture of modes holds the readings and the closed form that they were drawn from, in their units."""
 
 import numpy as np
-from documents import check_hygiene, legends_of
+from documents import check_hygiene
 
-from rotorid.samples import sample_data
 from rotorid.workflows.vibration.modes import ModesOptions, modes
 
 M = np.diag([20.0, 20.0, 10.0])
 K = np.array([[3e4, -2e4, 0.0], [-2e4, 2.5e4, -5e3], [0.0, -5e3, 5e3]])
 OMEGA = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(M, K)).real))
-SAMPLE = sample_data() / "modes" / "amplitudes.csv"
 
 
 def around(share=4e-4, readings=9, modes=3):
@@ -51,10 +49,6 @@ def curves(ax):
     return [line.get_xydata() for line in ax.lines if len(line.get_xydata()) > 500]
 
 
-def words(figure):
-    return legends_of(figure)[0].get_title().get_text()
-
-
 def test_readings_and_curves_are_those_of_the_chain_in_the_units_of_the_table(tmp_path):
     omega = around()
     _, axes = drawn(written(tmp_path / "a.csv", omega, response(omega)))
@@ -75,19 +69,6 @@ def test_readings_and_curves_are_those_of_the_chain_in_the_units_of_the_table(tm
             np.testing.assert_allclose(top[:, 1], np.abs(between), atol=1e-3 * np.abs(between).max())
 
 
-def test_each_reading_is_joined_with_the_fit_at_its_frequency():
-    _, axes = drawn(SAMPLE, amplitude_error=2.0, phase_error=1.0)
-    for circle, _ in axes:
-        read = np.concatenate(points(circle)) @ (1, 1j)
-        joins = [line.get_xydata() @ (1, 1j) for line in circle.lines if len(line.get_xydata()) == 2]
-        assert len(joins) == 27
-        np.testing.assert_allclose([first for first, _ in joins], read)
-        gaps = np.abs([second / first - 1 for first, second in joins])
-        assert 0.01 < np.median(gaps) < 0.04  # 2 % and 1° of noise
-        loops = np.concatenate(curves(circle)) @ (1, 1j)
-        assert max(np.abs(loops - end).min() / abs(end) for _, end in joins) < 1e-9
-
-
 def test_an_unbalance_grows_between_readings_with_the_square_of_the_speed(tmp_path):
     def shaken(w):
         """A mass on a spring with 5 % of critical damping, and half of that."""
@@ -99,12 +80,3 @@ def test_an_unbalance_grows_between_readings_with_the_square_of_the_speed(tmp_pa
     for p, top in enumerate(curves(axes[0, 1])):
         between = 1e6 * np.abs(shaken(2 * np.pi * top[:, 0])[:, p])
         np.testing.assert_allclose(top[:, 1], between, rtol=1e-6)
-
-
-def test_another_force_at_every_frequency_leaves_the_circles(tmp_path):
-    omega = around()
-    F = np.linspace(5, 20, len(omega)) * np.exp(1j * np.arange(len(omega)))
-    figure, axes = drawn(written(tmp_path / "a.csv", omega, response(omega) / 10 * F[:, None], F=F))
-    assert words(figure).endswith("for the force at the lowest frequency")
-    read = points(axes[1, 0])[2] @ (1, 1j)
-    np.testing.assert_allclose(read, 5e5 * response(omega)[9:18, 2], rtol=1e-9)

@@ -9,7 +9,6 @@ from documents import check_hygiene
 from rotorid.samples import sample_data
 from rotorid.workflows.balance import BalanceOptions, balance
 from rotorid.workflows.tolerance import ToleranceOptions, tolerance
-from rotorid.workflows.trial_weight import trial_weight
 from rotorid.workflows.unbalance import UnbalanceOptions, unbalance
 
 TURBO, MODEL = sample_data() / "turbo_job", sample_data() / "model_job" / "job.toml"
@@ -109,19 +108,6 @@ def test_trade_off_has_a_larger_scale_for_its_end():
     for ax in (upper, closer):
         line = named(ax, "rms (made as small as possible)")
         assert line.get_ydata() == pytest.approx(found.curve.rms * 2e6)
-
-
-def test_all_trial_weights_stand_in_one_picture():
-    found = trial_weight(MODEL)
-    figure = found.figure()
-    check_hygiene(figure)
-    [ax] = figure.axes
-    for line, one in zip(ax.lines, found.weights, strict=True):
-        size, angle = one.labels.weight(one.amount * np.exp(1j * one.angle))
-        assert line.get_ydata()[1] == pytest.approx(float(size))
-        assert np.degrees(line.get_xdata()[1]) == pytest.approx(float(angle))
-        assert size < ax.get_rmax()
-    assert len({line.get_marker() for line in ax.lines}) == 3
 
 
 def test_unbalance_is_a_vector_at_each_station():

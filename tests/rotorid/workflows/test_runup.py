@@ -159,17 +159,3 @@ def test_vectors_of_python(rotor_and_sweep):
     found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])], slow_roll=47.0))
     assert len(found.to_dict()["modes"]) == 1
     assert json.dumps(found.document)
-
-
-def test_arrows_lead_from_the_first_run_to_the_trial_run_at_the_same_speed():
-    _, sweep = drawn()
-    trial = replace(sweep, run="trial", vectors=sweep.vectors + 5e-6)
-    polar = runup([sweep, trial], RunUpOptions(run=sweep.run)).figure("polar").axes[0]
-    assert "arrows: from the first run to another at one speed" in polar.get_title()
-    arrows = [one for one in polar.texts if getattr(one, "arrow_patch", None) is not None]
-    assert len(arrows) == 6 * len(sweep.sensors)
-    for arrow in arrows:
-        (a, r), (b, s) = arrow.xyann, arrow.xy
-        assert s * np.exp(1j * b) - r * np.exp(1j * a) == pytest.approx(
-            5e-6 * sweep.labels.vibration_scale, rel=1e-6
-        )

@@ -73,16 +73,6 @@ def test_lesson_5_is_one_command_and_the_next(cli, tmp_path):
     assert answers[0] == answers[1]
 
 
-def test_natural_modes_are_those_of_the_chain(cli, tmp_path):
-    """Task 7.1: the way back is exact."""
-    file = tmp_path / "modes.csv"
-    cli("simulate", task("task_7_1"), "--with", "c1=1e4,c2=2e4,c3=5e3", "--modes", "--output", file)
-    rows = np.array(printed(file)[1:], dtype=float)
-    assert np.all(rows[:, 1] == 1)
-    found = cli("identify", task("task_7_1"), file, "--json").json["parameters"]
-    assert [round(found[name]["value"], 6) for name in ("c1", "c2", "c3")] == [1e4, 2e4, 5e3]
-
-
 def test_the_record_of_f_to_its_five_digits(cli, tmp_path):
     file = tmp_path / "f.csv"
     words = "--with", "c1=0.14,m1=12,m2=28", "--times", "0:50:0.2", "--digits", "5"

@@ -284,20 +284,6 @@ def test_damped_supports_cannot_be_condensed():
     assert motion.coordinates == at_bearings.coordinates  # nothing is massless
 
 
-def test_condensed_pedestals_without_mass():
-    """Springs in series: the small model on them is that on bearings of the resulting stiffness."""
-    series = 1 / (1 / 2e7 + 1 / 6e7)
-    soft = [fem.Support(n, 2e7, pedestal=fem.Pedestal(0.0, 6e7)) for n in (1, 11)]
-    plain = [fem.Support(n, series) for n in (1, 11)]
-    K = [
-        small_rotor(full_machine(supports=s, material_damping=0.0), (4, 8), (30.0, 20.0))
-        .motion(supports="condensed")
-        .K
-        for s in (soft, plain)
-    ]
-    np.testing.assert_allclose(K[0], K[1], rtol=1e-9, atol=1e-9 * np.abs(K[1]).max())
-
-
 @each_of(
     ("nodes", "masses", "options", "message"),
     [
