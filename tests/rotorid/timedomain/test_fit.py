@@ -69,6 +69,20 @@ def test_measured_input():
         assert fit(model, record, method=method).values == pytest.approx([2.0, 1.5], rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"method": "newton"}, "method 'newton' is not known"),
+        ({"start": {"z": 1.0}}, "z is no parameter"),
+        ({"starts": 0}, "at least 1"),
+        ({"loss": "square"}, "loss 'square' is not known"),
+    ],
+)
+def test_bad_options(options, words):
+    with pytest.raises(ValueError, match=words):
+        fit(decay(), decay_record(), **options)
+
+
 def test_bad_records():
     t = np.arange(3.0)
     with pytest.raises(ValueError, match="no output of the model"):

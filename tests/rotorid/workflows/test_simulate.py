@@ -218,3 +218,10 @@ def test_a_sharp_resonance_is_none_without_damping(cli, tmp_path):
     words = "--with", "c=1000,alpha=1e-4", "--frequencies", "10", "--inputs", "F=1"
     found = cli("simulate", task("task_5_1"), *words, "--json").json
     assert np.isclose(found["values"][0][found["signals"].index("X_im")], -1000.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("times", ["0:50", "0:x:1", "5:0:1", "0:1:0", "0:1e9:1e-9", ""])
+def test_times_that_cannot_be(cli, times):
+    model = FIT / "three_masses" / "model.toml"
+    found = cli("simulate", model, "--with", "c1=0.14,m1=12,m2=28", "--times", times)
+    assert (found.code, found.err.count("\n")) == (2, 1)
