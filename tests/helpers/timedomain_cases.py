@@ -84,21 +84,6 @@ def fitzhugh_nagumo_record():
     return Record(t, {"V": y[:, 0], "R": y[:, 1]})
 
 
-def van_der_pol():
-    return ode_model(
-        {"x": "v", "v": "lam*(1 - x**2)*v - x"},
-        initial={"x": 2.0, "v": 0.0},
-        outputs={"x": "x"},
-        estimate={"lam": 1.0},
-    )
-
-
-def van_der_pol_record(**options):
-    t, rng = np.linspace(0.0, 25.0, 126), np.random.default_rng(1)
-    x = simulate(van_der_pol(), [10.0], t, sensitivities=False).y[:, 0]
-    return Record(t, {"x": x + 0.05 * rng.standard_normal(len(t))}, **options)
-
-
 def motion_in(path, values=()):
     """M, C and K of a model file, its parameters at their starting values or at these."""
     said = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -10,8 +10,17 @@ from typing import Any
 import numpy as np
 
 from fem.model.node_forces import NodeForce
-from fem.model.rotor import SHORTEST, STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
-from fem.model.rotor import Support, too_short
+from fem.model.rotor import (
+    SHORTEST,
+    STEEL_DENSITY,
+    STEEL_MODULUS,
+    STEEL_POISSON,
+    Disc,
+    Model,
+    Rotor,
+    Support,
+    too_short,
+)
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table

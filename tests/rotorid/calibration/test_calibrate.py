@@ -107,20 +107,6 @@ def test_exact_data_give_the_numbers_back(rotor, values, more):
         assert found.unbalance[0] == pytest.approx(list(runs.unbalance.values()), rel=1e-6)
 
 
-@pytest.mark.full
-def test_several_jobs_with_unbalances_of_their_own():
-    values = {"bearing[1].kxx": 4.6e7, "bearing[2].cyy": 2.4e4, "material.youngs_modulus.scale": 1.03}
-    truth = with_parameters(machine(), values)
-    first = Runs(free=False, speeds=(140.0, 300.0, 420.0))
-    second = Runs(free=False, unbalance={4: 1e-3j}, weights=((0, 0), (0, 2e-3)), speeds=(200.0, 350.0))
-    jobs = [each.data(each.readings(truth), errors=ERRORS) for each in (first, second)]
-    found = calibrate(machine(), off(machine(), values), jobs)
-    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
-    assert [u.tolist() for u in found.unbalance] == [
-        pytest.approx(list(each.unbalance.values()), rel=1e-6) for each in (first, second)
-    ]
-
-
 def test_an_unknown_bow():
     """Without it the bent shaft pulls the numbers away, and the model does not explain its readings."""
     values = {"bearing[1].kxx": 4.6e7, "bearing[2].cyy": 2.4e4}
@@ -423,18 +409,4 @@ def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
     runs = Runs(unbalance={})
     data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
     found = calibrate(rotor, [Unknown(path) for path in values], [data])
-    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
-
-
-@pytest.mark.full
-def test_critical_speeds_over_bearing_tables():
-    tables = [
-        replace(s, speeds=(1.0, 300.0, 800.0, 3000.0), stiffness=[3e7, 5e7, 9e7, 1.2e8])
-        for s in rotor23().supports
-    ]
-    rotor = replace(rotor23(), supports=tables)
-    values = {"bearing[1].stiffness.scale": 1.2, "bearing[2].stiffness.scale": 0.85}
-    speeds = fem.critical_speeds(with_parameters(rotor, values), 2).frequencies
-    data = MeasuredFrequencies(np.arange(1, 3), speeds, 1e-4 * speeds)
-    found = calibrate(rotor, [Unknown(path) for path in values], frequencies=[data], starts=1)
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)

@@ -1,7 +1,6 @@
 """`rotorid calibrate`: files and options in, numbers or one clear complaint out, and nothing half written."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,23 +46,6 @@ def critical(folder, k1=7e7, k2=1.4e8, head="mode,critical_speed_rpm"):
     path = folder / "critical.csv"
     path.write_text("\n".join([head, *(f"{k},{v:.0f}" for k, v in enumerate(speeds, 1))]) + "\n")
     return path
-
-
-def test_two_stiffnesses_from_three_rounded_critical_speeds(cli, folder):
-    told = cli("calibrate", ROTOR23, critical(folder), "--estimate", f"{TWO}", "--exact", "--json")
-    assert (told.code, told.err) == (0, "")
-    document = told.json
-    for path, truth in zip(TWO.split(","), (7e7, 1.4e8), strict=True):
-        found = document["parameters"][path]
-        assert found["ci95"][0] < truth < found["ci95"][1]
-        assert found["std"] < 0.01 * truth
-    assert document["explained"]
-    assert document["degrees_of_freedom"] == 1
-    read = [Path(entry["file"]).name for entry in document["provenance"]["inputs"]]
-    assert read == ["rotor23.csv", "critical.csv"]
-    text = cli("calibrate", ROTOR23, critical(folder), "--estimate", TWO, "--exact").out
-    assert text.startswith("The model explains the data")
-    assert "modes count the forward critical speeds" in text
 
 
 def test_a_table_of_modes_at_rest(cli, folder):
@@ -249,25 +231,8 @@ def test_critical_speeds_and_an_estimate_that_doubles_them(cli, folder):
     assert "bearing[1].kxx alone makes supports differ in x and y" in told.err
 
 
-def test_a_design_of_the_sample(cli, folder):
+def test_a_design_writes_no_rotor(cli, folder):
     args = "calibrate", COMPRESSOR, TRIAL, "--estimate", "bearing[*].kxx", "--prior", "bearing[*].kxx=20%"
-    told = cli(
-        *args,
-        "--estimate",
-        "bearing[*].kxx.scale",
-        "--design",
-        "2",
-        "--speeds",
-        "2000:6000:1000rpm",
-        "--json",
-    )
-    assert told.code == 0, told.err
-    assert len(told.json["runs"]) == 2
-    assert [p["parameter"] for p in told.json["parameters"]] == [
-        "bearing[1].kxx.scale",
-        "bearing[2].kxx.scale",
-    ]
-    assert all(p["std_after"] < p["std_before"] == 0.2 for p in told.json["parameters"])
     refused = cli(*args, "--estimate", "bearing[*].kxx.scale", "--design", "2", "--output", "new.toml")
     assert refused.code == 2
     assert "new.toml: --design finds no rotor; a table of the runs is .csv or .xlsx" in refused.err

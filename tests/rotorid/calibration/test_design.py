@@ -81,14 +81,3 @@ def test_limits(n):
     _, data = candidates()
     with pytest.raises(ValueError, match=f"--design {n}: from 1 to 6 of the 6 candidates can be chosen"):
         design(machine(), UNKNOWNS, WISHED, data, n)
-
-
-def test_the_answer_says_where_to_run():
-    _, data = candidates()
-    found = design(machine(), UNKNOWNS, WISHED, data, 2)
-    document = found.to_dict()
-    assert [run["plane"] for run in document["runs"]] == list(found.planes)
-    assert [p["parameter"] for p in document["parameters"]] == WISHED
-    for speed, plane in zip(found.speeds, found.planes, strict=True):
-        assert f"{speed * 30 / np.pi:.5g}" in found.answer.judgement
-        assert plane in found.answer.judgement

@@ -7,19 +7,15 @@ coefficients, from the same three runs, estimate them at best.
 from __future__ import annotations
 
 import importlib.util
-import re
-import shlex
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from repetitions import FULL
 
-from rotorid import read_job, read_rotor
+from rotorid import read_job
 from rotorid.samples import sample_data
-from rotorid.workflows.calibration.calibrate import CalibrateOptions, calibrate
 from rotorid.workflows.coefficients import choose
 
 FOLDER = sample_data() / "rk4"
@@ -47,17 +43,6 @@ def estimates(rpm, kind, rotor=None, method="weighted"):
     all_ = [example().estimated(coefficients, one, method) for one in example().others(rpm).values()]
     assert len(all_) == 8
     return all_, np.sqrt(np.mean([each.errors**2 for each in all_], axis=0))
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("method", ["weighted", "least-squares"])
-@pytest.mark.parametrize("rpm", SPEEDS)
-@pytest.mark.parametrize("speeds", [SPEEDS, (1206,), (1005,)], ids=str)
-def test_weights_of_other_runs_at_both_speeds_also_from_the_other_one_alone(speeds, rpm, method):
-    runs, (disc_1, disc_2, both) = estimates(rpm, "computed", found(speeds).rotor, method)
-    assert both <= SUM
-    assert max(disc_1, disc_2) <= PUBLISHED
-    assert np.all([each.inside for each in runs])  # 24 regions of 95 %
 
 
 @pytest.mark.parametrize("rpm", SPEEDS)
@@ -92,45 +77,6 @@ def test_what_the_runs_determine_and_what_not():
     assert determined == {*gains, "bearing.tilting_stiffness", "key_phasor.angle"}
     unknown = {name for name, value in share.items() if value < 0.05}
     assert {"bearing.kxx", "bearing.kyy", "bearing.cxx", "bearing.cyy"} <= unknown
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("stiffness", [1e6, 7e4] if FULL else [7e4])
-def test_the_runs_contradict_a_distance_of_480_mm_between_the_bearings(stiffness):
-    assert not found(SPEEDS, 480, stiffness).explained
-    assert found(SPEEDS, 480, stiffness).chi_square > found(SPEEDS).chi_square + 40
-
-
-@pytest.mark.full
-def test_they_do_not_contradict_bearings_five_times_as_soft():
-    assert found(SPEEDS, 560, 2e5).explained
-    assert abs(found(SPEEDS, 560, 2e5).chi_square - found(SPEEDS).chi_square) < 4
-
-
-@pytest.mark.full
-def test_other_starts_end_at_the_same_numbers():
-    start = read_rotor(FOLDER / "rotor.toml")
-    files = [FOLDER / name for name in ("few.toml", "few_1005.toml")]
-    options = CalibrateOptions(estimate=example().ESTIMATE, prior=example().PRIOR, starts=10 if FULL else 5)
-    again = calibrate(start, files, options).found
-    assert again.other_ends == ()
-    assert again.chi_square == pytest.approx(found(SPEEDS).chi_square, rel=1e-6)
-    assert (np.abs(again.values - found(SPEEDS).values) < 1e-3 * found(SPEEDS).std).all()
-
-
-@pytest.mark.full
-def test_the_command_of_the_sample_makes_its_calibrated_rotor(tmp_path, cli, monkeypatch):
-    (line,) = re.findall(r"^rotorid (calibrate .*)$", (FOLDER / "README.md").read_text("utf-8"), re.MULTILINE)
-    monkeypatch.chdir(FOLDER)
-    words = shlex.split(line)
-    assert cli(*words[:-1], str(tmp_path / words[-1])).code == 0
-    new, kept = (read_rotor(folder / "calibrated.toml") for folder in (tmp_path, FOLDER))
-    assert new.calibration.names == kept.calibration.names
-    np.testing.assert_allclose(new.calibration.values, kept.calibration.values, rtol=1e-7)
-    np.testing.assert_allclose(new.calibration.std, kept.calibration.std, rtol=1e-6)
-    np.testing.assert_allclose(new.calibration.correlation, kept.calibration.correlation, atol=1e-6)
-    assert new.calibration.data == kept.calibration.data
-    assert {*words} >= {example().ESTIMATE, example().PRIOR}
 
 
 @pytest.mark.parametrize(("few", "all_"), [("few.toml", "job.toml"), ("few_1005.toml", "job_1004.toml")])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from helpers.calibration.jobs import Runs, bent, machine
 from scipy.linalg import eigh
-from scipy.stats import chi2
 
 import fem
 from balancing.coefficients.run_error_estimate import given
@@ -151,32 +150,6 @@ def test_errors_that_are_assumed_are_not_called_stated():
     noise = 1 + 0.01 * np.random.default_rng(1).standard_normal((4, *exact.shape))
     assert not runs.data(exact * noise).rows(W).stated  # the repeats say nothing of errors between runs
     assert runs.data(exact * noise, errors=ERRORS).rows(W).stated
-
-
-@pytest.mark.parametrize("free", [True, False])
-def test_chi_square_of_simulated_readings(free):
-    """Of readings with the stated errors, common ones of runs included: mean and quantiles of χ²."""
-    runs, rng, draws = Runs(free=free, speeds=(150.0, 380.0)), np.random.default_rng(11), 400
-    rotor, scatter = machine(), RunScatter(0.03)
-    exact = runs.readings(rotor)
-    W = coefficients_of(runs, rotor)
-    sizes = given([], runs_of(exact, np.array(runs.weights), W[..., :2]), *scatter, "stated").sizes
-    data = runs.data(exact, errors=ReadingErrors(0.01, 0.01), run_errors=scatter)
-    white, found = data.rows(W).white, []
-
-    def noise(*shape):
-        return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
-
-    p = sizes[0]
-    for _ in range(draws):
-        common = p[0] * noise(3, 2, 4) + p[1] * noise(3, 2, 1) + p[2] * noise(3, 1, 1)
-        Y = exact * (1 + common + 0.01 * noise(*exact.shape))
-        rows = replace(data.rows(W), data=runs.data(Y, errors=data.trials.errors), white=white)
-        found.append(float(np.sum(rows.residual(W)[0] ** 2)))
-    dof = data.size - (0 if free else 2 * len(runs.unbalance))
-    assert np.mean(found) == pytest.approx(dof, abs=4 * np.sqrt(2 * dof / draws))
-    outside = np.mean(np.array(found) > chi2.ppf(0.9, dof))
-    assert outside == pytest.approx(0.1, abs=4 * np.sqrt(0.1 * 0.9 / draws))
 
 
 def test_unbalances_of_the_bare_rotor_are_found_beside():

@@ -15,99 +15,25 @@ FIT = (SAMPLES / "fit/quasilinearization/model.toml", SAMPLES / "fit/quasilinear
 
 
 @pytest.mark.parametrize(
-    ("command", "judgement"),
+    ("command", "line", "judgement"),
     [
-        (
-            ("critical", COMPRESSOR, "-n", 2, "--operating", "4200:6500rpm"),
-            ["2 critical speeds without damping: 4066.84 and 4375.19 rpm.",
-             "INSIDE the operating range 4200 to 6500 rpm: 4375.19 rpm."],
-        ),
-        (
-            ("critical", COMPRESSOR, "-n", 2, "--operating", "5300:6500rpm"),
-            ["2 critical speeds without damping: 4066.84 and 4375.19 rpm.",
-             "NOT KNOWN whether a critical speed lies in the operating range 5300 to 6500 rpm: only speeds"],
-        ),
-        (
-            ("critical", ROTOR, "--operating", "1910:2865rpm"),
-            ["3 critical speeds without damping: 1291.45, 5163.62 and 11113.5 rpm.",
-             "None lies in the operating range 1910 to 2865 rpm; the nearest, 1291.45 rpm, is 32.4 % away."],
-        ),
-        (
-            ("campbell", ROTOR, "--speeds", "100:300:20", "-n", 2, "--operating", "200:600"),
-            ["Stable: no motion grows.", "From 954.93 to 2864.79 rpm",
-             "NOT KNOWN whether a critical speed lies in the operating range 1909.86 to 5729.58 rpm: only"],
-        ),
-        (
-            (*RESPONSE, "--speeds", "2000:6000:500rpm", "--operating", "5800:6500rpm"),
-            ["NOT KNOWN whether all are far enough from the operating range, 5800 to 6500 rpm (API 684): "],
-        ),
-        (
-            ("critical", COMPRESSOR, "-n", 4, "--operating", "5300:6500rpm"),
-            ["4 critical speeds without damping: ",
-             "None lies in the operating range 5300 to 6500 rpm; the nearest, 4375.19 rpm, is 17.4 % away."],
-        ),
-        (
-            ("campbell", COMPRESSOR, "--speeds", "1000:15000:1000rpm"),
-            ["UNSTABLE above 10932.4 rpm: a motion grows there.",
-             "From 1000 to 15000 rpm (104.72 to 1570.8 rad/s): 4 damped critical speeds, 2 more"],
-        ),
-        (
-            (*RESPONSE, "--speeds", "2000:8000:500rpm", "--operating", "4800:6500rpm"),
-            ["NOT far enough from the operating range, 4800 to 6500 rpm (API 684): critical speed 4"],
-        ),
-        (
-            (*RESPONSE, "--speeds", "3000,4000rpm"),
-            ["Too few speeds to find a peak: at 2 speeds from 3000 to 4000 rpm "],
-        ),
-        (
-            ("reduce", ROTOR, "--nodes", "2,3,4", "--modes", 1),
-            ["3 equivalent masses from the first mode, formula (50), together ",
-             "NO physical model, a mass is not positive; condition number "],
-        ),
-        (
-            ("fit", *FIT, "--max-iterations", 1),
-            ["No estimates: the values are where the search stopped."],
-        ),
-        (
-            ("identify", SAMPLES / "identify/task_4_1/model.toml", SAMPLES / "identify/task_4_1/data.csv"),
-            ["Only c and b*(1 - delta) are determined; b and delta by themselves are not. Method: linear"],
-        ),
+        (("critical", COMPRESSOR, "-n", 2, "--operating", "4200:6500rpm"), 1, "INSIDE"),
+        (("critical", COMPRESSOR, "-n", 2, "--operating", "5300:6500rpm"), 1, "NOT KNOWN"),
+        (("critical", COMPRESSOR, "-n", 4, "--operating", "5300:6500rpm"), 1, "None lies"),
+        (("campbell", ROTOR, "--speeds", "100:300:20", "-n", 2), 0, "Stable"),
+        (("campbell", COMPRESSOR, "--speeds", "1000:15000:1000rpm"), 0, "UNSTABLE above 10932.4 rpm"),
+        ((*RESPONSE, "--speeds", "2000:6000:500rpm", "--operating", "5800:6500rpm"), 0, "NOT KNOWN"),
+        ((*RESPONSE, "--speeds", "2000:8000:500rpm", "--operating", "4800:6500rpm"), 0, "NOT far enough"),
+        ((*RESPONSE, "--speeds", "3000,4000rpm"), 0, "Too few speeds"),
+        (("reduce", ROTOR, "--nodes", "2,3,4", "--modes", 1), 1, "NO physical model"),
+        (("fit", *FIT, "--max-iterations", 1), 0, "No estimates"),
     ],
-)  # fmt: skip
-def test_the_judgement_comes_first(cli, command, judgement):
+)
+def test_the_judgement_comes_first(cli, command, line, judgement):
     lines = cli(*command).out.splitlines()
-    for line, said in zip(lines, judgement, strict=False):
-        assert line.startswith(said)
+    assert lines[line].startswith(judgement)
     assert len(lines) <= 24
     assert max(map(len, lines)) <= 100
-
-
-@pytest.mark.full
-def test_one_peak_of_each_critical_speed_and_all_behind_them(cli):
-    command = (*RESPONSE, "--speeds", "1000:10000:50rpm", "--operating", "4800:6500rpm")
-    document = cli(*command, "--json").json
-    brief, whole = cli(*command).out, cli(*command, "--table").out
-    near = max((p for p in document["peaks"] if p["enough"] is False), key=lambda p: p["amplitude"])
-    assert brief.count("NOT ENOUGH") == 1
-    (line,) = [line for line in brief.splitlines() if "NOT ENOUGH" in line]
-    assert line.split()[:4] == [
-        *near["sensor"].split(),
-        f"{near['speed_rpm']:.2f}",
-        f"{near['speed_rad_s']:.4f}",
-    ]
-    assert whole.count("NOT ENOUGH") == 1 + sum(p["enough"] is False for p in document["peaks"])
-    assert "largest force, N" in whole
-    assert "largest force, N" not in brief
-
-
-def test_what_a_fit_leaves_of_the_record_is_its_residual(cli):
-    """The sample has noise of 0.02 on outputs of this size."""
-    rows = [line.split(",")[1:] for line in FIT[1].read_text(encoding="utf-8").splitlines()[1:]]
-    data = [float(y) for row in rows for y in row]
-    rms = (sum(y * y for y in data) / len(data)) ** 0.5
-    found = cli("fit", *FIT)
-    residual = cli("fit", *FIT, "--json").json["residual_rms"]
-    assert f"The model leaves {100 * residual / rms:.2g} % of the record (rms)." in found.out
 
 
 def test_warnings_come_last_one_of_each_kind_and_numerical_ones_first(cli, monkeypatch):

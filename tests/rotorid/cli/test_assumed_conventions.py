@@ -22,9 +22,7 @@ Y0 = -W @ BEST
 
 ON_AXIS = [{}, {"left": (3, 0)}, {"right": (4, 180)}]
 OFF_AXIS = [{}, {"left": (3, 40)}, {"right": (4, 250)}]
-IN_LINE = [*OFF_AXIS, {"left": (2, 220)}, {"left": (1, 40), "right": (3, 70)}]
 TELLING = [*OFF_AXIS, {"left": (3, 150)}, {"right": (4, 10)}]
-OPPOSITE = {"lead": "lag", "lag": "lead", "with": "against", "against": "with"}
 
 
 def shop(folder, runs, phase="lead", angles="with", noise=0.0, seed=0):
@@ -80,27 +78,6 @@ def test_one_of_both_answers_is_right(cli, tmp_path, runs, phase, angles):
             assert (one["angle_deg"] + two["angle_deg"] + 180) % 360 == pytest.approx(180, abs=1e-6)
 
 
-def test_the_first_lines_say_so(cli, tmp_path):
-    files = shop(tmp_path, ON_AXIS)
-    text = cli("balance", *files, "--amplitude-error", 1, "--phase-error", 1).out
-    assert text.startswith("Mount these weights, if phases lead as assumed: ")
-    first = " ".join(text.split("\nWarning: ")[1].split())
-    assert first.startswith("Neither the job nor the command line says whether phases lead or lag; lead is")
-    assert "The runs cannot tell: none is more than the planes need." in first
-    assert "If it is lag, the weights go to the angles under “if lag”" in first
-    head = next(line for line in text.splitlines() if line.strip().startswith("plane"))
-    assert "  if lag  add if 'r2' stays" in head
-    document = cli("balance", *files, "--json").json
-    rows = [line for line in text.splitlines() if line.strip().startswith(PLANES)]
-    for row, line in zip(document["other_readings"], rows, strict=False):
-        assert f"{row['angle_deg']:.1f}°" in line
-    assert "phases as lead (phase assumed)" in text
-    assert max(map(len, text.splitlines())) <= 100
-    assert document["assumptions"][0] in first
-    whole = cli("balance", *files, "--amplitude-error", 1, "--phase-error", 1, "--table").out
-    assert "\nTo add to that if it is lag (g): left " in whole[: whole.index("\nVibration")]
-
-
 @pytest.mark.parametrize("runs", [ON_AXIS, OFF_AXIS])
 @pytest.mark.parametrize(("phase", "angles"), [("lead", "with"), ("lag", "against")])
 def test_what_is_stated_is_not_said_again(cli, tmp_path, runs, phase, angles):
@@ -108,24 +85,17 @@ def test_what_is_stated_is_not_said_again(cli, tmp_path, runs, phase, angles):
     outcome = cli("balance", *files, *said(phase, None if runs is ON_AXIS else angles), "--json")
     assert outcome.json["conventions"]["assumed"] == outcome.json["assumptions"] == []
     assert outcome.json["other_readings"] == []
-    text = cli("balance", *files, *said(phase, angles)).out
-    assert text.startswith("Mount these weights: ")
-    assert "assumed)" not in text[: text.index("Largest predicted")]
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (("lead", None), "says how angles count; with rotation is assumed"),
-        ((None, "against"), "says whether phases lead or lag; lead is assumed"),
-        ((None, None), "says whether phases lead or lag and how angles count; lead and with rotation are"),
-    ],
+    ("given", "assumed"),
+    [(("lead", None), ["angles"]), ((None, "against"), ["phase"]), ((None, None), ["phase", "angles"])],
 )
-def test_each_word_that_is_missing_is_named(cli, tmp_path, given, words):
+def test_each_word_that_is_missing_is_named(cli, tmp_path, given, assumed):
     """The other reading is what the command prints with the other word."""
     files = shop(tmp_path, OFF_AXIS)
     document = cli("balance", *files, *said(*given), "--json").json
-    assert words in document["assumptions"][0]
+    assert document["conventions"]["assumed"] == assumed
     phase, angles = given
     turned = ("lag", angles) if phase is None else (phase, "against")
     expected = cli("balance", *files, *said(*turned), "--json").json["corrections"]
@@ -154,24 +124,11 @@ def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
         test = outcome.json["convention_test"]
         assert test["verdict"] == "contradicted"
         assert test["chi_square"] > 10 * test["chi_square_other"]
-        assert outcome.json["warnings"][0].startswith(
-            f"these runs contradict '{own}': χ² {test['chi_square']:.3g} of {test['degrees_of_freedom']}; "
-            f"'{other}' fits: {test['chi_square_other']:.3g}"
-        )
-        text = cli("balance", *files, *said(*given), *errors).out
-        assert text.startswith(f"Warning: these runs contradict '{own}'")
+        assert outcome.json["warnings"][0].startswith(f"these runs contradict '{own}'")
+        assert f"'{other}' fits" in outcome.json["warnings"][0]
         if given[0] is None:
-            assert "The runs contradict it" in " ".join(text.split())
             right = on_the_tape(outcome.json["other_readings"], "with")
             np.testing.assert_allclose(right, BEST, atol=0.1 * np.abs(BEST).max())
-
-
-def test_angles_that_the_runs_contradict_are_named(cli, tmp_path):
-    files = shop(tmp_path, TELLING, "lead", "against", noise=0.02)
-    outcome = cli("balance", *files, "--phase", "lead", "--json")
-    words = outcome.json["warnings"][0] if outcome.code == 0 else outcome.err
-    assert "these runs contradict 'with rotation'" in words
-    assert "'against rotation' fits" in words
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -185,9 +142,6 @@ def test_redundant_runs_confirm(cli, tmp_path, seed, phase, given):
     name = "lead" if given[0] is None else "with rotation"
     assert document["assumptions"][1].startswith(f"The runs themselves confirm '{name}': χ² ")
     assert not any("contradict" in words for words in document["warnings"])
-    text = cli("balance", *files, *said(phase, "with")).out
-    assert text.startswith("Mount these weights: ")
-    assert "assumed)" not in text[: text.index("Largest predicted")]
 
 
 def test_both_assumed_and_confirmed_needs_no_other_angles(cli, tmp_path):
@@ -231,9 +185,7 @@ def test_a_check_run_is_asked_too(cli, tmp_path, assumed):
     document = cli("balance", job, "--json").json
     assert document["convention_test"]["verdict"] == "contradicted"
     assert document["warnings"][0].startswith("these runs contradict 'lead'")
-    lines = cli("balance", job).out.splitlines()
-    assert lines[0].startswith("Do not mount anything yet: these runs contradict 'lead'")
-    assert not any(line.startswith("Warning: these runs contradict") for line in lines)
+    assert cli("balance", job).out.startswith("Do not mount anything yet: ")
 
 
 def test_stored_coefficients(cli, tmp_path):
@@ -262,54 +214,11 @@ def test_pieces_the_sheet_and_the_workbook_say_so(cli, tmp_path):
     job, page, book = tmp_path / "job.toml", tmp_path / "sheet.html", tmp_path / "sheet.xlsx"
     planes = "".join(f"[planes.{p}]\nholes = 8\navailable_g = [1, 2]\n" for p in PLANES)
     job.write_text('runs = "runs.csv"\nweights = "weights.csv"\n' + planes, encoding="utf-8")
-    outcome = cli("balance", job, "--split", "--report", page, "--output", book)
-    assert "For phase and angles as assumed: if that is otherwise, state it" in " ".join(outcome.out.split())
-    text = page.read_text(encoding="utf-8")
-    assert text.index("Neither the job nor the command line says") < text.index("What the angles mean")
-    assert "<strong>If lag or against:</strong>" in text
-    assert text.count("Assumed: neither the job nor the command line says so.") == 2
+    cli("balance", job, "--split", "--report", page, "--output", book)
+    assert "<strong>If lag or against:</strong>" in page.read_text(encoding="utf-8")
     sheets = openpyxl.load_workbook(book)
-    said = [str(row[0]) for row in sheets["results"].iter_rows(values_only=True)]
-    assert any(line.startswith("# Neither the job nor the command line says") for line in said)
     assert sheets["results other readings"].max_row == 4
     assert cli("balance", book, "--json").json["conventions"]["assumed"] == ["phase", "angles"]
-
-
-def test_the_form_asks(cli, tmp_path):
-    """A form in which nobody has chosen is refused, with the words to choose from."""
-    form = tmp_path / "job.xlsx"
-    assert cli("balance", "--template", form).code == 0
-    book = openpyxl.load_workbook(form)
-    for name in ("runs", "weights"):
-        lines = [line.split(",") for line in shop(tmp_path, OFF_AXIS)[name == "weights"].read_text().split()]
-        for number, line in enumerate(lines, start=1):
-            for place, cell in enumerate(line, start=1):
-                number_cell = number > 1 and lines[0][place - 1] not in ("run", "sensor", "plane")
-                book[name].cell(number, place).value = float(cell) if number_cell else cell
-    book.save(form)
-    outcome = cli("balance", form)
-    assert outcome.code == 2
-    assert "found 'lead or lag?', expected 'lead' or 'lag'" in outcome.err
-    assert "found 'which way?', expected 'with rotation', 'against rotation'" in outcome.err
-    keys = [cell.value for cell in book["settings"]["A"]]
-    for key, value in (("phase", "lead"), ("angles", "with rotation")):
-        book["settings"].cell(keys.index(key) + 1, 2).value = value
-    book.save(form)
-    assert cli("balance", form, "--json").json["conventions"]["assumed"] == []
-    job = tmp_path / "job.toml"
-    job.write_text('runs = "runs.csv"\nweights = "weights.csv"\nphase = ""\n', encoding="utf-8")
-    assert "key phase: found nothing (a blank), expected 'lead' or 'lag'" in cli("balance", job).err
-
-
-def test_a_refusal_names_the_contradiction(cli, tmp_path):
-    """Four weights a quarter turn apart, read the wrong way, seem to do nothing at all."""
-    around = [{plane: (3, angle)} for plane in PLANES for angle in (0, 90, 180, 270)]
-    files = shop(tmp_path, [{}, *around], "lag", noise=0.02)
-    outcome = cli("balance", *files)
-    assert outcome.code == 2
-    assert "its effect is not determined" in outcome.err
-    assert "these runs contradict 'lead'" in outcome.err
-    assert cli("balance", *files, "--phase", "lag").code == 0
 
 
 def test_computed_coefficients(cli, tmp_path):
@@ -326,11 +235,3 @@ def test_computed_coefficients(cli, tmp_path):
     expected = cli("balance", tmp_path / "job.toml", "--phase", "lag", "--json").json["corrections"]
     for row, other in zip(expected, document["other_readings"], strict=True):
         assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
-    trial = cli("trial-weight", tmp_path / "job.toml", "--plane", "middle").out
-    assert "lead is assumed" in " ".join(trial.split())
-
-
-def test_sample_jobs_state_their_conventions(cli):
-    for job in sorted(sample_data().glob("*/*.toml")):
-        if job.stem in ("job", "holes", "checked"):
-            assert cli("balance", job, "--json").json["assumptions"] == [], job

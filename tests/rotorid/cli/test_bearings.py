@@ -48,30 +48,6 @@ def test_the_threshold_does_not_depend_on_the_steps(cli):
     assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
 
 
-@pytest.mark.full
-def test_the_linear_rotor_is_read_by_the_other_commands(cli, tmp_path):
-    linear = tmp_path / "linear.toml"
-    speeds = ",".join(map(str, [*range(600, 9001, 400), 6405, 6409])) + "rpm"
-    outcome = cli("bearings", ROTOR, "--speeds", speeds, "--output", linear)
-    assert outcome.code == 0
-    assert outcome.out.count("written: ") == 4
-    rotor = read_rotor(linear)
-    assert [s.name for s in rotor.supports] == ["left", "right"]
-    made = bearings(ROTOR, BearingsOptions(speeds=speeds))
-    assert made.linear == rotor
-    assert cli("critical", linear, "-n", 1, "--json").code == 0
-    whirl = cli("campbell", linear, "--speeds", "600:9000:400rpm", "--json").json
-    # coefficients are linear between the speeds of the table: near the threshold they are close
-    assert whirl["unstable"][0]["speed_rpm"] == pytest.approx(made.stability.threshold * 30 / np.pi, rel=1e-6)
-    weights = tmp_path / "unbalance.csv"
-    weights.write_text("plane,unbalance_g_mm,angle_deg\n12,1000,0\n")
-    response = cli("response", linear, "--unbalance", weights, "--speeds", "800:6000:100rpm", "--json")
-    assert 1150 < response.json["largest"][0]["speed_rad_s"] * 30 / np.pi < 1400
-    table = tmp_path / "bearings.csv"
-    cli("bearings", ROTOR, *SPEEDS, "--output", table)
-    assert len(pd.read_csv(table)) == 18
-
-
 def test_gravity_turns_everything_with_it(cli):
     down, aside = (
         cli("bearings", ROTOR, *SPEEDS, "--gravity-direction", angle, "--json").json for angle in (-90, 0)
@@ -83,15 +59,6 @@ def test_gravity_turns_everything_with_it(cli):
     assert down["stability"]["threshold_rad_s"] == pytest.approx(
         aside["stability"]["threshold_rad_s"], rel=1e-6
     )
-
-
-def test_the_picture_shows_loci_and_map():
-    found = bearings(ROTOR, BearingsOptions(speeds="1000:9000:2000rpm"))
-    axes = found.figure().axes
-    assert [ax.get_xlabel() for ax in axes[:2]] == ["x by clearance", "eccentricity by clearance"]
-    loci = [line for line in axes[0].get_lines() if line.get_label() in ("left", "right")]
-    x, y = loci[0].get_data()
-    assert np.hypot(x, y) == pytest.approx([at.eccentricity[0] for at in found.found])
 
 
 def test_other_forces_are_listed_and_explained():
@@ -113,15 +80,6 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     found = bearings(light, BearingsOptions(speeds=[100.0]))
     assert found.found[0].eccentricity == pytest.approx(0)
     assert "no load" in [text.get_text() for text in found.figure().axes[0].texts]
-
-
-def test_one_speed_alone(cli, tmp_path):
-    outcome = cli("bearings", ROTOR, "--speeds", "3000rpm", "--plot", tmp_path / "one.png")
-    assert outcome.out.startswith("One speed: no threshold is sought.")
-    assert cli("bearings", ROTOR, "--speeds", "3000rpm", "--json").json["stability"] is None
-    outcome = cli("bearings", ROTOR, "--speeds", "3000rpm", "--output", tmp_path / "linear.toml")
-    assert (outcome.code, list(tmp_path.glob("*.toml"))) == (2, [])
-    assert "a table over speed needs two speeds at least (--speeds)" in outcome.err
 
 
 @pytest.mark.parametrize(
@@ -148,6 +106,7 @@ def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):
     [
         (("--speeds", "0:1000:500rpm"), "speed 0: the journal bearing 'left' at node 2 carries nothing"),
         ((*SPEEDS, "--gravity-direction", "400"), "--gravity-direction: '400.0' is no angle"),
+        (("--speeds", "3000rpm", "--output", "linear.toml"), "needs two speeds at least (--speeds)"),
         ((*SPEEDS, "--output", "linear.txt"), "the name must end in .csv, .xlsx, .toml"),
     ],
 )

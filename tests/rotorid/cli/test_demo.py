@@ -65,34 +65,6 @@ def test_a_sample_runs_and_writes_its_pictures(demo, name):
     assert not any("make_" in file for file in files)
 
 
-@pytest.mark.full
-def test_the_commands_are_those_a_user_would_type(cli, tmp_path):
-    folder = tmp_path / "a folder"
-    outcome = cli("demo", folder, "--sample", "holes")
-    lines = outcome.out.replace(" \\\n    ", " ").splitlines()
-    typed = {lines[k]: lines[k + 1] for k in range(len(lines)) if lines[k].startswith("$ ")}
-    assert len(typed) == len(SAMPLES["holes"].steps)
-    every = cli("demo", folder, "--sample", "holes", "--table").out
-    for line, first in typed.items():
-        command = shlex.split(line.removeprefix("$ "))
-        assert command[0] == "rotorid"
-        again = cli(*command[1:])
-        assert again.code == 0
-        assert again.out in every
-        assert again.out.splitlines()[0] == first
-
-
-@pytest.mark.parametrize(
-    "name", ["main", "rotor", "reduction", "identification", "record", "calibration", "waveforms"]
-)
-def test_a_demo_fits_a_terminal_and_shows_the_judgement_of_each_command(demo, name):
-    lines = demo(name)[0].out.splitlines()
-    assert len(lines) <= 24
-    assert max(map(len, lines)) <= 100
-    for number, step in enumerate(SAMPLES[name].steps, start=1):
-        assert f"{number}. {step.title}" in lines
-
-
 def test_the_license_of_a_sample_goes_with_it(cli, tmp_path):
     assert cli("demo", tmp_path, "--sample", "rig").code == 0
     assert "MIT License" in (tmp_path / "rk4" / "LICENSE.txt").read_text(encoding="utf-8")

@@ -37,13 +37,6 @@ def test_inputs_are_never_overwritten(cli, job, option, name):
         assert {path: path.read_bytes() for path in job.iterdir()} == before
 
 
-def test_a_rotor_table_is_not_overwritten(cli, job):
-    outcome = cli("critical", job / "rotor.csv", "--output", job / "rotor.csv")
-    assert outcome.code == 2
-    assert "must not be overwritten" in outcome.err
-    assert (job / "rotor.csv").read_bytes() == ROTOR.read_bytes()
-
-
 def test_two_results_need_two_files(cli, job):
     outcome = cli("balance", job / "job.toml", "--output", job / "s.csv", "--save-influence", job / "s.csv")
     assert outcome.code == 2
@@ -81,19 +74,6 @@ def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, mon
     assert outcome.code == 2
     assert outcome.err == f"rotorid: {job / 'i.csv'}: expected a file that can be written (No space left on device)\n"  # fmt: skip  # noqa: E501
     assert sorted(job.iterdir()) == before
-
-
-@pytest.mark.full
-def test_demo_keeps_what_people_changed(cli, tmp_path):
-    folder = tmp_path / "d"
-    assert cli("demo", folder, "--sample", "holes").code == 0
-    assert cli("demo", folder, "--sample", "holes").code == 0  # make demo, again
-    mine = folder / "turbo_job" / "job.toml"
-    mine.write_text("mine", encoding="utf-8")
-    outcome = cli("demo", folder, "--sample", "holes")
-    assert outcome.code == 2
-    assert f"{mine}: differs from the sample and would be overwritten; delete it" in outcome.err
-    assert mine.read_text(encoding="utf-8") == "mine"
 
 
 def test_demo_does_not_write_into_the_sample_data(cli, tmp_path):
@@ -160,15 +140,13 @@ def test_speeds_of_balance_are_in_the_unit_of_the_job(cli):
         ("20Hz,60rpm", [40 * np.pi, 2 * np.pi]),
         ("100 rad/s, 60rpm", [100.0, 2 * np.pi]),
         ("60rpm:120rpm:60rpm", [2 * np.pi, 4 * np.pi]),
+        ("1:2:1Hz", [2 * np.pi, 4 * np.pi]),
+        ("100:140:30", [100.0, 130.0]),
+        ("0:0.3:0.1", [0.0, 0.1, 0.2, 0.3]),
     ],
 )
 def test_a_unit_at_each_speed(text, expected):
     assert speeds(text) == pytest.approx(expected)
-
-
-def test_speeds_without_a_unit():
-    assert speeds("60,120", "rpm") == pytest.approx([2 * np.pi, 4 * np.pi])
-    assert speeds("60rad_s", "rpm") == [60.0]
 
 
 @pytest.mark.parametrize(
@@ -203,24 +181,6 @@ def test_dependent_planes_end_with_status_2(cli, tmp_path):
         outcome = cli("balance", *files, *options, "--json")
         assert (outcome.code, outcome.out) == (2, "")
         assert "planes 'L' and 'R' act alike at every sensor and speed" in outcome.err
-
-
-def test_reduce_writes_masses_and_modes_apart(cli, tmp_path):
-    import pandas as pd
-
-    table = tmp_path / "t.csv"
-    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", "2", "--output", table).code == 0
-    frame = pd.read_csv(table)
-    assert frame["table"].tolist() == ["masses"] * 3 + ["modes"] * 3
-    assert table.read_text(encoding="utf-8").splitlines()[1].startswith("masses,7,0.973,134.2")
-    assert frame["mode"].dropna().tolist() == [1, 2, 3]
-
-
-def test_reduce_speaks_as_the_other_commands(cli):
-    text = cli("reduce", ROTOR, "--nodes", "3,7,12", "--modes", "1").out
-    assert "warning:" not in text
-    assert "Warning: " in text
-    assert "e+0" not in text
 
 
 def test_speeds_of_vectors_without_a_unit_are_rad_s_as_of_other_commands(cli):

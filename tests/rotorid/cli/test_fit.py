@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from rotorid.samples import sample_data
@@ -62,35 +61,6 @@ def test_history_begins_at_the_start_and_ends_at_the_result(cli):
     assert history[-1]["cost"] < 1e-6 * history[0]["cost"]
 
 
-def test_noisy_record_has_errors_of_the_size_of_its_noise(cli):
-    found = cli("fit", *files("quasilinearization", "record_noisy.csv"), "--json").json
-    assert 0.016 < found["residual_rms"] < 0.024
-    for name, truth in {"theta1": 1, "theta2": -1, "theta3": -1}.items():
-        entry = found["parameters"][name]
-        assert abs(entry["value"] - truth) < 4 * entry["std"]
-        assert entry["std"] < 0.01
-
-
-@pytest.mark.full
-def test_stated_errors_scale_the_intervals(cli):
-    one, two = (
-        cli("fit", *files("limit_cycle"), "--sigma", s, "--json").json["parameters"]["lambda"]
-        for s in ("0.05", "x=0.1")
-    )
-    assert one["value"] == pytest.approx(two["value"], rel=1e-7)
-    assert 2 * one["std"] == pytest.approx(two["std"], rel=1e-5)
-
-
-def test_picture_and_table(cli, tmp_path):
-    picture, table = tmp_path / "fit.png", tmp_path / "fit.csv"
-    outcome = cli("fit", *files("three_masses"), "--plot", picture, "--output", table)
-    assert outcome.code == 0, outcome.err
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert "c1" in outcome.out
-    frame = pd.read_csv(table)
-    assert list(frame.iloc[:, 0]) == ["c1", "m1", "m2"]
-
-
 def test_several_records_share_the_parameters(cli, tmp_path):
     model = saved(tmp_path, "m.toml", MODEL)
     first = saved(tmp_path, "a.csv", decay(np.arange(20) / 10))
@@ -122,33 +92,6 @@ def test_a_combination_is_named(cli, tmp_path):
     assert found["identifiable"] is False
     assert found["parameters"]["a"]["value"] is None
     assert found["unidentifiable"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--method", "newton"), "--method 'newton' is not known"),
-        (("--integrator", "euler"), "--integrator 'euler' is not known"),
-        (("--loss", "square"), "--loss 'square' is not known"),
-        (("--sigma", "y=1"), "no output of the model"),
-        (("--plot", "fit.txt"), "cannot write this kind of file"),
-        (("--method", "gauss-newton", "--loss", "huber"), "robust loss"),
-    ],
-)
-def test_bad_options_end_with_one_message(cli, arguments, said):
-    outcome = cli("fit", *files("limit_cycle"), *arguments)
-    assert outcome.code == 2
-    assert outcome.out == ""
-    assert said in outcome.err
-    assert "Traceback" not in outcome.err
-
-
-def test_a_state_that_diverges_is_one_message(cli, tmp_path):
-    model = saved(tmp_path, "m.toml", MODEL.replace("-a*x", "a*x**2").replace("a = 0.5", "a = 2.0"))
-    outcome = cli("fit", model, saved(tmp_path, "r.csv", decay(np.arange(30) / 10)))
-    assert outcome.code == 2
-    assert "t = " in outcome.err
-    assert "Traceback" not in outcome.err
 
 
 def test_json_has_no_nan(cli, tmp_path):

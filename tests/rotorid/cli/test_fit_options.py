@@ -1,7 +1,6 @@
 """Options of `rotorid fit`, standard deviations in records, and what a page shows of several records."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,12 +10,9 @@ from cases import each_of
 
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
-from rotorid.timedomain import Record, simulate
 from rotorid.timedomain.fit import fit
 
-ROOT = Path(__file__).resolve().parents[3]
 FOLDER = sample_data() / "fit"
-PAGE = (ROOT / "docs" / "getting_started" / "identification.md").read_text(encoding="utf-8")
 DECAY = '[states]\nx = "-a*x"\n[initial]\nx = "x0"\n[estimate]\na = 0.5\nx0 = 0.8\n[bounds]\na = [0, 5]\n'
 OWN = f'per_record = ["x0"]\n{DECAY}'
 TWO = '[states]\nx = "-a*x"\n[initial]\nx = 1\n[outputs]\ny = "x"\nz = "2*x"\n[estimate]\na = 0.5\n'
@@ -58,44 +54,6 @@ def test_starting_values_and_iterations(cli):
     assert options == {"start": "m1=10, c1=0.2"}
 
 
-def test_too_few_iterations_are_said(cli):
-    found = cli(
-        "fit", *files("three_masses"), "--method", "gauss-newton", "--max-iterations", 1, "--json"
-    ).json
-    assert found["converged"] is False
-    assert found["parameters"]["c1"]["std"] is None
-    assert found["provenance"]["options"]["max_iterations"] == 1
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("--method", "quasilinearization", "--trajectory", "data"),
-        ("--method", "multiple-shooting", "--trajectory", "model"),
-        ("--method", "multiple-shooting", "--pieces", "4"),
-        ("--integrator", "dop853", "--rtol", "1e-08"),
-        ("--starts", "3", "--seed", "7"),
-    ],
-)
-def test_options_reach_the_fit_and_its_provenance(cli, arguments):
-    found = cli("fit", *files("quasilinearization"), *arguments, "--json").json
-    for name, truth in {"theta1": 1, "theta2": -1, "theta3": -1}.items():
-        assert values(found)[name] == pytest.approx(truth, rel=1e-6)
-    options = found["provenance"]["options"]
-    for option, value in zip(arguments[::2], arguments[1::2], strict=True):
-        assert str(options[option.strip("-")]) == value
-
-
-@pytest.mark.full
-def test_a_loose_integration_is_another_one(cli):
-    one, two = (
-        cli("fit", *files("limit_cycle"), "--rtol", rtol, "--json").json for rtol in ("1e-3", "1e-11")
-    )
-    assert values(one)["lambda"] != values(two)["lambda"]
-    assert values(one)["lambda"] == pytest.approx(values(two)["lambda"], rel=1e-2)
-
-
 def test_seeds_choose_other_places(cli, tmp_path):
     model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
     none, zero, one = (
@@ -128,6 +86,9 @@ def test_seeds_choose_other_places(cli, tmp_path):
         (("--sigma", "much"), "--sigma: x = much is no number above 0"),
         (("--sigma", "1,2"), "'1' is no NAME=VALUE; use y1=0.01,y2=0.02"),
         (("--seed", "3"), "--seed belongs to --starts N"),
+        (("--integrator", "euler"), "--integrator 'euler' is not known"),
+        (("--loss", "square"), "--loss 'square' is not known"),
+        (("--method", "gauss-newton", "--loss", "huber"), "robust loss"),
         (("--tolerance", "1e-3"), "--tolerance belongs to --method gauss-newton or quasilinearization"),
         (("--tolerance", "2", "--method", "gauss-newton"), "a number between 0 and 1, not 2"),
         (("--max-iterations", "0"), "--max-iterations"),
@@ -258,26 +219,3 @@ def test_an_output_may_be_called_like_a_standard_deviation(tmp_path):
     record = read_record(saved(tmp_path, "r.csv", "t_s,y,y_std\n0,1,-2\n1,0.5,1\n"), model)
     assert record.sigma is None
     np.testing.assert_array_equal(record.outputs["y_std"], [-2, 1])
-
-
-def test_help_says_what_is_assumed(cli):
-    said = re.sub(r"[\s│]+", " ", cli("fit", "--help").out)
-    for text in ("Inputs are taken as exact", "NAME_std", "auto: estimate the error of each output"):
-        assert text in said
-
-
-def test_the_model_file_for_several_records_of_the_page(cli, tmp_path):
-    text = re.search(r"```toml\n(per_record.*?)```", PAGE, re.DOTALL).group(1)
-    model = saved(tmp_path, "m.toml", text)
-    equations, t = read_ode_model(model), np.arange(60) / 100
-    truth = {"d": 25.0, "k": 5000.0}
-    paths = []
-    for x0 in (1.0, 2.5):
-        theta = [{**truth, "x0": x0}[name] for name in equations.parameters]
-        y = simulate(equations, theta, Record(t)).y
-        frame = pd.DataFrame(y, columns=list(equations.outputs))
-        frame.insert(0, "t_s", t)
-        paths.append(tmp_path / f"{x0}.csv")
-        frame.to_csv(paths[-1], index=False)
-    found = cli("fit", model, *paths, "--json").json
-    assert values(found) == pytest.approx({**truth, "x0_1": 1.0, "x0_2": 2.5}, rel=1e-6)

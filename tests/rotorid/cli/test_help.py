@@ -51,12 +51,6 @@ def test_every_option_has_a_panel_and_the_first_two_are_short(name):
     assert in_order == sorted(in_order, key=list(panels).index) or in_order[-1] == "Output"
 
 
-def test_the_panels_of_balance():
-    titles = dict.fromkeys(one.rich_help_panel for one in options(COMMANDS["balance"]))
-    expected = "Input and conventions|Method|Limits|Mounting|Machines of a type|Check run|Grade|Output|Expert"
-    assert list(titles) == expected.split("|")
-
-
 @pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("name", [*COMMANDS, ""])
 def test_help_fits_the_terminal_and_names_no_types(cli, monkeypatch, name, plain):
@@ -122,15 +116,3 @@ def test_rotorid_alone_shows_the_jobs_with_examples_that_run(cli, checkout):
     for example in examples:
         found = cli(*shlex.split(example)[1:])
         assert found.code == 0, example
-
-
-def test_commands_stand_in_the_panels_of_the_jobs(cli):
-    groups = {name: one.rich_help_panel for name, one in typer.main.get_command(app).commands.items()}
-    assert set(groups.values()) == {
-        "Balance rotors",
-        "Compute rotors",
-        "Reduce rotors, let them move",
-        "Identify coefficients",
-        "Samples, and checks",
-    }
-    assert groups["balance"] == groups["split"] == "Balance rotors"

@@ -76,16 +76,6 @@ def test_more_modes_change_little(unbalance):
     assert chosen.reduced.error <= 3e-4
     fewer = motion(ROTOR, MotionOptions(**options, modes=chosen.reduced.modes - 2))
     assert fewer.reduced.error > 3e-4
-    none = motion(ROTOR, MotionOptions(**options, modes=0))
-    assert "NOT ENOUGH" in none.answer.brief()
-
-
-def test_at_rest_it_stays_and_says_so(cli):
-    told = cli("motion", ROTOR, *SHORT)
-    assert told.out.startswith("At 4000 rpm it comes to rest.")
-    assert "nothing excites it" in told.out
-    assert len(told.out.splitlines()) <= 24
-    assert max(map(len, told.out.splitlines())) <= 100
 
 
 def test_a_start_in_steady_motion_has_no_transient(unbalance):
@@ -93,35 +83,6 @@ def test_a_start_in_steady_motion_has_no_transient(unbalance):
     end = motion(ROTOR, MotionOptions(**options)).end
     assert end.periodic
     assert end.period == pytest.approx(60 / 4000)
-
-
-@pytest.mark.parametrize("view", ["motion", "orbits"])
-def test_pictures_of_a_motion(cli, tmp_path, view):
-    picture = tmp_path / "p.png"
-    cli("motion", ROTOR, *SHORT, "--displaced", "12=20um@45", "--view", view, "--plot", picture)
-    assert picture.stat().st_size > 10_000
-
-
-@pytest.mark.full
-def test_pictures_of_a_run_up(unbalance):
-    options = MotionOptions(run_up="1000:3000rpm", time=2.0, unbalance=unbalance, sensors="12")
-    found = motion(ROTOR, options)
-    above, below = found.figure("bode").axes
-    assert above.get_ylabel() == "1× of x, µm"
-    assert below.get_xlabel() == "speed, rpm"
-    steady, run = above.get_lines()[:2]
-    # far above the critical speed the run-up follows the steady response
-    speed, size = run.get_data()
-    far = speed > 2500
-    at = np.interp(speed[far], *steady.get_data())
-    np.testing.assert_allclose(size[far], at, rtol=0.15)
-    for line in below.get_lines():
-        assert np.nanmin(line.get_ydata()) >= -315
-        assert np.nanmax(line.get_ydata()) <= 45
-    assert len(found.figure("polar").axes) == 3
-    for view in ("bode", "polar"):
-        with pytest.raises(ValueError, match="--run-up has one"):
-            motion(ROTOR, MotionOptions(speed="4000rpm", time=0.1)).figure(view)
 
 
 @pytest.mark.parametrize(

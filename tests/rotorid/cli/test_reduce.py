@@ -11,10 +11,8 @@ from scipy.io import loadmat
 import fem
 from rotorid import read_ode_model, read_rotor
 from rotorid import reduce as reduce_rotor
-from rotorid.reduction import equivalent_masses, natural_frequencies
 from rotorid.samples import sample_data
 from rotorid.tables import read_small_model
-from rotorid.tables.data.modes_table import read_compliance, read_modes
 from rotorid.timedomain.models.linear_system import state_space
 
 ROTOR = sample_data() / "rotor23.csv"
@@ -30,83 +28,11 @@ def book(which, modes, *more):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("which", ["_printed", ""])
-@pytest.mark.parametrize("modes", [1, 2])
-def test_tasks_9_1_and_9_2_as_commands(cli, which, modes):
-    document = cli(*book(which, modes, "--json")).json
-    measured = read_modes(BOOK / f"modes{which}.csv")
-    _, alpha = read_compliance(BOOK / f"compliance{which}.csv", measured.nodes)
-    masses = equivalent_masses(alpha, measured.frequencies[:modes], measured.shapes[:, :modes]).values
-    np.testing.assert_allclose(document["masses_kg"], masses, rtol=1e-9)
-    frequencies = natural_frequencies(alpha, masses)[0]
-    np.testing.assert_allclose(document["natural_frequencies_rad_s"], frequencies, rtol=1e-9)
-    assert document["positions_m"] is None
-    assert document["source"] == "measured"
-    assert document["relative_error"][2] is None or which == ""
-
-
-def drawn_masses(spread):
-    return ", ".join(f"{std:.2g}" for std in spread["drawn"]["masses_std_kg"])
-
-
-def test_the_error_of_the_printed_compliance_is_predicted(cli):
-    command = ("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--errors", "alpha12=1.3", "--what-if",
-               "alpha12=1.336", "--json")  # fmt: skip
-    document = cli(*command).json
-    shift, spread = document["what_if"], document["uncertainty"]
-    np.testing.assert_allclose(shift["exact"]["masses_kg"], [-2.191, 0.426, -0.890], atol=1e-3)
-    np.testing.assert_allclose(shift["first_order"]["masses_kg"], [-2.573, 0.749, -1.183], atol=1e-3)
-    assert shift["exact"]["frequencies_rad_s"][1] == pytest.approx(-0.247, abs=1e-3)
-    assert "omega2" in shift["warnings"][0]  # first order has even the wrong sign there, and says so
-    np.testing.assert_allclose(spread["masses_std_kg"], [2.5, 0.73, 1.15], rtol=0.01)
-    drawn = spread["drawn"]["natural_frequencies_std_rad_s"]
-    assert abs(shift["exact"]["frequencies_rad_s"][1]) < 2 * drawn[1]
-    text = cli(*command[:-1], "--table").out
-    assert f"By the stated errors the masses are ± {drawn_masses(spread)} kg" in text
-    assert "alpha12 100 %" in text
-
-
 def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
-    document = cli("reduce", ROTOR, "--rank", "--json").json
-    best = document["placement"]["choices"][0]
-    assert best["nodes"] == [3, 11, 14]
-    np.testing.assert_allclose(best["masses_kg"], [317.61, 145.62, 194.64], atol=6e-3)
-    assert best["largest_error"] == pytest.approx(0.002975, abs=5e-7)
-    assert document["nodes"] == [4, 10, 16]  # the compromise: the best by frequency has MAC 0.06 in mode 3
-    for place, nodes in (("best", [3, 11, 14]), ("mac", [6, 12, 18]), ("book", [7, 12, 18])):
+    for place, nodes in (("best", [3, 11, 14]), ("compromise", [4, 10, 16]), ("book", [7, 12, 18])):
         assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
     few = cli("reduce", ROTOR, "--rank", "--candidates", "7,12,18,20", "--json").json
     assert few["placement"]["considered"] == 4
-
-
-def test_methods_trade_off_response_and_stability_stand_in_the_document(cli):
-    document = cli(
-        "reduce", ROTOR, "--nodes", "7,12,18", "--methods", "--trade-off", "--response", "auto",
-        "--stability", "0:9000rpm", "--supports-apart", "--json",
-    ).json  # fmt: skip
-    rows = {row["method"]: row for row in document["methods"]["methods"]}
-    np.testing.assert_allclose(
-        rows["Guyan"]["natural_frequencies_rad_s"], [135.2973, 545.3615, 1250.853], atol=6e-4
-    )
-    np.testing.assert_allclose(
-        rows["IRS"]["natural_frequencies_rad_s"], [135.2404, 540.7360, 1176.319], atol=6e-4
-    )
-    assert document["separated"]["span_m"] == pytest.approx(2.76)
-    assert document["response"]["largest"] < 0.08
-    assert document["response"]["median"] < 0.01
-    assert document["stability"]["small"]["status"] == "stable"
-    matching = [row for row in document["trade_off"]["alternatives"] if row["matching"]]
-    np.testing.assert_allclose(
-        sorted(row["masses_kg"] for row in matching),
-        [(89.08, 196.51, 198.60), (280.52, 162.08, 76.47)],
-        atol=5e-3,
-    )
-
-
-def test_supports_apart_give_the_same_masses(cli):
-    plain = cli("reduce", ROTOR, "--nodes", "7,12,18", "--json").json
-    apart = cli("reduce", ROTOR, "--nodes", "7,12,18", "--supports-apart", "--json").json
-    np.testing.assert_allclose(apart["masses_kg"], plain["masses_kg"], rtol=1e-8)
 
 
 def test_seals_at_the_masses_go_to_the_right_side(tmp_path, cli):
@@ -148,40 +74,22 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
     assert names == ["x7", "x12", "x18", "y7", "y12", "y18"]
 
 
-def test_the_small_compressor_has_both_planes_and_damped_supports(cli, tmp_path):
-    model = tmp_path / "model.toml"
-    outcome = cli("reduce", COMPRESSOR, "--place", "compromise", "--masses", 3, "--speed", "6000rpm",
-                  "--model", model, "--stability", "1000:12000rpm", "--json")  # fmt: skip
-    assert outcome.code == 0, outcome.err
-    assert "[states]" in model.read_text()
-    assert outcome.json["stability"]["full"]["status"] == outcome.json["stability"]["small"]["status"]
-
-
-@pytest.mark.full
 @pytest.mark.parametrize(
-    "view",
-    ["shapes", "methods", "trade-off", "placement", "response", "stability", "errors", "what-if"],
+    ("view", "ask"),
+    [
+        ("placement", "--rank"),
+        ("methods", "--methods"),
+        ("response", "--response"),
+        ("stability", "--stability"),
+        ("trade-off", "--trade-off"),
+        ("errors", "--errors"),
+        ("what-if", "--what-if"),
+    ],
 )
-def test_every_view_is_drawn(cli, tmp_path, view):
-    options = {
-        "placement": ["--rank"],
-        "methods": ["--methods"],
-        "response": ["--response", "auto"],
-        "stability": ["--stability", "0:9000rpm"],
-        "trade-off": ["--trade-off"],
-        "errors": ["--errors", "shapes=1"],
-        "what-if": ["--what-if", "alpha12=1.3"],
-    }
-    ask = options.get(view, [])
-    place = [] if view == "placement" else ["--nodes", "7,12,18"]
-    path = tmp_path / "picture.png"
-    assert cli("reduce", ROTOR, *place, *ask, "--view", view, "--plot", path).code == 0
-    assert path.stat().st_size > 20_000
-    assert cli(*book("", 2), "--plot", tmp_path / "measured.png").code == 0
-    if ask:
-        refused = cli("reduce", ROTOR, "--nodes", "7,12,18", "--view", view, "--plot", path)
-        assert refused.code == 2
-        assert ask[0] in refused.err
+def test_a_view_needs_what_it_draws(cli, tmp_path, view, ask):
+    picture = tmp_path / "picture.png"
+    refused = cli("reduce", ROTOR, "--nodes", "7,12,18", "--view", view, "--plot", picture)
+    assert (refused.code, ask in refused.err, picture.exists()) == (2, True, False)
 
 
 @each_of(
@@ -259,25 +167,6 @@ def test_measured_shapes_are_compared_with_the_rotor():
     assert any("but of its mode 2 (MAC 1.00): is a mode missing?" in text for text in missed.warnings)
 
 
-def test_a_model_on_damped_bearings_can_be_driven(cli, tmp_path):
-    """Damped supports are states of first order; forces are inputs, and only the masses are measured."""
-    path = tmp_path / "model.toml"
-    ask = ("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--speed", "6000rpm", "--model", path)
-    assert cli(*ask, "--force", "14").code == 0
-    model = read_ode_model(path)
-    assert model.inputs == ("f_x14",)
-    assert set(model.outputs) == {f"{axis}{node}" for axis in "xy" for node in (8, 14, 20)}
-    assert all(name.startswith(("d_x", "d_y")) for name in model.parameters)
-    speed = 200 * np.pi
-    small = reduce_rotor(read_rotor(COMPRESSOR), (8, 14, 20), 1, speed=speed).small()
-    back = state_space(model, np.zeros(len(model.parameters)))
-    theirs, ours = np.sort_complex(back.eigenvalues), np.sort_complex(small.eigenvalues(speed))
-    np.testing.assert_allclose(theirs, ours, rtol=1e-9)
-    refused = cli(*ask, "--force", "15")
-    assert refused.code == 2
-    assert "no mass of the model stands at 15" in refused.err
-
-
 @pytest.mark.parametrize(
     ("more", "message"),
     [
@@ -298,12 +187,10 @@ def test_options_without_effect_are_refused(cli, more, message):
 def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeypatch):
     monkeypatch.chdir(Path(__file__).resolve().parents[3])
     stored = MOTION / "small.toml"
+    made = tmp_path / "small.toml"
     said = (MOTION / "README.md").read_text(encoding="utf-8")
     command = said.partition("`rotorid reduce ")[2].partition("small.toml`")[0]
-    made = tmp_path / "small.toml"
-    text = cli("reduce", *command.split(), made).out
-    assert "The shaft held rigidly at nodes 2 and 22, without its supports and forces:" in text
-    assert "together 558.53, weight 5477.4 N; journal bearing at 2" in text
+    assert cli("reduce", *command.split(), made).code == 0
     mine, theirs = read_small_model(made), read_small_model(stored)
     first, again = (path.read_text(encoding="utf-8").splitlines()[0] for path in (made, stored))
     assert first == again

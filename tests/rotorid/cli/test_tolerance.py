@@ -13,8 +13,6 @@ SHAFT = ("--planes", "left=100mm,right=600mm", "--bearings", "0mm,700mm", "--cen
 def test_the_known_example(cli):
     outcome = cli(*USUAL)
     assert outcome.code == 0
-    assert "3979 g·mm" in outcome.out
-    assert "7.96" in outcome.out
     found = cli(*USUAL, "--json").json
     assert found["permissible_g_mm"] == pytest.approx(3978.87, abs=0.01)
     assert found["specific_um"] == pytest.approx(7.958, abs=0.001)
@@ -46,17 +44,6 @@ def test_planes(cli, tmp_path):
     assert pd.read_csv(table)["limit_g_mm"].tolist()[-2:] == pytest.approx([1989.44, 1989.44], abs=0.01)
 
 
-def test_an_overhung_rotor(cli):
-    found = cli(
-        *USUAL, "--planes", "fan=1200mm,hub=1000mm", "--bearings", "0mm,800mm", "--centre", "1.1m", "--json"
-    ).json
-    # levers 0.375 and 1.375, the larger cut to 1.3
-    assert [b["limit_g_mm"] / found["permissible_g_mm"] for b in found["bearings"]] == pytest.approx(
-        [0.375, 1.3]
-    )
-    assert "0.375 and 1.38" in found["warnings"][0]
-
-
 @each_of(
     ("options", "words"),
     [
@@ -84,14 +71,6 @@ def test_bad_input_is_one_message(cli, options, words):
     assert "Traceback" not in outcome.err
     assert len(outcome.err.strip().splitlines()) == 1
     assert outcome.out == ""
-
-
-def test_help_has_examples(cli):
-    outcome = cli("tolerance", "--help")
-    assert outcome.code == 0
-    assert "Example: rotorid tolerance --mass 500kg --speed 3000rpm --grade G2.5" in " ".join(
-        outcome.out.split()
-    )
 
 
 @pytest.mark.parametrize(

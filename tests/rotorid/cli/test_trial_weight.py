@@ -9,7 +9,6 @@ from rotorid.samples import sample_data
 
 FORCE = ("--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "200mm")
 ANGLE = ("--reading-phase", "120", "--lag", "below")
-MODEL = sample_data() / "model_job" / "job.toml"
 TURBO = sample_data() / "turbo_job" / "job.toml"
 BK = sample_data() / "bk_two_plane" / "job.toml"
 
@@ -80,17 +79,6 @@ def test_angle_and_expected_change_from_a_job(weights):
     assert stated["expected"][0]["change"] == pytest.approx(shift)
 
 
-def test_a_computed_and_a_measured_job_agree(weights):
-    computed, measured = weights(MODEL), weights(TURBO)
-    assert [row["plane"] for row in computed] == ["left", "middle", "right"]
-    for a, b in zip(computed, measured, strict=True):
-        assert a["mass"] == pytest.approx(b["mass"], rel=0.02)
-        assert a["angle_deg"] == pytest.approx(b["angle_deg"], abs=2)
-        # g·mm: the force needs no radius
-        assert a["force_N"] == pytest.approx(a["mass"] * 1e-6 * (5400 * np.pi / 30) ** 2)
-        assert max(r["change"] for r in a["expected"]) == pytest.approx(0.4 * 59.7, rel=1e-6)
-
-
 def test_radius_of_the_job(weights, tmp_path):
     for name in ("runs.csv", "weights.csv"):
         (tmp_path / name).write_bytes((BK.parent / name).read_bytes())
@@ -112,20 +100,10 @@ def test_limit_of_a_plane(cli, weights):
     assert any("would need more than the largest weight" in w for w in cut["warnings"])
     outcome = cli("trial-weight", TURBO, "--plane", "left", "--max-mass", "100", "--mass", "150g_mm")
     assert outcome.code == 2
-    assert (
-        "the trial weight of 150 g·mm is larger than the largest weight of plane 'left', 100 g·mm"
-        in outcome.err
-    )
+    assert "150 g·mm is larger than the largest weight of plane 'left', 100 g·mm" in outcome.err
     outcome = cli("trial-weight", *FORCE, "--max-mass", "20g")
     assert outcome.code == 2
     assert "24.84 g is larger than the largest weight of plane '1', 20 g: take at most 8.05 %" in outcome.err
-
-
-def test_force_beyond_the_load_is_named(weights):
-    (found,) = weights(*FORCE, "--fraction", "30")
-    assert any("30 % of the load, more than 25 %" in w for w in found["warnings"])
-    (found,) = weights(TURBO, "--plane", "left", "--bearing-load", "100N")
-    assert any("of the load, more than 25 %" in w for w in found["warnings"])
 
 
 def test_files(cli, tmp_path):
@@ -187,10 +165,3 @@ def test_bad_input_is_one_message(cli, args, words):
     assert "Traceback" not in outcome.err
     assert len(outcome.err.strip().splitlines()) == 1
     assert outcome.out == ""
-
-
-def test_help_has_examples(cli):
-    outcome = cli("trial-weight", "--help")
-    assert outcome.code == 0
-    text = " ".join(outcome.out.split())
-    assert "Example: rotorid trial-weight --rotor-mass 500kg --speed 3000rpm --radius 200mm" in text

@@ -18,24 +18,12 @@ def balance(cli, name, *options):
     [
         (
             "weak_trial",
-            ["the weight in plane 'I' is 458 g ± ", "its trial weight (10 g) is only 0.18 times its error"],
-            ["plane 'II' alone (--planes II; ", "repeat the trial run of plane 'I' with at least 2"],
+            "the weight in plane 'I' is 458 g ± ",
+            "repeat the trial run of plane 'I' with at least 2",
         ),
-        (
-            "tiny_trial",
-            ["the weight in plane 'P1' is 5.627 g ± ", "the weight in plane 'P2' is 6.738 g ± "],
-            ["repeat the trial run of plane 'P1' with at least 2.", "of plane 'P2' with at least 3."],
-        ),
-        (
-            "one_digit",
-            ["the readings have one digit (steps of 0.10 µm pp, readings of 0.29 µm pp)", "17.02 g ± "],
-            ["repeat the trial run of plane 'P1'", "read the instrument in a range that shows more digits"],
-        ),
-        (
-            "alike_planes",
-            ["planes 'P1' and 'P2' act alike, and their weights fight each other ("],
-            ["plane 'P2' alone (--planes P2; ", "--ridge ", "at which planes 'P1' and 'P2' act differently"],
-        ),
+        ("tiny_trial", "the weight in plane 'P2' is 6.738 g ± ", "of plane 'P2' with at least 3."),
+        ("one_digit", "the readings have one digit (steps of 0.10 µm pp", "that shows more digits"),
+        ("alike_planes", "planes 'P1' and 'P2' act alike", "plane 'P2' alone (--planes P2; "),
     ],
 )
 @each_of("method", ["least-squares", "weighted"])
@@ -45,14 +33,9 @@ def test_the_first_line_says_that_the_weights_cannot_be_meant(cli, method, name,
     first, *rest = re.split(r"\n(?=Instead|Or)", ran.out.split("\n\n")[0])
     first, rest = " ".join(first.split()), " ".join(" ".join(rest).split())
     assert first.startswith("Do not mount these weights: ")
-    assert re.search(
-        r"with the weights, expect rms \S+ (µm pp|mm/s rms) rather than .*; without them it is ", first
-    )
-    for words in says:
-        assert words in first
-    for words in instead:
-        assert words in rest
+    assert says in first
     assert rest.startswith("Instead: ")
+    assert instead in rest
 
 
 @each_of("name", ["weak_trial", "tiny_trial", "one_digit", "alike_planes"])

@@ -6,8 +6,6 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
-from repetitions import FULL
-from workbook_jobs import SAMPLES
 
 from rotorid.samples import sample_data
 from rotorid.tables import read_influence, write_influence
@@ -20,34 +18,6 @@ def answer(outcome):
     """The document of a result without what names files and dates."""
     assert outcome.code == 0, outcome.err
     return {key: value for key, value in outcome.json.items() if key != "provenance"}
-
-
-CALLS = [
-    *((sample, ()) for sample in SAMPLES),
-    ("turbo_job/holes", ("--split",)),
-    ("turbo_job/checked", ("--history",)),
-    ("turbo_job/checked", ("--refine",)),
-    ("turbo_job/job", ("--method", "minmax")),
-    ("bk_two_plane/job", ("--amplitude-error", "2", "--phase-error", "1", "--phase", "lag")),
-    ("left_in/job", ("--angles", "against rotation")),
-    ("turbo_job/job", ("--max-mass", "left=400,right=9oz_in", "--limit", "probe 1=20")),
-]
-ONCE = ("--amplitude-error", "--phase-error", "--phase", "--angles", "--max-mass", "--limit")
-"""What the workbook says from then on."""
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(("sample", "options"), CALLS)
-def test_a_workbook_gives_the_same_result(cli, tmp_path, sample, options):
-    job, sheet = DATA / f"{sample}.toml", tmp_path / "sheet.xlsx"
-    first = cli("balance", job, *options, "--output", sheet, "--json")
-    again = options if not options or options[0] not in ONCE else ()
-    assert answer(cli("balance", sheet, *again, "--json")) == answer(first)
-    if options and not FULL:
-        return  # a workbook of a workbook: those without options
-    second = tmp_path / "second.xlsx"
-    assert answer(cli("balance", sheet, *again, "--output", second, "--json")) == answer(first)
-    assert answer(cli("balance", second, *again, "--json")) == answer(first)
 
 
 def test_the_sheets_of_results(cli, tmp_path):
@@ -111,14 +81,6 @@ def test_stored_coefficients_are_embedded(cli, tmp_path):
     assert "# machine 7, summer" in comments
 
 
-def test_csv_output_holds_the_corrections_alone(cli, tmp_path):
-    table = tmp_path / "weights.csv"
-    document = cli("balance", TURBO / "job.toml", "--output", table, "--json").json
-    frame = pd.read_csv(table, converters={"mass": float})  # pandas before 3 loses the last digit
-    assert frame.columns.tolist() == ["plane", "mass", "unit", "angle_deg", "mass_std", "angle_std_deg"]
-    assert frame["mass"].tolist() == [row["mass"] for row in document["corrections"]]
-
-
 def test_what_cannot_be_kept_writes_nothing(cli, tmp_path):
     for name in ("runs", "weights"):
         (tmp_path / f"{name}.csv").write_bytes((TURBO / f"{name}.csv").read_bytes())
@@ -135,16 +97,6 @@ def test_what_cannot_be_kept_writes_nothing(cli, tmp_path):
     assert not picture.exists()
 
 
-def test_the_workbook_itself_is_not_overwritten(cli, tmp_path):
-    sheet = tmp_path / "sheet.xlsx"
-    assert cli("balance", TURBO / "job.toml", "--output", sheet).code == 0
-    before = sheet.read_bytes()
-    outcome = cli("balance", sheet, "--output", sheet)
-    assert outcome.code == 2
-    assert "must not be overwritten" in outcome.err
-    assert sheet.read_bytes() == before
-
-
 def test_the_form(cli, tmp_path):
     form = tmp_path / "job.xlsx"
     outcome = cli("balance", "--template", form)
@@ -155,23 +107,6 @@ def test_the_form(cli, tmp_path):
     assert empty.err.count("\n") == 1
     assert "sheet 'runs'" in empty.err
     assert "none are filled in yet" in empty.err
-    book = openpyxl.load_workbook(form)
-    for name in ("runs", "weights"):
-        lines = (DATA / "bk_two_plane" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
-        header, *body = [line.split(",") for line in lines if not line.startswith("#")]
-        for place, title in enumerate(header, start=1):
-            book[name].cell(1, place).value = title
-            for number, row in enumerate(body, start=2):
-                text = title in ("run", "sensor", "plane")
-                book[name].cell(number, place).value = row[place - 1] if text else float(row[place - 1])
-    keys = [cell.value for cell in book["settings"]["A"]]
-    for key, value in (("phase", "lead"), ("angles", "with rotation")):
-        book["settings"].cell(keys.index(key) + 1, 2).value = value
-    book.save(form)
-    expected = answer(cli("balance", DATA / "bk_two_plane" / "job.toml", "--json"))
-    assert answer(cli("balance", form, "--json")) == expected
-    corrections = [(row["plane"], row["mass"], row["angle_deg"]) for row in expected["corrections"]]
-    assert corrections[0] == ("1", pytest.approx(2.951, rel=1e-3), pytest.approx(50.2, rel=1e-3))
 
 
 @pytest.mark.parametrize(
@@ -192,16 +127,3 @@ def test_forms_that_are_refused(cli, tmp_path, monkeypatch, arguments, words):
     assert words in outcome.err
     assert [path.name for path in tmp_path.iterdir()] == ["there.xlsx"]
     assert (tmp_path / "there.xlsx").read_bytes() == b"filled in"
-
-
-def test_only_weights_are_missing(cli, tmp_path):
-    form = tmp_path / "job.xlsx"
-    assert cli("balance", "--template", form).code == 0
-    book = openpyxl.load_workbook(form)
-    for place, value in enumerate(("initial", 3000, "1", 7.2, 238), start=1):
-        book["runs"].cell(2, place).value = value
-    book.save(form)
-    outcome = cli("balance", form)
-    assert outcome.code == 2
-    assert "weight" in outcome.err
-    assert "Traceback" not in outcome.err

@@ -6,13 +6,11 @@ from itertools import combinations, combinations_with_replacement
 import numpy as np
 import pytest
 from cases import each_of
-from harmonic_cases import STATED, simulate, task51, two_masses
-from repetitions import FULL
+from harmonic_cases import STATED, task51, two_masses
 
 from rotorid.harmonic.experiment_design import design
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.operator_equations import harmonic_model
-from rotorid.harmonic.output_error import output_error
 from rotorid.regression.d_optimal import d_optimal
 
 
@@ -75,18 +73,6 @@ def test_expected_deviations_are_those_of_independent_derivatives():
     np.testing.assert_allclose(found.std, np.sqrt(np.diag(np.linalg.inv(part.T @ part))), rtol=1e-6)
 
 
-def test_expected_deviations_are_those_of_repetitions():
-    model, truth, w, inputs = task51()
-    found = design(model, {"c": 1000.0, "b": 10.0}, w, 3, errors=STATED, inputs=inputs)
-    rng, n = np.random.default_rng(2), 300 if FULL else 150
-    values = [
-        output_error(model, simulate(model, truth, w, inputs, STATED, rng, stated=STATED), truth).fit.values
-        for _ in range(n)
-    ]
-    # 300 repetitions know a standard deviation to 4 %: 9 % of those, 12.7 % of 150
-    np.testing.assert_allclose(found.std_all, np.std(values, axis=0), rtol=1.56 / np.sqrt(n))
-
-
 def test_a_resonance_tells_the_damping():
     model, _, _, inputs = task51()
     w = np.array([2.0, 5.0, 9.0, 10.0, 11.0, 20.0, 40.0])
@@ -95,18 +81,6 @@ def test_a_resonance_tells_the_damping():
     assert found.determined
     assert (found.std >= found.std_all * (1 - 1e-12)).all()
     assert found.efficiency > 1.2
-
-
-def test_more_frequencies_never_tell_less():
-    model, truth, _, inputs = two_masses()
-    guess = dict(zip(model.parameters, truth, strict=True))
-    w = np.linspace(10, 55, 10)
-    volumes = []
-    for n in range(2, 8):
-        found = design(model, guess, w, n, errors=STATED, inputs=inputs)
-        J = sensitivities(model, truth, w, inputs)
-        volumes.append(log_det(J, found.chosen))
-    assert (np.diff(volumes) > 0).all()
 
 
 def test_repetition_and_a_single_sensor():
@@ -137,10 +111,6 @@ def test_the_result_speaks():
     model, truth, w, inputs = two_masses()
     guess = dict(zip(model.parameters, truth, strict=True))
     found = design(model, guess, w, 2, errors=STATED, inputs=inputs)
-    first, table = found.summary().split("\n\n")
-    assert first.startswith("Measure at ")
-    for line, guess, std in zip(table.splitlines()[1:], found.guess, found.std, strict=True):
-        assert [float(cell) for cell in line.split()[1:3]] == pytest.approx([guess, std], rel=0.051)
     frame = found.to_frame()
     assert frame["chosen"].sum() == 2
     assert list(frame.columns) == ["frequency_rad_s", "chosen", "a1_std", "a2_std", "a_std"]

@@ -1,18 +1,14 @@
 """Modes from amplitudes: against closed forms and drawn readings, and what is said where they do not tell."""
 
-import csv
-
 import numpy as np
 import pytest
 from repetitions import FULL
 from scipy.linalg import eigh
 
-import fem
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.modal.modal_fit import fit_modes
 from rotorid.harmonic.modal.modal_readings import SteadyAnswers
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.workflows.vibration.modes import ModesOptions, modes
 
@@ -90,41 +86,6 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
     np.testing.assert_allclose(result.shapes[0], shapes[:, 1], rtol=2e-3)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("errors", "masses", "read", "draws"),
-    [("stated", 3, 3, 60), ("share of", 3, 3, 60), ("stated", 4, 2, 60), ("size everywhere", 4, 1, 200)]
-    if FULL
-    else [("share of", 3, 3, 40), ("stated", 4, 2, 60), ("size everywhere", 4, 1, 120)],
-)
-def test_intervals_of_drawn_readings_hold_the_truth(errors, masses, read, draws):
-    """Random chains: 95 % of the intervals, within four standard deviations of such a count."""
-    rng, held, count = np.random.default_rng(7), np.zeros(3), 0
-    chosen = 0
-    for _ in range(draws):
-        M0, K0 = chain(rng.uniform(5, 20, masses), rng.uniform(5e3, 2e4, masses))
-        omega0, shapes = undamped(M0, K0)
-        damping = 10 ** rng.uniform(-3, -2) * omega0 / omega0[-1]
-        C = 2 * damping[0] / omega0[0] * K0
-        omega = around(omega0[:read], damping[:read])
-        exact = amplitudes(omega, M0, C, K0, np.eye(masses)[-1])
-        share = 0.01 * np.abs(exact).max() / np.abs(exact) if "size" in errors else 0.02
-        stated = AmplitudeErrors(0.02, 0.02) if errors == "stated" else None
-        result = fitted(omega, measured(omega, exact, stated, (rng, share)))
-        chosen += stated is not None or result.same.startswith(errors)
-        assert len(result.ends) == read
-        _, _, low, high = found(result)
-        truth = np.array([omega0[:read], damping[:read]])
-        held[:2] += ((low <= truth) & (truth <= high)).sum(axis=1)
-        factor = (high - low)[0, 0] / 2 / result.fit.std[0]
-        ratio = result.shapes[:, -1] / result.shapes[:, 0]
-        error = np.abs(ratio) * np.hypot(result.shape_std[:, -1], result.shape_std[:, 0])
-        held[2] += (np.abs(ratio - (shapes[-1] / shapes[0])[:read]) <= factor * error).sum()
-        count += read
-    assert chosen > 0.9 * draws
-    assert np.abs(held / count - 0.95).max() < 4 * np.sqrt(0.95 * 0.05 / count)
-
-
 def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli):
     """Lesson 7 whole: amplitudes around resonances, modes, stiffnesses; 40 drawn tests."""
     from rotorid.tables import read_harmonic_model, read_measurements
@@ -147,44 +108,6 @@ def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli
     for name, value, std in zip(result.parameters, result.values, result.std, strict=True):
         assert output[name]["value"] == pytest.approx(value, abs=0.05 * std)
         assert output[name]["std"] == pytest.approx(std, rel=0.05)  # the error of the reference counts, too
-
-
-def test_the_modes_of_a_rotor_reduce_it(tmp_path, cli):
-    """Run-up under unbalance of the 23-element rotor with dampers, read at three nodes: the same masses."""
-    rows = list(csv.reader((sample_data() / "rotor23.csv").read_text().splitlines()))
-    damped = tmp_path / "rotor.csv"
-    damped.write_text(
-        ",".join([*rows[0], "support_damping_N_s_per_m"])
-        + "\n"
-        + "\n".join(",".join([*row, "400" if float(row[3]) else "0"]) for row in rows[1:])
-    )
-    rotor, nodes = read_rotor(damped), [7, 12, 18]
-    exact = fem.critical_speeds(rotor, 3)
-    omega = around(exact.frequencies, [1.2e-5, 1.5e-4, 4e-4], 11)
-    unbalance = {6: 1e-3, 15: 0.5e-3j, 19: 3e-4}
-    Z = fem.unbalance_response(rotor, unbalance, omega, nodes=nodes).amplitudes
-    Z = 1e6 * Z.reshape(len(omega), 3)
-    rng = np.random.default_rng(2)
-    Z = Z * (1 + 0.01 * (rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)))
-    head = "speed_rpm," + ",".join(f"{n}_amplitude_um,{n}_phase_deg" for n in nodes)
-    cells = [
-        [w * 30 / np.pi, *np.stack((np.abs(z), np.degrees(np.angle(z))), 1).ravel()]
-        for w, z in zip(omega, Z, strict=True)
-    ]
-    table, output = tmp_path / "runup.csv", tmp_path / "modes.csv"
-    table.write_text("\n".join([head, *(",".join(map(str, row)) for row in cells)]))
-    words = ("--amplitude-error", "1", "--phase-error", "0.573")
-    document = cli("modes", table, "--excitation", "unbalance", *words, "--output", output, "--json").json
-    assert document["warnings"] == []
-    read = read_modes(output, rotor)
-    assert np.all(np.abs(read.frequencies - exact.frequencies) < 4 * read.frequency_std * read.frequencies)
-    reduced = cli(
-        "reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json"
-    ).json
-    computed = cli(
-        "reduce", sample_data() / "rotor23.csv", "--nodes", "7,12,18", "--modes", "2", "--json"
-    ).json
-    np.testing.assert_allclose(reduced["masses_kg"], computed["masses_kg"], rtol=0.05)
 
 
 def test_a_velocity_under_a_given_force_is_the_same_mode(tmp_path):
@@ -371,15 +294,6 @@ def test_one_stated_error_needs_the_other(cli):
     )
     assert outcome.code == 2
     assert "belong together" in outcome.err
-
-
-def test_the_sample_holds_what_the_command_writes(tmp_path, cli):
-    folder, output = sample_data() / "modes", tmp_path / "modes.csv"
-    words = ("--excitation", "force", "--amplitude-error", "2", "--phase-error", "1")
-    cli("modes", folder / "amplitudes.csv", *words, "--output", output)
-    new, stored = read_modes(output), read_modes(folder / "modes.csv")
-    np.testing.assert_allclose(new.frequencies, stored.frequencies, rtol=1e-9)
-    np.testing.assert_allclose(new.shapes, stored.shapes, rtol=1e-7)
 
 
 def test_one_wild_reading_of_a_sweep_is_no_mode():

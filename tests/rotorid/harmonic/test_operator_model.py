@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from cases import each_of
-from harmonic_cases import chain
 
 from rotorid.harmonic import harmonic_model
 
@@ -117,10 +116,3 @@ def test_an_expansion_too_long_to_use_is_refused():
     letters = " + ".join("abcdefghijklmnoqrstuvwxyz")
     with pytest.raises(ValueError, match="terms"):
         harmonic_model([f"({letters})**9*X = F"], estimate=["a"])
-
-
-def test_twenty_masses_are_read():
-    equations, unknowns = chain(20)
-    model = harmonic_model(equations, estimate=unknowns)
-    assert len(model.combinations.words) == 60
-    assert model.coefficients.size > 100

@@ -1,7 +1,5 @@
 """From combinations back to parameters: the singular exercises, several solutions, none, null spaces."""
 
-import re
-
 import numpy as np
 import pytest
 from harmonic_cases import FEEDBACK, PUMP, ROTOR
@@ -52,8 +50,6 @@ def test_41_in_words():
     assert document["parameters"]["c"]["value"] == pytest.approx(1e5, rel=1e-9)
     assert document["parameters"]["b"] == {"value": None, "std": None, "ci95": None}
     assert document["combinations"]["b*(1 - delta)"]["value"] == pytest.approx(5000, rel=1e-9)
-    assert found.summary().startswith("Only c and b*(1 - delta) are determined; ")
-    assert re.search(r"^  b +not determined$", found.summary(), re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +70,6 @@ def test_32_and_33_up_to_exchange(known, estimate, frequencies):
     if "T0" in estimate:
         assert document["parameters"]["T0"]["value"] == pytest.approx(1.0, rel=1e-6)
         assert document["parameters"]["T0"]["std"] is not None
-    assert "solution 2" in found.summary()
 
 
 def test_bounds_choose_between_exchanged_solutions():

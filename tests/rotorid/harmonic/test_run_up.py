@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_ups import drawn, example
+from run_ups import drawn
 
 from balancing import Labels
 from rotorid.base.rpm import RPM
@@ -83,30 +83,6 @@ def test_slow_roll_is_a_mean_with_its_error():
     assert np.trace(scattered[0]) == pytest.approx(np.var(low, ddof=1) / count, rel=1e-9)
     with pytest.raises(ValueError, match=r"no vector at or below 100 rpm; the lowest speed is 300 rpm"):
         slow_vectors(sweep, 100 / RPM)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("fitted", [True, False])
-def test_vectors_between_are_within_their_errors(fitted):
-    """Of drawn sweeps; by the fit errors are smaller."""
-    squares, sizes = [], []
-    for seed in range(16 if fitted else 60):
-        rotor, sweep = drawn(seed)
-        speeds = np.array([1.25, 1.5]) * rotor.omega[0]
-        rate = 100 / RPM
-        passing = (speeds - 300 / RPM) / rate - (sweep.speeds[0] - 300 / RPM) / rate
-        modes = list(zip(rotor.omega, rotor.zeta, strict=True))
-        time = np.concatenate(([0.0], passing))
-        answers = [example.swept(*mode, 300 / RPM, rate, time)[1:] for mode in modes]
-        exact = np.transpose(answers) @ rotor.moved + rotor.run_out
-        given = None if fitted else [(1.0, 2.0)]
-        vectors, covariances = vectors_when_passing(sweep, speeds, bands=given or ())
-        off = vectors - exact
-        parts = np.stack((off.real, off.imag), axis=-1)
-        squares += np.einsum("mci,mcij,mcj->mc", parts, np.linalg.inv(covariances), parts).ravel().tolist()
-        sizes.append(np.sqrt(np.trace(covariances, axis1=-2, axis2=-1)).mean())
-    assert np.mean(np.array(squares) < 5.99) > 0.85
-    assert np.mean(sizes) < (0.6e-6 if fitted else 2e-6)
 
 
 def test_a_speed_that_is_not_passed_is_refused():

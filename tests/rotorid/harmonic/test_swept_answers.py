@@ -35,18 +35,6 @@ def off(found, exact):
     return np.abs(found - exact).max(axis=0) / np.abs(exact).max(axis=0)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(("first", "rate"), SWEEPS)
-def test_constant_acceleration_as_dop853_has_it(first, rate):
-    time = np.sort(np.random.default_rng(1).uniform(0, 24, 60))
-    time[0] = 0.0
-    exact = integrated(
-        lambda t: first * t + rate * t**2 / 2, lambda t: first + rate * t, lambda t: rate, time
-    )
-    found = swept_answers(time, first + rate * time).basis(Q)[0]
-    assert off(found[:, :2], exact).max() < 1e-8
-
-
 def test_an_acceleration_that_changes():
     """A coast-down, Ω = 250 e^{−t/20}: read often enough the spline is it."""
     time = np.linspace(0, 30, 2000)

@@ -37,20 +37,6 @@ def test_a_speed_that_changes_from_row_to_row(method):
         np.testing.assert_allclose(z, data.signals[name], rtol=1e-9)
 
 
-def test_it_is_what_known_numbers_are_in_experiments_at_one_speed():
-    _model, _, data = gyroscopic()
-    one = data.take(np.isclose(data.varying["Omega"], data.varying["Omega"][2]))
-    fixed = harmonic_model(
-        GYRO, known={"I": 0.8, "Omega": float(one.varying["Omega"][0])}, estimate=["k", "G"]
-    )
-    free = harmonic_model([e.replace("b*p", "3*p") for e in GYRO], known={"I": 0.8}, estimate=["k", "G"])
-    plain = experiments(fixed, one.frequencies, one.signals, free=False)
-    a = identify(free, one).values
-    b = identify(harmonic_model([e.replace("b*p", "3*p") for e in fixed.equations], known=fixed.known,
-                                estimate=["k", "G"]), plain).values  # fmt: skip
-    np.testing.assert_allclose(a, b, rtol=1e-12)
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_free_vibrations_at_several_temperatures(method):
     model = harmonic_model(["(m*p**2 + k0 + k1*T)*X = F"], known={"m": 2.0}, estimate=["k0", "k1"])

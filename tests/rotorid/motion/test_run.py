@@ -193,12 +193,6 @@ def test_above_its_critical_mass_a_rotor_ends_on_a_limit_cycle():
     assert ends[1].frequency == pytest.approx(ends[0].frequency, rel=1e-3)
 
 
-def test_limit_cycle_with_the_film_of_the_textbook():
-    end = steady_end(moved(8.0, "line of centres", 500))
-    assert end.whirl_ratio == pytest.approx(0.500004, abs=2e-6)
-    assert end.eccentricity == pytest.approx(np.array([[0.8945, 0.8988]]), abs=8e-5)
-
-
 def test_the_end_is_not_called_steady_while_it_changes():
     end = steady_end(moved(7.0, "pressure", 40))
     assert not end.steady

@@ -278,14 +278,3 @@ def test_impossible_models_are_refused(change, message):
     }
     with pytest.raises(ValueError, match=message):
         SmallModel(**given | change)
-
-
-def test_what_it_tells():
-    model = reduced(on_films())
-    text = model.summary()
-    assert "masses in kg 43.36 at 2, 134.64 at 7" in text
-    assert "journal bearing at 2 and journal bearing at 22" in text
-    document = model.to_dict()
-    assert document["nodes"] == [2, 7, 12, 18, 22]
-    assert sum(document["weight_N"]) == pytest.approx(GRAVITY * 558.5346506833)
-    assert document["warnings"] == []

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import fem
-from rotorid.plots import plot
 from rotorid.reduction import equivalent_masses, mac, natural_frequencies, placement, reduce
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.samples import sample_data
@@ -298,14 +297,3 @@ def test_document_frame_and_text(triples):
     assert np.flatnonzero(frame["trade_off"]).tolist() == triples.pareto.tolist()
     np.testing.assert_array_equal(frame[["node_1", "node_2", "node_3"]], triples.nodes)
     np.testing.assert_array_equal(frame["largest_error"], triples.error)
-    assert "317.6, 145.6, 194.6" in triples.summary()
-    assert max(map(len, triples.summary().splitlines())) <= 100
-
-
-def test_the_map_of_all_choices(triples):
-    from matplotlib.figure import Figure
-
-    axes = Figure().subplots()
-    assert plot(triples, axes) is axes
-    assert axes.get_xlabel()
-    assert axes.get_ylabel()

@@ -1,7 +1,7 @@
 """The balancing sheet: its numbers are those of the document, and it can be used without the program."""
 
-import re
 import json
+import re
 
 import numpy as np
 import pytest

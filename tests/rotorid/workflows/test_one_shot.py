@@ -2,7 +2,6 @@
 
 import importlib.util
 import shutil
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,49 +59,6 @@ def test_one_run_balances_the_true_machine_as_well_as_its_exact_coefficients(mac
     squares = np.einsum("ni,nij,nj->n", z, np.linalg.inv(covariance.reshape(-1, 2, 2)), z)
     assert squares.max() < 18.0  # of 2 degrees of freedom: 1.2e-4
     assert shot.answer.judgement.startswith("Mount these weights")
-
-
-def fem_value(rotor, name):
-    from fem.model.rotor_parameters import parameter_value
-
-    return rotor.calibration.readings.get(name) or parameter_value(rotor, name)
-
-
-@pytest.mark.full
-def test_the_next_trial_run_tells_what_a_linear_update_by_differences_tells(shot):
-    trial, job = shot.next_trial, read_job(FOLDER / "later.toml")
-    known, W = job.rotor.calibration, shot.influence.W
-    p = shot.result.planes.index(trial.plane)
-    C, slopes = known.covariance, []
-    for k, name in enumerate(known.names):  # derivatives by the rotor itself
-        step = 1e-3 * np.sqrt(C[k, k])
-        at = fem_value(job.rotor, name)
-        ends = []
-        for sign in (1, -1):
-            moved = {name: at + sign * step}
-            places = [
-                replace(q, angle=q.angle + {**known.readings, **moved}[f"probe[{s}].angle"])
-                for s, q in job.sensor_places.items()
-            ]
-            rotor = with_parameters(job.rotor, moved)
-            ends.append(fem.influence(rotor, list(job.planes), places, job.trials.speeds).W)
-        slopes.append((ends[0] - ends[1]) / (2 * step))
-    slopes = np.array(slopes)
-    moved = np.einsum("nscp,p->nsc", slopes, shot.result.weights).reshape(len(slopes), -1)
-    now = 1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, C, moved.conj()).real / 2 / moved.shape[1])
-    assert trial.before == pytest.approx(now, rel=1e-3)
-    # less than with exact readings, more than without the trial
-    one = slopes[..., p].reshape(len(slopes), -1) * trial.weight
-    K = np.concatenate((one.real, one.imag), axis=1).T
-    size = np.abs(one).mean()
-    best = C - C @ K.T @ np.linalg.solve(K @ C @ K.T + (1e-4 * size) ** 2 * np.eye(len(K)), K @ C)
-    least = 1.96 * np.sqrt(np.einsum("ni,nm,mi->", moved, best, moved.conj()).real / 2 / moved.shape[1])
-    assert least < trial.after < trial.before
-    assert np.abs(W[..., p]).any()
-    entry = shot.to_dict()["next_trial"]
-    assert entry["plane"] == trial.plane
-    assert entry["error_after"] == pytest.approx(trial.after * 2e6)
-    assert "a trial run with" in shot.answer.whole()
 
 
 def test_runs_that_made_the_calibration_do_not_count_twice(tmp_path):

@@ -4,7 +4,6 @@ import dataclasses
 import importlib
 import inspect
 import pkgutil
-from typing import get_type_hints
 
 import pytest
 
@@ -31,12 +30,3 @@ def test_each_option_is_a_parameter_of_the_command(name, kind):
             assert default is inspect.Parameter.empty, field.name
         else:
             assert default == field.default or (default is None and field.default == ()), field.name
-
-
-@pytest.mark.parametrize(("name", "kind"), [pytest.param(*pair, id=pair[0]) for pair in options()])
-def test_each_parameter_says_what_it_is(name, kind):
-    command = importlib.import_module(f"{commands.__name__}.{name}")
-    hints = get_type_hints(getattr(command, name), include_extras=True)
-    for field in dataclasses.fields(kind):
-        said, *_ = hints[field.name].__metadata__
-        assert said.help, field.name

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib import image
 from run_ups import drawn, table
 
 from rotorid.base.rpm import RPM
@@ -58,14 +57,6 @@ def test_lag_is_the_same_and_the_wrong_way_is_told(cli, rotor_and_sweep, vectors
     assert wrong["modes"] == []
     assert "modes explain them as lags (--phase lag)" in wrong["warnings"][0]
     assert cli("runup", lag, "--output", tmp_path / "m.csv").code == 2
-
-
-def test_the_text_says_both_fits_and_what_is_assumed(cli, vectors):
-    text = cli("runup", vectors).out
-    assert text.startswith("Run run-up: 2 critical speeds, ")
-    assert "steady fit: rpm" in text
-    assert "lead is assumed (--phase)" in text
-    assert "slow roll of the fit" in text
 
 
 def test_acceleration_may_be_an_option(cli, rotor_and_sweep, tmp_path):
@@ -150,19 +141,6 @@ def test_slow_roll_of_a_speed_and_of_a_file(cli, vectors, tmp_path):
         assert one["frequency_rad_s"] == other["frequency_rad_s"]  # the fit has its own
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("view", ["bode", "polar"])
-def test_pictures(cli, rotor_and_sweep, tmp_path, view):
-    _, sweep = rotor_and_sweep
-    path = table(
-        tmp_path / "v.csv", [sweep, replace(sweep, run="later", vectors=sweep.vectors * 0.5)], lag=True
-    )
-    target = tmp_path / "picture.png"
-    words = ("--phase", "lag", "--run", "run-up", "--view", view)
-    assert cli("runup", path, *words, "--plot", target).code == 0
-    assert image.imread(target).std() > 0.05
-
-
 def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
     _, sweep = rotor_and_sweep
     path = table(tmp_path / "v.csv", [sweep], lag=True)
@@ -174,23 +152,6 @@ def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
     assert bottom > top
     phase = np.concatenate([line.get_ydata() for line in below.lines[:1]])
     assert np.abs(np.diff(phase)).max() < 180
-    polar = found.figure("polar").axes[0]
-    assert "lag" in polar.get_title()
-    shown = [label.get_text() for label in polar.get_xticklabels()]
-    assert shown[1] == "315°"  # a lead of 45°
-
-
-@pytest.mark.full
-def test_a_sweep_without_a_resonance_is_still_drawn(cli, rotor_and_sweep, tmp_path):
-    rotor, sweep = rotor_and_sweep
-    slow = sweep.take(np.flatnonzero(sweep.speeds < 0.6 * rotor.omega[0]))
-    path, target = table(tmp_path / "slow.csv", [slow]), tmp_path / "bode.png"
-    found = cli("runup", path, "--plot", target, "--json")
-    assert found.json["modes"] == []
-    assert found.json["warnings"][0].startswith("no modes: no peak stands")
-    assert target.exists()
-    assert "no critical speed is determined" in cli("runup", path).out
-    assert "there is no table of modes" in cli("runup", path, "--output", tmp_path / "modes.csv").err
 
 
 def test_vectors_of_python(rotor_and_sweep):
@@ -198,17 +159,3 @@ def test_vectors_of_python(rotor_and_sweep):
     found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])], slow_roll=47.0))
     assert len(found.to_dict()["modes"]) == 1
     assert json.dumps(found.document)
-
-
-def test_arrows_lead_from_the_first_run_to_the_trial_run_at_the_same_speed():
-    _, sweep = drawn()
-    trial = replace(sweep, run="trial", vectors=sweep.vectors + 5e-6)
-    polar = runup([sweep, trial], RunUpOptions(run=sweep.run)).figure("polar").axes[0]
-    assert "arrows: from the first run to another at one speed" in polar.get_title()
-    arrows = [one for one in polar.texts if getattr(one, "arrow_patch", None) is not None]
-    assert len(arrows) == 6 * len(sweep.sensors)
-    for arrow in arrows:
-        (a, r), (b, s) = arrow.xyann, arrow.xy
-        assert s * np.exp(1j * b) - r * np.exp(1j * a) == pytest.approx(
-            5e-6 * sweep.labels.vibration_scale, rel=1e-6
-        )

@@ -1,13 +1,11 @@
 """`simulate`: the direct problem, and lesson 5's way back: compute, round, estimate."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
 
 from rotorid.harmonic import AmplitudeErrors, harmonic_model
-from rotorid.harmonic.simulated_measurements import free_vibration
 from rotorid.samples import sample_data
 from rotorid.tables import read_measurements, read_ode_model, read_record
 from rotorid.workflows import SimulateOptions, simulate
@@ -75,46 +73,6 @@ def test_lesson_5_is_one_command_and_the_next(cli, tmp_path):
     assert answers[0] == answers[1]
 
 
-def test_task_6_1_rounds_one_amplitude_the_other_way_than_the_book(cli, tmp_path):
-    """0.1946 is printed 0.20, not 0.19."""
-    data = amplitudes(cli, tmp_path, "task_6_1", "T1=0.5,T2=0.8", "1,2", "F=1", "--digits", "2")
-    table, book = (np.array(printed(p)[1:], float) for p in (data, IDENTIFY / "task_6_1" / "data.csv"))
-    assert np.round(table[:, -2:] - book[:, -2:], 9).tolist() == [[0, 0], [0, -0.01]]
-
-
-def test_natural_modes_are_those_of_the_chain(cli, tmp_path):
-    """Task 7.1: the way back is exact."""
-    file = tmp_path / "modes.csv"
-    cli("simulate", task("task_7_1"), "--with", "c1=1e4,c2=2e4,c3=5e3", "--modes", "--output", file)
-    rows = np.array(printed(file)[1:], dtype=float)
-    assert np.all(rows[:, 1] == 1)
-    found = cli("identify", task("task_7_1"), file, "--json").json["parameters"]
-    assert [round(found[name]["value"], 6) for name in ("c1", "c2", "c3")] == [1e4, 2e4, 5e3]
-
-
-def test_modes_of_a_beam_in_compliance_form():
-    """Task 8.1: ω² = 2182641.158 and 45817128.428."""
-    model = read_harmonic("task_8_1").model
-    found = free_vibration(model, np.array([2e6, 3e6]), {})
-    assert np.allclose(found.frequencies**2, [2182641.158, 45817128.428], rtol=1e-9)
-
-
-def test_table_2_1_of_q_to_its_four_digits(cli, tmp_path):
-    """y1 and y2 of rows 17 to 31; the print is checked where it has four digits."""
-    file = tmp_path / "q.csv"
-    step = 0.10471975511965977
-    words = "--with", "theta1=1,theta2=-1,theta3=-1", "--times", f"0:{30 * step}:{step}", "--digits", "4"
-    cli("simulate", FIT / "quasilinearization" / "model.toml", *words, "--output", file)
-    got = np.array(printed(file)[1:], dtype=float)
-    assert len(got) == 31
-    t = got[:, 0]
-    w, decay = np.sqrt(3) / 2, np.exp(-t / 2)
-    x1 = np.sin(t) + decay * (1.5 * np.cos(w * t) + w * np.sin(w * t))
-    x2 = np.cos(t) + decay * ((0.75 - 0.75) * np.cos(w * t) - (1.5 * w + w / 2) * np.sin(w * t))
-    for column, exact in zip(got.T[1:], (x1 + 2 * x2, 2 * x1 + x2), strict=True):
-        assert np.all(np.abs(column - exact) <= 0.5001 * 10.0 ** (np.floor(np.log10(np.abs(exact))) - 3))
-
-
 def test_the_record_of_f_to_its_five_digits(cli, tmp_path):
     file = tmp_path / "f.csv"
     words = "--with", "c1=0.14,m1=12,m2=28", "--times", "0:50:0.2", "--digits", "5"
@@ -171,21 +129,6 @@ def test_the_same_seed_is_the_same_table_and_another_is_not():
     assert one == table(amplitude_error=2.0, seed=0) != table(amplitude_error=2.0, seed=1)
     assert abs(one + 0.1) > 1e-6
     assert table() == -0.1
-
-
-def test_python_gives_what_the_command_prints(cli):
-    words = "--with", "c=1000,alpha=10", "--frequencies", "10,20", "--inputs", "F=10@-90"
-    told = cli("simulate", task("task_5_1"), *words, "--json").json
-    model = read_harmonic("task_5_1").model
-    own = SimulateOptions(
-        parameters={"c": 1000.0, "alpha": 10.0}, frequencies=[10.0, 20.0], inputs={"F": -10j}
-    )
-    document = json.loads(json.dumps(simulate(model, own).document))
-    assert {k: v for k, v in told.items() if k != "provenance"} == {
-        k: v for k, v in document.items() if k != "provenance"
-    }
-    assert told["signals"] == ["frequency_rad_s", "F_re", "F_im", "X_re", "X_im"]
-    assert told["values"][0][:3] == [10, 0, -10]
 
 
 def test_what_changes_from_row_to_row_is_a_column(tmp_path):
@@ -282,9 +225,3 @@ def test_times_that_cannot_be(cli, times):
     model = FIT / "three_masses" / "model.toml"
     found = cli("simulate", model, "--with", "c1=0.14,m1=12,m2=28", "--times", times)
     assert (found.code, found.err.count("\n")) == (2, 1)
-
-
-def test_times_are_written_as_typed():
-    model = FIT / "three_masses" / "model.toml"
-    options = SimulateOptions(parameters="c1=0.14,m1=12,m2=28", times="0:1:0.1")
-    assert simulate(model, options).to_frame()["t_s"].tolist() == [k / 10 for k in range(11)]

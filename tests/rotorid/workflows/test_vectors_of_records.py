@@ -96,18 +96,6 @@ def test_command_line(cli, tmp_path):
     table = pd.read_csv(tmp_path / "runs.csv")
     assert table["amplitude_um_pp"].tolist() == [row["amplitude_um_pp"] for row in document["rows"]]
     assert {entry["run"] for entry in document["runs"]} == {"as_found", "trial_left", "trial_right"}
-    shown = cli("vectors", SAMPLE / "run_up.wav", "--tacho", 1, "--unit", "um", "--speeds", "900,2000rpm")
-    assert shown.code == 0
-    assert "run_up: 601 to 3298 rpm" in shown.out
-    assert "nothing states whether phases lead or lag" in shown.out
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("picture", ["tacho", "orbit", "waterfall"])
-def test_pictures(cli, tmp_path, picture):
-    words = ("--tacho", 1, "--unit", "um", "--picture", picture, "--plot", tmp_path / "p.png")
-    assert cli("vectors", SAMPLE / "run_up.wav", *words).code == 0
-    assert (tmp_path / "p.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(

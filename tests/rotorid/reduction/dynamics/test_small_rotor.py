@@ -284,20 +284,6 @@ def test_damped_supports_cannot_be_condensed():
     assert motion.coordinates == at_bearings.coordinates  # nothing is massless
 
 
-def test_condensed_pedestals_without_mass():
-    """Springs in series: the small model on them is that on bearings of the resulting stiffness."""
-    series = 1 / (1 / 2e7 + 1 / 6e7)
-    soft = [fem.Support(n, 2e7, pedestal=fem.Pedestal(0.0, 6e7)) for n in (1, 11)]
-    plain = [fem.Support(n, series) for n in (1, 11)]
-    K = [
-        small_rotor(full_machine(supports=s, material_damping=0.0), (4, 8), (30.0, 20.0))
-        .motion(supports="condensed")
-        .K
-        for s in (soft, plain)
-    ]
-    np.testing.assert_allclose(K[0], K[1], rtol=1e-9, atol=1e-9 * np.abs(K[1]).max())
-
-
 @each_of(
     ("nodes", "masses", "options", "message"),
     [
@@ -358,33 +344,3 @@ def test_speeds_are_checked(rotor):
     )
     with pytest.raises(ValueError, match="exactly at a critical speed"):
         small_rotor(jeffcott, (1, 3), (1.0, 1.0)).response(100.0)
-
-
-def test_document_frame_and_text(rotor, reduction):
-    small = small_rotor(rotor, NODES, reduction.masses.solution, modal_damping=(0.02,))
-    document = small.to_dict()
-    assert document["nodes"] == list(NODES)
-    assert document["support_nodes"] == [2, 22]
-    assert document["coordinates"][:3] == ["x7", "x12", "x18"]
-    np.testing.assert_array_equal(document["shaft_stiffness_N_per_m"], small.shaft_stiffness)
-    frame = small.to_frame()
-    np.testing.assert_array_equal(frame["mass_kg"], small.masses)
-    np.testing.assert_allclose(frame["position_m"], rotor.positions[[6, 11, 17]])
-    text = small.summary()
-    assert "supports without mass at node 2, 22" in text
-    assert "2 %" in text
-    assert small.warnings == ()
-    turning = replace(rotor, model=fem.Model(rotary_inertia=True, gyroscopic=True))
-    assert "Warning: gyroscopic moments act on slopes" in small_rotor(turning, (7, 18), (1.0, 1.0)).summary()
-
-
-def test_python_control_takes_the_state_space():
-    import control
-
-    model = reduce(rotor23(), (7, 12, 18), 2).small((0.01, 0.02)).state_space()
-    system = control.ss(*model)
-    ours, theirs = np.sort_complex(model.eigenvalues), np.sort_complex(system.poles())
-    np.testing.assert_allclose(theirs, ours, rtol=1e-10)
-    omega = np.array([50.0, 300.0])
-    response = np.moveaxis(system(1j * omega), -1, 0)
-    np.testing.assert_allclose(response, frequency_response(model, omega), rtol=1e-8)

@@ -10,11 +10,10 @@ from fem_rotors import ROOT, rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL
-from whirl_rotors import machine, whirling_rotors
+from whirl_rotors import whirling_rotors
 
 import fem
 import rotorid
-from rotorid.plots import plot
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
@@ -171,23 +170,6 @@ def test_cross_coupling_that_grows_with_speed(part):
     assert f"{part:.5g}" in cost.answer.whole()
 
 
-def test_split_stiffness_with_cross_coupling():
-    """Two planes that differ: c_x ≠ c_y, b, q against the quartic's own threshold (Routh).
-
-    λ⁴ + a3 λ³ + a2 λ² + a1 λ + a0 with a3 = 2 b/m, a2 = w1 + w2 + (b/m)², a1 = (b/m)(w1 + w2),
-    a0 = w1 w2 + (q/m)², w = c/m: stable while a3 a2 a1 > a1² + a3² a0, that is while
-    q² < (c_x − c_y)²/4 + b² (w1 + w2)/2 · 1 (with d = b/m: (q/m)² < ((w1 − w2)/2)² + d² (w1 + w2)/2).
-    """
-    damping, top, more = 150.0, 400.0, 0.2 * STIFFNESS
-    limit = math.sqrt((more / 2) ** 2 + damping**2 * (2 * STIFFNESS + more) / (2 * MASS))
-    rate = limit / 250.0  # the threshold is at 250 rad/s
-    ends = [((0.0, rate * speed), (-rate * speed, more)) for speed in (0.0, top)]
-    seal = fem.Support(2, ends, [damping, damping], speeds=(0.0, top), kind="seal")
-    cost = compare_stability(jeffcott(seal), top)
-    assert cost.full_threshold == pytest.approx(250.0, rel=1e-6)
-    assert cost.small_threshold == pytest.approx(250.0, rel=1e-6)
-
-
 def test_lumped_rotor_is_the_full_one():
     """Discs on a massless shaft with whirling tables and a pedestal: thresholds and decrements agree."""
     tables = [
@@ -247,16 +229,6 @@ def test_decrements_are_those_of_the_eigenvalues():
         assert cost.small_frequency[k] == pytest.approx(values[least].imag, rel=1e-7)
 
 
-def test_anisotropic_machine():
-    """The reference rotor on bearings that differ in x and y, with material damping."""
-    rotor = machine(cross=False, material=np.full(23, 2e-4))
-    small = small_rotor(rotor, (7, 12, 18), reduce(rotor, (7, 12, 18), 2).masses.solution)
-    found = stability_threshold(small, 3000.0)
-    assert found.status == "threshold"
-    assert abs(growth(small, found.threshold)) < 1e-8
-    assert growth(small, 0.999 * found.threshold) < 0 < growth(small, 1.001 * found.threshold)
-
-
 def test_running_away():
     """A seal whose negative stiffness grows with speed pushes the disc aside where it equals the shaft's."""
     top = 1000.0
@@ -274,37 +246,6 @@ def test_running_away():
     assert np.isneginf(cost.small_decrement[cost.speeds > 612.0]).all()
     assert np.isfinite(cost.small_decrement[cost.speeds < 500.0]).all()
     assert json.loads(json.dumps(cost.to_dict(), allow_nan=False))["small_log_decrement"][-1] is None
-
-
-def test_running_away_under_a_driven_whirl():
-    """Of two losses between the same speeds the first counts."""
-    top, damping = 1000.0, 5.0
-    slow = STIFFNESS / 700.0
-    cross = damping * CRITICAL / 650.0  # drives whirl before the disc is pushed aside at 700 rad/s
-    ends = [((-slow * w, cross * w), (-cross * w, -slow * w)) for w in (0.0, top)]
-    small = jeffcott(fem.Support(2, ends, [damping, damping], speeds=(0.0, top), kind="seal"))
-    found = stability_threshold(small, top, steps=1)
-    fine = stability_threshold(small, top, steps=200)
-    # Whirl at ω² = (k − s Ω) / m, driven from q Ω = b ω on.
-    ratio = cross / damping
-    whirl = (-slow + math.sqrt(slow**2 + 4 * MASS * STIFFNESS * ratio**2)) / (2 * MASS * ratio**2)
-    assert fine.threshold == pytest.approx(whirl, rel=1e-6)
-    assert fine.whirl_ratio == pytest.approx(ratio, rel=1e-6)
-    assert found.threshold == pytest.approx(fine.threshold, rel=1e-9)
-
-
-@pytest.mark.parametrize("steps", [1, 2, 9])
-def test_overdamped_motion_that_is_driven_to_whirl(steps):
-    """Four times critical damping: at rest nothing oscillates, from q = b ω0 on whirl at ω0 grows."""
-    top, damping = 1000.0, 8 * MASS * CRITICAL
-    rate = damping * CRITICAL / 430.0
-    ends = [((0.0, rate * w), (-rate * w, 0.0)) for w in (0.0, top)]
-    small = jeffcott(fem.Support(2, ends, [damping, damping], speeds=(0.0, top), kind="seal"))
-    found = stability_threshold(small, top, steps=steps)
-    assert found.threshold == pytest.approx(430.0, rel=1e-6)
-    assert found.frequency == pytest.approx(CRITICAL, rel=1e-6)
-    assert found.direction == 1
-    assert "forward whirl" in found.summary()
 
 
 def test_undamped_is_not_unstable():
@@ -410,30 +351,6 @@ def test_no_motion_is_left_out():
     assert distance.min(axis=0) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_plot():
-    import matplotlib
-
-    matplotlib.use("Agg")
-    cost = compare_stability(jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4), 900.0, steps=9)
-    lines = [line.get_ydata() for line in plot(cost).lines]
-    assert any(np.shape(y) == (10,) and np.allclose(y, cost.small_decrement) for y in lines)
-
-
-def test_outputs():
-    cost = compare_stability(jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4), 900.0, steps=9)
-    data = json.loads(json.dumps(cost.to_dict(), allow_nan=False))
-    assert data["small"]["threshold_rad_s"] == cost.small_threshold
-    assert data["modes_watched"] == {"full": cost.n_full, "small": 2}
-    frame = cost.to_frame()
-    assert frame.small_log_decrement.to_numpy() == pytest.approx(cost.small_decrement)
-    assert len(frame) == 10
-    text = cost.answer.whole()
-    assert f"{cost.small_threshold:.7g}" in text
-    assert f"loses stability at {cost.small_threshold * 30 / np.pi:.6g} rpm" in cost.answer.judgement
-    assert "forward" in text
-    assert not cost.small_decrement.flags.writeable
-
-
 @pytest.mark.parametrize(
     ("highest", "options", "message"),
     [
@@ -454,11 +371,3 @@ def test_bad_input(highest, options, message):
 def test_too_many_modes():
     with pytest.raises(ValueError, match="5 modes cannot be found"):
         compare_stability(jeffcott(), 100.0, n=5)
-
-
-def test_tables_are_not_left():
-    small = jeffcott(fem.Support(2, [1e3, 1e3], [1.0, 1.0], speeds=(100.0, 200.0), name="plain seal"))
-    for function in (compare_stability, stability_threshold):
-        with pytest.raises(ValueError, match="plain seal"):
-            function(small, 150.0)
-    assert stability_threshold(small, 200.0, lowest=100.0).status == "stable"

@@ -190,13 +190,7 @@ def test_trade_off_puts_exact_frequencies_beside_shapes(rotor, table):
     np.testing.assert_allclose(table.masses[row], weighted.values, rtol=1e-9)
 
 
-def test_trade_off_says_the_trap_in_words(table):
-    text = " ".join(table.summary().split())
-    assert "2 different sets of masses have the rotor's 3 frequencies exactly: frequencies alone are" in text
-    assert "Do not use these: matching set 1 has MAC 0.8388 in mode 3; matching set 2 has MAC 0.7326" in text
-    assert "Closest in shape: regression, 3 modes, relative rows, smallest MAC 0.9912 in mode 3" in text
-    assert "-0.0000" not in text
-    assert max(map(len, table.summary().splitlines())) <= 100
+def test_trade_off_as_document_and_table(table):
     document = table.to_dict()
     json.dumps(document, allow_nan=False)
     assert [a["matching"] for a in document["alternatives"]] == table.matching.tolist()
@@ -264,9 +258,6 @@ def test_trade_off_refuses_bad_nodes(rotor, nodes, message):
             [1, 2.6936, 232.9631],
         ),
         ([[1, 0.1593, -1.0076], [0.1593, 0.4319, -0.314], [-1.0076, -0.314, 1.7292]], [1, 1.2874, 38.7023]),
-        ([[1, 0.2127, 0.3258], [0.2127, 0.1234, 0.1822], [0.3258, 0.1822, 0.3322]], [1, 1.9623, 91.1191]),
-        ([[1, 1.0403, 2.0046], [1.0403, 1.1589, 1.9398], [2.0046, 1.9398, 6.595]], [1, 2.8907, 79.0464]),
-        ([[1, 1.8816, 0.142], [1.8816, 4.6643, 1.1891], [0.142, 1.1891, 2.9523]], [1, 2.8783, 134.5128]),
     ],
 )
 def test_steps_to_masses_beyond_all_bounds_say_nothing(alpha, omega):

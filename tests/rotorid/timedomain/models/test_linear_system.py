@@ -97,20 +97,6 @@ def test_both_planes_with_gyroscopic_discs_and_cross_coupling(tmp_path, damping,
     )
 
 
-def test_both_planes_through_matrices_and_back(tmp_path):
-    small = small_rotor(turning(0.0), (3, 5, 6), [40.0, 25.0, 10.0])
-    motion = small.motion(SPEED, supports="condensed")
-    back = motion_in(written(tmp_path, motion))
-    for key in "MCK":
-        np.testing.assert_array_equal(getattr(back, key), getattr(motion, key))
-    assert (back.coordinates, back.speed) == (motion.coordinates, SPEED)
-    found = state_space(read_ode_model(tmp_path / "model.toml")).eigenvalues
-    assert farthest(found, of_motion(motion).eigenvalues) < 1e-10
-    assert farthest(of_motion(back).eigenvalues, of_motion(motion).eigenvalues) == 0
-    assert np.abs(motion.C).max() > 0  # the gyroscopic effect is there
-    assert np.abs(motion.K - motion.K.T).max() > 1e4  # and the cross-coupling
-
-
 def test_dampers_in_states_act_like_dampers(tmp_path):
     small = small_rotor(turning(800.0), (3, 5, 6), [40.0, 25.0, 10.0])
     motion = small.motion(SPEED)

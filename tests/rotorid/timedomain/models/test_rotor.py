@@ -42,29 +42,6 @@ def test_bearing_of_a_finite_element_rotor_from_its_decay():
     assert (found.std < 0.05 * truth).all()
 
 
-@pytest.mark.full
-def test_frequency_of_the_model_in_time_is_that_of_the_rotor():
-    rotor = read_rotor(ROTOR)
-    motion = fem.equations_of_motion(rotor, plane="x")
-    model = second_order(motion.M, motion.C, motion.K, names=motion.coordinates, estimate={"unused": 1.0})
-    A = model.matrices(model.start)[0, :, : len(model.states)]
-    low = np.sort(np.abs(1 / np.linalg.eigvals(np.linalg.inv(A)).imag))[:2]
-    np.testing.assert_allclose(low, fem.critical_speeds(rotor, 1).frequencies[0], rtol=1e-6)
-
-
-def test_reduced_model_as_a_file(cli, tmp_path):
-    path = tmp_path / "three.toml"
-    outcome = cli("reduce", ROTOR, "--nodes", "7,12,18", "--model", path)
-    assert outcome.code == 0, outcome.err
-    model = read_ode_model(path)
-    small = reduce(read_rotor(ROTOR), (7, 12, 18), 2)
-    A = model.matrices(np.zeros(3))[0, :, :6]  # without the dampers
-    found = np.unique(np.abs(np.linalg.eigvals(A)).round(8))
-    np.testing.assert_allclose(found, small.frequencies, rtol=1e-10)
-    assert model.parameters == ("d_x7", "d_x12", "d_x18")
-    assert (model.start > 0).all()
-
-
 def test_sample_has_the_matrices_of_the_reduction():
     model = read_ode_model(sample_data() / "fit" / "run_down" / "model.toml")
     small = reduce(read_rotor(ROTOR), (7, 12, 18), 2)

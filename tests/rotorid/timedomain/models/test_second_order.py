@@ -75,17 +75,6 @@ def test_forces_of_time_inputs_and_states():
     np.testing.assert_allclose(run.y_theta, plain.y_theta, atol=1e-8)
 
 
-def test_measured_forces_are_solved_exactly():
-    t = np.linspace(0, 5, 21)
-    model = made(force={"y2": "a*u + 0.1"}, inputs=["u"])
-    record = Record(t, inputs={"u": np.sin(t**2)})
-    run = simulate(model, model.start, record)
-    integrated = simulate(model, model.start, record, method="dop853")
-    assert (run.method, integrated.method) == ("expm", "dop853")
-    np.testing.assert_allclose(run.y, integrated.y, atol=1e-10)
-    np.testing.assert_allclose(run.y_theta, integrated.y_theta, atol=1e-9)
-
-
 def test_names_and_rest_by_default():
     model = second_order([[2.0]], [["d"]], [[8.0]], estimate={"d": 0.1}, names=["tip"], force={"tip": 4})
     assert model.states == ("tip", "v_tip")
