@@ -80,7 +80,7 @@ class Discrete:
         return sum(int(one.counts.sum()) for one in self.mountings if one is not None)
 
 
-def solve_discrete(  # noqa: PLR0913
+def solve_discrete(
     W: ArrayLike,
     Y: ArrayLike,
     planes: Mapping[str, Holes | None] | Sequence[Holes | None],
@@ -89,8 +89,7 @@ def solve_discrete(  # noqa: PLR0913
     row_weights: ArrayLike | None = None,
     limits: Limits | None = None,
     time_limit: float = 5.0,
-    within: float = 1.0,
-    share: float = 0.0,
+    within: float | tuple[float, float] = 1.0,
 ) -> Discrete:
     """The mounting of all planes that leaves the least vibration, or little more with fewer pieces.
 
@@ -108,12 +107,12 @@ def solve_discrete(  # noqa: PLR0913
         Largest amplitudes (S·C = N, speed by speed), largest weights of the planes (of what is mounted and
         added together) and arcs in which no hole is used.
     time_limit
-        s; what is found until then is returned with its gap; as long again for fewer pieces.
+        s; what is found until then is returned with its gap; a fifth as long again proves that no fewer
+        pieces are enough.
     within
         So many times the least objective is good enough for fewer pieces: of the choices within it the one
-        of the fewest pieces, and of these the best; 1: the best of all.
-    share
-        Of the objective without weights that is good enough as well, where `within` is above 1.
+        of the fewest pieces, and of these the best; 1: the best of all. A second number: so large a share of
+        the objective without weights is good enough, too.
 
     Raises
     ------
@@ -138,7 +137,8 @@ def solve_discrete(  # noqa: PLR0913
         raise ValueError(f"there must be holes, or None, for each of the {P} planes")
     arcs = limits.forbidden if limits is not None else ((),) * P
     usable = [_usable(h, a, name) for (name, h), a in zip(named.items(), arcs, strict=True)]
-    return _Joint(task, tuple(named.values()), usable, tuple(named)).best(start, time_limit, within, share)
+    times, share = within if isinstance(within, tuple) else (within, 0.0)
+    return _Joint(task, tuple(named.values()), usable, tuple(named)).best(start, time_limit, times, share)
 
 
 def _usable(holes: Holes | None, arcs: Sequence[tuple[float, float]], name: str) -> BoolArray:
@@ -244,7 +244,7 @@ class _Joint:
             return result
         present = self.task.objective(np.zeros_like(result.weights))
         enough = max(within * result.objective, share * present, _SAME * float(np.linalg.norm(self.y)))
-        until = max(start + limit, time.perf_counter()) + limit
+        until = time.perf_counter() + limit / 5
         few, sure = fewest(q, self.own, self._squares, enough**2 * _KEPT, result.pieces, until, chunk)
         if few is None:
             return replace(result, proven=result.proven and sure)

@@ -127,7 +127,7 @@ def left_to_do(
         return LeftToDo("done", "every limit is kept", c, run, planes, there, nothing)
     if now >= before and explained is not True and there.any():
         why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
-        why += "; check what was mounted, and where"
+        why += f"; {stop or 'check what was mounted, and where'}"
         return LeftToDo("take off what is mounted", why, c, run, planes, there, nothing)
     if stop or not (c.sound or pieces is not None):
         return LeftToDo("add nothing yet", stop or c.decision.cause, c, run, planes, there, nothing)

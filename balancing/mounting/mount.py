@@ -94,8 +94,7 @@ def mount(
         row_weights=rows,
         limits=correction.limits,
         time_limit=time_limit,
-        within=within,
-        share=max(LITTLE, (correction.check_rms or 0.0) / rms(Y)) if Y.any() else 0.0,
+        within=(within, max(LITTLE, (correction.check_rms or 0.0) / rms(Y)) if Y.any() else 0.0),
     )
     after = Y + (W @ found.weights).reshape(Y.shape)
     after_covariance = None if errors is None else errors.check_run(total + found.weights, after)

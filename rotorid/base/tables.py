@@ -22,8 +22,10 @@ from __future__ import annotations
 
 import io
 import re
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -167,9 +169,41 @@ def excel(*tables: Table) -> bytes:
         for written in sheet[len(above) + 1]:
             written.font = Font(bold=True)
         sheet.freeze_panes = f"A{len(above) + 2}"
+    return workbook_bytes(book)
+
+
+def workbook_bytes(book: Any) -> bytes:  # noqa: ANN401
+    """A workbook as a file; no temporary files are made, which a full disk would break off."""
+    from openpyxl.drawing.spreadsheet_drawing import SpreadsheetDrawing
+    from openpyxl.worksheet._writer import WorksheetWriter
+    from openpyxl.writer.excel import ExcelWriter
+
+    class InMemory(ExcelWriter):  # type: ignore[misc]  # openpyxl has no types
+        def write_worksheet(self, ws: Any) -> None:  # noqa: ANN401
+            ws._drawing, part = SpreadsheetDrawing(), io.BytesIO()
+            ws._drawing.charts, ws._drawing.images = ws._charts, ws._images
+            writer = WorksheetWriter(ws, part)
+            writer.write()
+            ws._rels = writer._rels
+            self._archive.writestr(ws.path[1:], part.getvalue())
+            self.manifest.append(ws)
+
     stream = io.BytesIO()
-    book.save(stream)
+    InMemory(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
     return stream.getvalue()
+
+
+_FIRST = datetime(1980, 1, 1, tzinfo=UTC)
+"""Date of an archive."""
+
+
+class _Archive(zipfile.ZipFile):
+    """Dates its parts as the workbook, not by the clock."""
+
+    def open(self, name: Any, mode: Any = "r", *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
+        if mode == "w":
+            name.date_time = max(now(), _FIRST).timetuple()[:6]
+        return super().open(name, mode, *args, **kwargs)
 
 
 def html(table: Table) -> Markup:

@@ -13,13 +13,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import now
 from rotorid.tables.job.job_from_excel import NAMED, OPTIONAL, SETTINGS, job_in_sheets, key_parts
 from rotorid.tables.job.job_keys import CELLS, READINGS
 from rotorid.tables.job.workbook_sheets import dotted_key, number_cell, setting_cell
 from rotorid.tables.reader.columns import sheet_source
 from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma
-from rotorid.tables.reader.excel_pages import Line, header_row, put, saved, sized
+from rotorid.tables.reader.excel_pages import Line, header_row, put, sized
 from rotorid.tables.reader.excel_workbook import find_sheet, sheets_in
 from rotorid.tables.reader.grid import Cell, Row, clean, from_header, make_grid, show
 from rotorid.tables.reader.problems import InputError, Problems
@@ -180,7 +181,7 @@ class WorkbookVersion:
                 if isinstance(cell.value, float):  # nor would it write 17 digits
                     put(cell, cell.value, sheet.title)
         self._book.properties.modified = now().replace(tzinfo=None)
-        return {self.job: saved(self._book)}
+        return {self.job: workbook_bytes(self._book)}
 
 
 def _put(cell: Any, value: Cell) -> None:  # noqa: ANN401

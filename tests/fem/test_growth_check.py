@@ -127,6 +127,7 @@ def largest_growth(rotor, speed):
     return float((lam.real / np.abs(lam)).max())
 
 
+@pytest.mark.full
 def test_no_window_of_instability_is_missed_in_drawn_rotors():
     rng = np.random.default_rng(16)
     speeds = np.linspace(2.0, 1498.0, 120 if FULL else 40)

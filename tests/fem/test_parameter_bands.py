@@ -54,6 +54,7 @@ def test_critical_speeds_scatter_as_the_band_says(drawn):
     np.testing.assert_allclose(spread(ROTOR, criticals), scatter, rtol=WITHIN)
 
 
+@pytest.mark.full
 def test_the_band_does_not_close_at_a_resonance_and_is_said_to_be_rough(drawn):
     fine = np.linspace(150.0, 400.0, 501)
     top = fine[[np.argmax(amplitudes(ROTOR, fine)[:, 1])]]

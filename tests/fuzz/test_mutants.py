@@ -6,7 +6,7 @@ from repetitions import FULL
 from fuzz.examining import CHANGED, FINDING, REFUSED, SAME, bench, examine, judge
 from fuzz.subjects import SUBJECTS
 
-MUTANTS = 500 if FULL else 90
+MUTANTS = 500 if FULL else 40
 
 
 @pytest.fixture(scope="module")

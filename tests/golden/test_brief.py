@@ -12,24 +12,13 @@ from rotorid.samples import sample_data
 from rotorid.workflows import BalanceOptions, balance
 
 FEW = (
-    *(
-        "turbo",
-        "checked",
-        "holes-unsplit",
-        "model-job-ridge",
-        "left-in",
-        "unbalance-model-job",
-        "split-holes",
-    ),
-    *("tolerance-positions", "trial-weight-turbo", "calibrate-critical", "modes-chain", "simulate-lesson-5"),
-    *(
-        "critical-compressor",
-        "response-orbits",
-        "reduce-everything",
-        "identify-task_5_1",
-        "fit-shooting",
-        "study",
-    ),
+    "turbo",
+    "checked",
+    "split-holes",
+    "tolerance-positions",
+    "critical-compressor",
+    "reduce-everything",
+    "identify-task_5_1",
 )
 """Cases whose texts are read; `make test-full` reads all that are answers."""
 NAMES = [n for n, case in CASES.items() if case.group not in ("usage", "demos", "fleet")] if FULL else FEW

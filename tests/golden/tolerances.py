@@ -83,7 +83,7 @@ SPREAD = tuple(
             "*correlation*",
             "*uncertainty*",
         ),
-        *("*_low", "*_low[[]*", "*_high", "*_high[[]*", "*quantile*", "*probabilit*", "*spread*"),
+        *("*_low", "*_low[[]*", "*_high", "*_high[[]*", "*quantile*", "*probab*", "*spread*"),
     )
 ) + tuple(Tolerance("*", key, _DRAWN, relative=0.15, interval=True) for key in ("*ci95*", "*interval*"))
 """For `make golden-near` only: standard deviations, covariances, intervals, probabilities."""

@@ -64,6 +64,7 @@ def test_every_kind_of_file_has_the_same_bytes(twice):
     assert not [name for name in one if one[name].stat().st_size == 0]
 
 
+@pytest.mark.full
 def test_their_date_is_the_one_stated(twice):
     files = twice[0]
     document = json.loads(files["said_0.txt"].read_text(encoding="utf-8"))

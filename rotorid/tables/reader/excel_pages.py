@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import math
 import re
-import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from decimal import Decimal
 from typing import Any
 
+from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.tables.reader.grid import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
-_FIRST = datetime(1980, 1, 1, tzinfo=UTC)
-"""Date of an archive."""
 MOST_ROWS = 1048576
 _LONGEST_LIST = 255
 _WIDEST, _NARROWEST, _LOOKED_AT = 60, 9, 200
@@ -85,37 +81,7 @@ def book_bytes(pages: Sequence[Page], shown: str) -> bytes:
         _write(sheet, page)
         sheet.sheet_view.tabSelected = page.title == shown
     book.active = [page.title for page in pages].index(shown)
-    return saved(book)
-
-
-def saved(book: Any) -> bytes:  # noqa: ANN401
-    """A workbook as a file; no temporary files are made, which a full disk would break off."""
-    from openpyxl.drawing.spreadsheet_drawing import SpreadsheetDrawing
-    from openpyxl.worksheet._writer import WorksheetWriter
-    from openpyxl.writer.excel import ExcelWriter
-
-    class InMemory(ExcelWriter):  # type: ignore[misc]  # openpyxl has no types
-        def write_worksheet(self, ws: Any) -> None:  # noqa: ANN401
-            ws._drawing, part = SpreadsheetDrawing(), io.BytesIO()
-            ws._drawing.charts, ws._drawing.images = ws._charts, ws._images
-            writer = WorksheetWriter(ws, part)
-            writer.write()
-            ws._rels = writer._rels
-            self._archive.writestr(ws.path[1:], part.getvalue())
-            self.manifest.append(ws)
-
-    stream = io.BytesIO()
-    InMemory(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
-    return stream.getvalue()
-
-
-class _Archive(zipfile.ZipFile):
-    """Dates its parts as the workbook, not by the clock."""
-
-    def open(self, name: Any, mode: Any = "r", *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
-        if mode == "w":
-            name.date_time = max(now(), _FIRST).timetuple()[:6]
-        return super().open(name, mode, *args, **kwargs)
+    return workbook_bytes(book)
 
 
 def header_row(lines: Sequence[Line]) -> int:

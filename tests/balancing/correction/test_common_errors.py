@@ -106,6 +106,7 @@ def test_chi_square_of_check_runs_is_that_of_their_errors():
     np.testing.assert_allclose(each / stated, 1, atol=0.25)
 
 
+@pytest.mark.full
 def test_the_region_of_a_verdict_holds_the_truth():
     whole = tolerance(100, 1, "G2.5", planes={"A": None, "B": None})
     inside, warned = [], 0

@@ -9,7 +9,7 @@ from repetitions import FULL
 from balancing import ReadingErrors, correct, estimate_influence
 
 seeds = st.integers(0, 2**32 - 1)
-unhurried = settings(deadline=None, max_examples=100 if FULL else 40)  # a busy machine is no failure
+unhurried = settings(deadline=None, max_examples=100 if FULL else 15)  # a busy machine is no failure
 
 
 @unhurried

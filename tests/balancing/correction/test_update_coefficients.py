@@ -127,6 +127,7 @@ def test_runs_that_contradict_each_other_are_told():
     assert found.contradictions[0] in found.warnings
 
 
+@pytest.mark.full
 def test_chance_is_that_of_machines_of_the_type_and_small_for_others():
     rng, chances = np.random.default_rng(7), []
     known = prior(S=1, C=2, P=2)

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.limited_problems import minmax_cone
+from repetitions import FULL
 
 from balancing.data.limits import Limits
 from balancing.mounting import fewest_pieces
@@ -76,7 +77,7 @@ def grid(planes):
     return np.stack([g.ravel() for g in np.meshgrid(*map(everything, planes), indexing="ij")], axis=1)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(60 if FULL else 20))
 def test_equals_exhaustive_enumeration(seed):
     W, Y, planes, w = case(seed)
     D = grid(planes)
@@ -104,7 +105,7 @@ def fewest_of_all(planes, size):
     return fewest, size[good & (number == fewest)].min()
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(40 if FULL else 14))
 def test_the_fewest_pieces_within_reach_equal_enumeration(seed):
     W, Y, planes, w = case(seed)
     D = grid(planes)
@@ -257,6 +258,7 @@ def test_steps_of_free_amounts_equal_enumeration(method):
         assert np.allclose(mounting.amounts / holes.step, np.rint(mounting.amounts / holes.step))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", METHODS)
 def test_three_planes_of_24_holes_and_60_readings(method):
     rng = np.random.default_rng(1)

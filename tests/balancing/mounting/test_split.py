@@ -114,6 +114,7 @@ def test_opposite_pieces_are_not_mounted_for_nothing():
     assert split(0.0, from_list(equal_holes(36), [0.01])).pieces == 0
 
 
+@pytest.mark.full
 def test_more_than_can_be_listed_has_an_honest_bound():
     angles = np.sort(np.random.default_rng(5).uniform(0, 2 * np.pi, 40 if FULL else 28))
     holes = from_list(angles, [0.01, 0.02, 0.03], per_hole=2, stock=[9, 9, 9])

@@ -65,6 +65,7 @@ def test_weighted_is_the_effective_variance_fit():
     assert found.fit_dof == 2 * S * C - 2 * P
 
 
+@pytest.mark.full
 def test_truth_lies_in_the_weighted_region():
     hits = 0
     for seed in range(200):
@@ -190,6 +191,7 @@ def test_limits_of_each_method_are_kept():
     np.testing.assert_allclose(same.weights, free["weighted"].weights, rtol=1e-9)
 
 
+@pytest.mark.full
 def test_weighted_with_limits_is_the_constrained_optimum_and_passes_without_a_jump():
     from scipy.optimize import minimize
 

@@ -83,7 +83,7 @@ def in_both_planes(rotor, omega, node):
 
 
 @given(machines(elements=(2, 40)), st.integers(0, 10**6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40 if WHOLE else 12, deadline=None)
 def test_fast_is_exact_is_dense(rotor, seed):
     rng = np.random.default_rng(seed)
     node = int(rng.integers(1, rotor.n_nodes + 1))
@@ -113,7 +113,7 @@ def test_uneven_material_damping_on_any_supports(rotor):
 
 
 @given(machines(elements=(2, 20)))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25 if WHOLE else 10, deadline=None)
 def test_the_power_of_the_unbalance_is_what_supports_and_shaft_take(rotor):
     rotor = dataclasses.replace(rotor, material_damping=0.0)
     speeds = np.array([60.0, 350.0, 1400.0])
@@ -132,7 +132,7 @@ def test_the_power_of_the_unbalance_is_what_supports_and_shaft_take(rotor):
 
 
 @given(machines(elements=(2, 16), kinds=("symmetric",)))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20 if WHOLE else 8, deadline=None)
 def test_reciprocity_and_superposition(rotor):
     nodes = list(range(1, rotor.n_nodes + 1))
     speeds = [40.0, 500.0, 1900.0]

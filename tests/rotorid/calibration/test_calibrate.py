@@ -192,6 +192,7 @@ def rounded(rotor, n=3):
     return MeasuredFrequencies(np.arange(1, n + 1), frequencies, np.full(n, RPM / np.sqrt(12)))
 
 
+@pytest.mark.full
 def test_two_stiffnesses_from_three_rounded_critical_speeds():
     """Both lie in their 95 % intervals as often as that says, over drawn pairs; or two pairs are told."""
     unknowns = [Unknown(f"bearing[{i}].stiffness", start=1e8) for i in (1, 2)]

@@ -185,7 +185,9 @@ def test_a_check_run_is_asked_too(cli, tmp_path, assumed):
     document = cli("balance", job, "--json").json
     assert document["convention_test"]["verdict"] == "contradicted"
     assert document["warnings"][0].startswith("these runs contradict 'lead'")
-    assert cli("balance", job).out.startswith("Do not mount anything yet: ")
+    first = " ".join(cli("balance", job).out.partition("\n\n")[0].split())
+    assert first.startswith("Not as predicted: ")
+    assert "Take off what is mounted; the bare rotor had" in first
 
 
 def test_stored_coefficients(cli, tmp_path):

@@ -80,6 +80,7 @@ def test_material_removed_is_on_the_other_side(cli, tmp_path):
     assert "(remove)" in cli("balance", path).out
 
 
+@pytest.mark.full
 def test_table_of_holes_is_written(cli, tmp_path):
     target = tmp_path / "holes.csv"
     assert cli("balance", HOLES, "--split", "--output", target).code == 0

@@ -192,6 +192,7 @@ def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, w
         assert cli("balance", *args, *more).code == 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", FEW_DRAWS)
 def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, method):
     job = job_with(tmp_path, "")

@@ -47,7 +47,13 @@ def demo(outcomes, cli, monkeypatch):
     return run
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+EVERY_TIME = ("main", "rotor", "identification")
+"""Samples of which `make test` draws the pictures."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in EVERY_TIME else pytest.mark.full) for name in SAMPLES]
+)
 def test_a_sample_runs_and_writes_its_pictures(demo, name):
     outcome, place = demo(name)
     sample = SAMPLES[name]

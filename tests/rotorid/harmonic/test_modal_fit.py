@@ -86,6 +86,7 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
     np.testing.assert_allclose(result.shapes[0], shapes[:, 1], rtol=2e-3)
 
 
+@pytest.mark.full
 def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli):
     """Lesson 7 whole: amplitudes around resonances, modes, stiffnesses; 40 drawn tests."""
     from rotorid.tables import read_harmonic_model, read_measurements
@@ -180,6 +181,7 @@ def test_readings_that_lack_are_left_out():
     np.testing.assert_allclose(result.shapes, shapes.T, rtol=1e-7)
 
 
+@pytest.mark.full
 def test_peaks_of_noise_are_no_modes():
     """Run-ups under unbalance with an error of one size: over ω², low speeds show peaks of noise."""
     omega, told = np.linspace(10, 110, 100), 0
@@ -196,6 +198,7 @@ def test_peaks_of_noise_are_no_modes():
     assert told >= (4 if FULL else 2)
 
 
+@pytest.mark.full
 def test_few_readings_do_not_choose_what_errors_are_the_same_in():
     """Four readings with errors that are a share: chance alone makes one size fit better in half of all."""
     omega0, _ = undamped(M, K)

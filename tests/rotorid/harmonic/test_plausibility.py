@@ -113,6 +113,7 @@ def test_an_equation_that_follows_from_others_is_refused(more):
                           estimate=[*names, "b3" if "b1" in more else "k3"]).parameters  # fmt: skip
 
 
+@pytest.mark.full
 def test_noise_and_a_wrong_model_are_told_apart_by_the_order_of_the_residuals():
     noisy = [readings(seed, 2, AmplitudeErrors(0.2, 0.2), stated=False) for seed in range(8)]
     words = [" ".join(identify(m, d, method="output-error").warnings) for m, d in noisy]

@@ -35,6 +35,7 @@ def off(found, exact):
     return np.abs(found - exact).max(axis=0) / np.abs(exact).max(axis=0)
 
 
+@pytest.mark.full
 def test_an_acceleration_that_changes():
     """A coast-down, Ω = 250 e^{−t/20}: read often enough the spline is it."""
     time = np.linspace(0, 30, 2000)

@@ -299,6 +299,7 @@ def test_rotating_damping_against_its_threshold():
     assert np.hypot(*cycle.ends.T).max() == pytest.approx(np.sqrt((whirl**2 - 1) / k3), rel=1e-7)
 
 
+@pytest.mark.full
 def test_a_journal_without_mass_against_long_integration():
     """A disc on a flexible shaft in a film, with unbalance and weight: the branch to 1e-4 of its size."""
     m, k, u, W = 30.0, 5e6, 30.0 * 2e-5, 300.0
@@ -378,6 +379,7 @@ def test_a_rotor_that_does_not_whirl_and_one_without_mass_and_damping():
     assert "neither mass nor damping" in told.warnings[-1]
 
 
+@pytest.mark.full
 def test_motions_that_no_branch_shows_are_said():
     """A period doubling and self-excited whirl, not asked for."""
     damping = 0.04

@@ -245,6 +245,7 @@ def test_the_frequency_of_a_whirl_with_other_lines_beside_it(ratio):
     assert end.whirl_ratio == pytest.approx(ratio, abs=1e-4)
 
 
+@pytest.mark.full
 def test_three_masses_in_two_bearings_without_mass():
     # against scipy, where the velocities of the journals follow from the balance of forces; the issue: 1e-4
     L, D, c, eta = 0.05, 0.11, 1.5e-4, 0.02

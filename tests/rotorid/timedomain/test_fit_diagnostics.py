@@ -35,6 +35,7 @@ def test_three_masses_from_far_off(method):
 STARTS = [(1.0, 1.0, 1.0), (0.5, 0.5, 5.0), (0.0, 1.5, 0.5)]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("start", STARTS if FULL else STARTS[:1])
 def test_fitzhugh_nagumo_from_far_off(start):
     found = fit(

@@ -39,6 +39,7 @@ def test_the_angle_is_far_more_exact_than_an_edge():
     assert tacho.warnings == ()
 
 
+@pytest.mark.full
 def test_its_stated_error_holds():
     ratios = []
     for seed in range(40):

@@ -82,6 +82,7 @@ def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
     assert "a period of its own" in told.err
 
 
+@pytest.mark.full
 def test_on_linear_supports_it_is_the_response():
     """The compressor on its table of bearings; the rotor is reduced here, which costs a thousandth."""
     folder = sample_data() / "compressor"

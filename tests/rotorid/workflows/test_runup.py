@@ -42,6 +42,7 @@ def test_the_document(cli, rotor_and_sweep, vectors):
         assert abs(found - 2e6 * exact) < 5 * roll["std_um_pp"]
 
 
+@pytest.mark.full
 def test_lag_is_the_same_and_the_wrong_way_is_told(cli, rotor_and_sweep, vectors, tmp_path):
     lag = table(tmp_path / "lag.csv", [rotor_and_sweep[1]], lag=True)
     known, same = (

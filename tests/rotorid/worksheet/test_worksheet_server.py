@@ -112,6 +112,7 @@ def test_what_a_page_should_not_ask_for_is_one_sentence(shared):
     assert served.state()["results"]["answer"] is not None
 
 
+@pytest.mark.full
 def test_kill_loses_no_finished_cell(tmp_path, serve):
     job = copy(tmp_path) / "job.toml"
     served = serve(job)

@@ -116,6 +116,7 @@ def test_the_own_masses_of_a_chain_are_among_its_sets(data):
     assert len(sets) <= (1, 2, 6)[n - 1]
 
 
+@pytest.mark.full
 def test_elimination_finds_what_many_random_starts_find():
     """Two ways to the sets of three masses; there are 2, 4 or 6 of them."""
     rng = np.random.default_rng(3)

@@ -324,6 +324,7 @@ def test_divergence_is_told_promptly_with_time_and_state(rate, method):
     assert time.process_time() - begin < 2.0
 
 
+@pytest.mark.full
 def test_too_many_steps_end_with_an_error():
     model = ode_model({"x": "v", "v": "-w**2*x + cos(t)"}, initial={"x": 1, "v": 0}, estimate={"w": 1.0})
     begin = time.process_time()
