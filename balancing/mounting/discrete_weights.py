@@ -126,8 +126,9 @@ def solve_discrete(
         raise ValueError(f"the method must be 'least-squares' or 'minmax'; got {method!r}")
     if not (np.isfinite(time_limit) and time_limit > 0):
         raise ValueError("the time limit must be a number of seconds above 0")
-    if not 1 <= within < np.inf:
-        raise ValueError(f"the objective can be within 1 or more times of the least, not {within!r}")
+    times, share = within if isinstance(within, tuple) else (within, 0.0)
+    if not 1 <= times < np.inf:
+        raise ValueError(f"the objective can be within 1 or more times of the least, not {times!r}")
     residual = None if limits is None else limits.residual.ravel()
     most = None if limits is None else limits.max_weight
     task = problem(W, Y, row_weights, most, residual, minmax=method == "minmax")
@@ -137,7 +138,6 @@ def solve_discrete(
         raise ValueError(f"there must be holes, or None, for each of the {P} planes")
     arcs = limits.forbidden if limits is not None else ((),) * P
     usable = [_usable(h, a, name) for (name, h), a in zip(named.items(), arcs, strict=True)]
-    times, share = within if isinstance(within, tuple) else (within, 0.0)
     return _Joint(task, tuple(named.values()), usable, tuple(named)).best(start, time_limit, times, share)
 
 
