@@ -46,7 +46,7 @@ def test_few_pieces_where_exact_weights_leave_nothing(seed):
 def test_the_larger_share_is_enough_for_fewer_pieces():
     influence = drawn(3)
     W, Y = influence.W.reshape(2, 2), influence.baseline.ravel()
-    found = [solve_discrete(W, Y, (HOLES, HOLES), within=1.2, share=share) for share in (0.02, 0.2, 0.6, 1.1)]
+    found = [solve_discrete(W, Y, (HOLES, HOLES), within=(1.2, share)) for share in (0.02, 0.2, 0.6, 1.1)]
     pieces = [one.pieces for one in found]
     assert pieces[0] > pieces[1] > pieces[2] > pieces[3] == 0
     for one, share in zip(found, (0.02, 0.2, 0.6, 1.1), strict=True):
