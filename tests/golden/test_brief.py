@@ -56,6 +56,7 @@ def complaints(words, output):
     return found
 
 
+@pytest.mark.full
 def test_an_answer_fits_a_terminal_and_begins_with_the_judgement(printed):
     assert len(printed) >= len(FEW)
     assert {name: complaints(CASES[name].words, text) for name, text in printed.items()} == {

@@ -70,7 +70,10 @@ SETS = {
 }
 
 
-@pytest.fixture(scope="module", params=SETS)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=() if name == "spare readings" else pytest.mark.full) for name in SETS],
+)
 def drawn(request):
     """Jobs on rotors drawn around a model, what was true, and the same job without any error."""
     S, C, M, lack, method, outside, mounted = SETS[request.param]

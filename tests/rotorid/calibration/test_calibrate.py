@@ -212,6 +212,7 @@ def test_two_stiffnesses_from_three_rounded_critical_speeds():
     assert np.mean(inside) > 0.8  # 95 % to three deviations of such a count
 
 
+@pytest.mark.full
 def test_the_search_looks_for_another_pair_that_explains_as_well():
     truth = 1.836e8, 1.337e8
     unknowns = [Unknown(f"bearing[{i}].stiffness", start=1e8) for i in (1, 2)]
@@ -336,6 +337,7 @@ def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypa
     assert found.rotor.calibration.needs_trial_run
 
 
+@pytest.mark.full
 def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
     """Readings of a rotor with another modulus: χ² is too large, by speed and sensor, too."""
     truth = with_parameters(machine(), {"material.youngs_modulus.scale": 0.7})

@@ -144,7 +144,7 @@ def test_pieces_against_each_other_are_said(cli, tmp_path):
     text = 'runs = "runs.csv"\nweights = "weights.csv"\n'
     text += "".join(f"[planes.{name}]\n{plane}" for name in ("left", "middle", "right"))
     (tmp_path / "job.toml").write_text(text)
-    outcome = cli("balance", tmp_path / "job.toml", "--split", "--json", "--method", "least-squares")
+    outcome = cli("balance", tmp_path / "job.toml", "--split", "--best", "--json")
     assert outcome.code == 0, outcome.err
     mounting = outcome.json["mounting"]
     for plane in mounting["planes"]:

@@ -170,6 +170,7 @@ def test_best_planes_are_used_and_leave_out_what_the_job_leaves_out(answers, tmp
     assert answers(job, "--best-planes", "2")["best_planes"]["choices"] == 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("weights", ['[sensors."probe 4"]\nweight = 0\n', "speed_weights"])
 @pytest.mark.parametrize("method", FEW_DRAWS)
 def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, weights):

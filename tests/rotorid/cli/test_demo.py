@@ -47,7 +47,7 @@ def demo(outcomes, cli, monkeypatch):
     return run
 
 
-EVERY_TIME = ("main", "rotor", "identification")
+EVERY_TIME = ("main", "identification")
 """Samples of which `make test` draws the pictures."""
 
 

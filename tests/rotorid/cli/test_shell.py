@@ -209,7 +209,7 @@ def test_speeds_are_bounded():
                 band(f"1:{text}{unit}")
 
 
-@pytest.mark.parametrize("way", [["-OO"], []])
+@pytest.mark.parametrize("way", [["-OO"], pytest.param([], marks=pytest.mark.full)])
 def test_without_docstrings_commands_work_and_their_help_is_the_same(way, tmp_path):
     def output(way, *words, **environment):
         command = [sys.executable, *way, "-m", "rotorid", *map(str, words)]

@@ -59,6 +59,7 @@ def test_a_right_model_is_left_alone(method, stated):
     assert (method == "equation-error" and not stated) or not any(quiet), quiet
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("size", [0.01, 0.05])
 def test_what_noise_does_to_the_linear_estimate_is_said_and_the_rest_covers(size):
     """Two masses, errors not stated: silent intervals contain the truth, and no draw blames the model."""
@@ -75,6 +76,7 @@ def test_what_noise_does_to_the_linear_estimate_is_said_and_the_rest_covers(size
     assert np.mean(inside) > 0.85, (np.mean(inside), len(inside))
 
 
+@pytest.mark.full
 def test_ratios_that_noise_biases_are_said_too():
     model = harmonic_model(
         ["(m1*p**2 + b*p + k1)*X1 = k1*Z + k2*(X2 - X1)", "m2*p**2*X2 + k2*(X2 - X1) = 0"],

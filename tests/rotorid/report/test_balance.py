@@ -21,7 +21,7 @@ JOBS = {
     "hard": ("hard", {}),
 }
 FOLDERS = {"hard": hard, "on top": on_top}
-LONG = ("left in", "holes")
+LONG = ("left in", "holes", "hard")
 
 
 @pytest.fixture(

@@ -69,6 +69,7 @@ def shown(window, told):
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["bk_two_plane", "left_in"] if FULL else ["left_in"])
 def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, name):
     folder, sample, window = tmp_path / "new", sample_data() / name, windows[0]
