@@ -29,8 +29,10 @@ unexport PYTHONDONTWRITEBYTECODE
 define environment
 $(PYTHON) -c 'import sys; sys.exit("rotorid needs Python 3.11 or newer; set PYTHON=") if sys.version_info < (3, 11) else None'
 $(PYTHON) -m venv $(1)
-$(1)/bin/python -m pip -q install --upgrade 'pip>=25.3'
+$(1)/bin/python -m pip -q install --upgrade 'pip>=25.3' uv
 endef
+# $(call install,FOLDER) WHAT: into it, with the tested versions; uv does in half a minute what takes pip one and a half
+install = $(1)/bin/uv pip install -q --compile-bytecode --python $(1)/bin/python $(CONSTRAINTS:%=-c % -b %)
 
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
@@ -168,11 +170,11 @@ $(VENV)/.pip: $(CONSTRAINTS)
 	touch $@
 
 $(VENV)/.user: $(VENV)/.pip pyproject.toml
-	$(BIN)/python -m pip -q install -e .
+	$(call install,$(VENV)) -e .
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.user
-	$(BIN)/python -m pip -q install $(GROUPS:%=--group %)
+	$(call install,$(VENV)) $(GROUPS:%=--group %)
 	touch $@
 
 $(BENCH_VENV)/.bench: pyproject.toml $(CONSTRAINTS)

@@ -165,7 +165,7 @@ checked-grade               balance {TURBO}/checked.toml --planes left,right --g
 checked-grade-positions     balance {TURBO}/checked.toml --planes left,right --grade G6.3 --rotor-mass 558kg --service-speed 4500rpm --positions left=600mm,right=2500mm --bearings 200mm,3000mm --centre 1600mm
 holes-report                balance {TURBO}/holes.toml --split --report sheet.html
 holes-plot                  balance {TURBO}/holes.toml --split --plot discs.png
-holes-minmax                balance {TURBO}/holes.toml --split --method minmax --split-seconds 60
+holes-minmax                balance {TURBO}/holes.toml --split --best --method minmax --split-seconds 60
 holes-unsplit               balance {TURBO}/holes.toml
 model-job                   balance {MODEL_JOB} --model-error 2
 model-job-assumed           balance {MODEL_JOB}

@@ -97,6 +97,7 @@ def test_every_example_runs_as_typed(cli, checkout, name, line):
     assert (outcome.code, outcome.err) == (0, outcome.err)
 
 
+@pytest.mark.full
 def test_rotorid_alone_shows_the_jobs_with_examples_that_run(cli, checkout):
     outcome = cli()
     lines = outcome.out.splitlines()

@@ -21,7 +21,7 @@ JOBS = {
     "hard": ("hard", {}),
 }
 FOLDERS = {"hard": hard, "on top": on_top}
-LONG = ("left in", "holes", "hard")
+LONG = ("left in", "holes", "hard", "model")
 
 
 @pytest.fixture(

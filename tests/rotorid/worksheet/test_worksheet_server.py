@@ -31,7 +31,7 @@ def plain(document):
     ("name", "kinds"),
     [
         ("job.toml", {"answer": ()}),
-        ("holes.toml", {"pieces": ("--split",)}),
+        pytest.param("holes.toml", {"pieces": ("--split",)}, marks=pytest.mark.full),
         ("checked.toml", {"answer": (), "trim": ("--refine",)}),
     ],
 )
