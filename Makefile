@@ -32,7 +32,7 @@ $(PYTHON) -m venv $(1)
 $(1)/bin/python -m pip -q install --upgrade 'pip>=25.3' uv
 endef
 # $(call install,FOLDER) WHAT: into it, with the tested versions; uv does in half a minute what takes pip one and a half
-install = $(1)/bin/uv pip install -q --compile-bytecode --python $(1)/bin/python $(CONSTRAINTS:%=-c % -b %)
+install = $(1)/bin/uv pip install -q --compile-bytecode --python $(1)/bin/python $(foreach file,$(CONSTRAINTS),-c $(file) -b $(file))
 
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
