@@ -175,7 +175,8 @@ def _settings() -> Page:
 
 _MORE = (
     "Further sheets that may be added: check (readings of the check run, the columns of runs) and "
-    "check_weights (what was mounted then, the columns of weights; without it the proposed weights);",
+    "check_weights (what was mounted then, the columns of weights; without it the pieces of --split "
+    "where there are holes, else the proposed weights);",
     "slow_roll (columns sensor, amplitude, phase_deg, optional speed_rpm: subtracted from all readings); "
     "influence (coefficients, as --save-influence writes them).",
     "Repeated readings: a column repeat in runs (1, 2, ...). Holes with names or at any angle: holes_deg and "
