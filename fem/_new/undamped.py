@@ -1,0 +1,43 @@
+"""Names of the old modules until this one is written."""
+
+from fem.critical import (
+    NOT_COUNTED,
+    critical_speeds,
+    critical_speeds_below,
+    critical_speeds_near,
+    lowest_critical_speeds,
+)
+from fem.matrices.undamped_matrices import NO_MASS, Pencil, one_plane, whole_rotor
+from fem.mesh import MeshCheck, mesh_check
+from fem.modes_result import Modes
+from fem.solvers.eigen import (
+    DENSE,
+    Spectrum,
+    factor,
+    fine_mesh_warning,
+    finite_modes,
+    lowest_modes,
+    rigid_scale,
+)
+
+__all__ = [
+    "DENSE",
+    "NOT_COUNTED",
+    "NO_MASS",
+    "MeshCheck",
+    "Modes",
+    "Pencil",
+    "Spectrum",
+    "critical_speeds",
+    "critical_speeds_below",
+    "critical_speeds_near",
+    "factor",
+    "fine_mesh_warning",
+    "finite_modes",
+    "lowest_critical_speeds",
+    "lowest_modes",
+    "mesh_check",
+    "one_plane",
+    "rigid_scale",
+    "whole_rotor",
+]
