@@ -1,0 +1,39 @@
+"""Pictures of rotors, their modes and their vibration: a table of contents."""
+
+from fem._new.plots.campbell import campbell_figure, draw_campbell, draw_log_decrements, draw_speed_map
+from fem._new.plots.response import (
+    bode_figure,
+    draw_bode,
+    draw_deflected_shape,
+    draw_influence,
+    draw_orbits,
+    draw_polar,
+    draw_response,
+    influence_figure,
+    orbits_figure,
+    polar_figure,
+    right_angles,
+)
+from fem._new.plots.rotor import draw_deflection, draw_modes, draw_rotor, smooth_shapes
+
+__all__ = [
+    "bode_figure",
+    "campbell_figure",
+    "draw_bode",
+    "draw_campbell",
+    "draw_deflected_shape",
+    "draw_deflection",
+    "draw_influence",
+    "draw_log_decrements",
+    "draw_modes",
+    "draw_orbits",
+    "draw_polar",
+    "draw_response",
+    "draw_rotor",
+    "draw_speed_map",
+    "influence_figure",
+    "orbits_figure",
+    "polar_figure",
+    "right_angles",
+    "smooth_shapes",
+]
