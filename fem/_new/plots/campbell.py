@@ -172,16 +172,9 @@ def _draw_curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
     first, last = float(speeds.min()), float(speeds.max())
     room = 0.12 * (last - first) or 0.05 * last or 1.0
     ax.set_xlim(0.0 if first < 0.3 * last else first - room / 4, last + room)
-    heights = [height for height, _, _ in ends]
-    near = 0.03 * (max(heights, default=1.0) - min(0.0, *heights, 0.0))
-    base, column = -np.inf, 0
-    for height, text, color in sorted(ends):  # close neighbours stand side by side
-        column = column + 1 if height - base < near else 0
-        base = base if column else height
-        shift = (5 + 11 * column, 0)
-        note(
-            ax, text, (last, height), shift, va="center", color=color, fontweight="bold", annotation_clip=True
-        )
+    for height, text, color in ends:
+        note(ax, text, (last, height), (5 + 11 * (int(text) % 2), 0), va="center", color=color,
+             fontweight="bold", annotation_clip=True)  # fmt: skip
 
 
 def _label_criticals(ax: Axes, criticals: Sequence[tuple[float, float]]) -> None:

@@ -293,28 +293,17 @@ def draw_orbits(
 def orbits_figure(response: Response, sensors: Sequence[SensorLike], k: int) -> Figure:
     """Make a figure of the orbits of the sensors' nodes at speed k, from 0, of the response.
 
-    Above them is the rotor with their places. Of more than four, the four largest are drawn.
+    Of more than four, the four largest are drawn.
     """
     rotor, omega = response.rotor, response.speeds[k]
     places = list(dict.fromkeys(as_sensor(sensor, rotor).node for sensor in sensors))
-    by_size = sorted(places, key=lambda place: -response.major[k, response.column(place)])
-    shown = [place for place in places if place in by_size[:_ORBITS]]
-    some = "" if len(shown) == len(places) else f", the {_ORBITS} largest orbits of {len(places)}"
-    figure = new_figure(7.4)
-    above, below = figure.subplots(2, height_ratios=(1, 3))
-    draw_rotor(rotor, above, height=1.0)
-    for part in above.collections:
-        part.set_color(QUIET)
-    for i, place in enumerate(shown):
-        x = rotor.positions[rotor.node(place) - 1]
-        above.plot([x, x], [-1.3, 1.3], color=COLORS[i], marker=MARKERS[i], markersize=8, zorder=6)
-    above.set(xlabel="position, m", yticks=[], ylim=(-1.5, 1.5))
-    above.spines["left"].set_visible(False)
-    labels = [f"node {place}" if isinstance(place, int) else str(place) for place in shown]
-    columns = [response.column(place) for place in shown]
+    columns = np.array([response.column(place) for place in places])
+    largest = np.sort(np.argsort(-response.major[k, columns], kind="stable")[:_ORBITS])
+    some = "" if len(places) <= _ORBITS else f", the {_ORBITS} largest orbits of {len(places)}"
     title = f"at {omega * RPM:.0f} rpm = {omega:.5g} rad/s, a stable speed{some}"
-    draw_orbits(response.x[k, columns], response.y[k, columns], labels, below, title=title)
-    return figure
+    labels = [f"node {places[i]}" if isinstance(places[i], int) else str(places[i]) for i in largest]
+    x, y = response.x[k, columns[largest]], response.y[k, columns[largest]]
+    return on_figure(lambda ax: draw_orbits(x, y, labels, ax, title=title), height=6.0)
 
 
 def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> Axes:

@@ -109,18 +109,26 @@ def draw_rotor(
     if height is None:
         top = 1e3 * largest
         ax.set(xlabel="position, m", ylabel="radius, mm", ylim=(-1.9 * top, (1.55 if planes else 1.35) * top))
-    if planes:
-        x, end = rotor.positions[np.array(plane_nodes) - 1], _inside(ax, 0.87)
-        ax.vlines(x, -end, end, color=COLORS[1], linestyle=(0, (5, 2, 1, 2)), linewidth=1.2, zorder=5,
-                  label=f"correction plane{_s(planes)}")  # fmt: skip
-        _names(ax, x, [str(plane) for plane in planes], end, COLORS[1], up=True)
-    if sensors:
-        at = np.array(sensor_nodes) - 1
-        x, tips, end = rotor.positions[at], -1e3 * surface(rotor)[at], _inside(ax, 0.13)
-        ax.vlines(x, np.minimum(tips, end), np.maximum(tips, end), color=COLORS[0], linewidth=1.2, zorder=5,
-                  label=f"sensor{_s(sensors)}")  # fmt: skip
-        ax.scatter(x, tips, marker="^", s=46, color=COLORS[0], edgecolor="white", linewidth=0.6, zorder=5.5)
-        _names(ax, x, [str(label(sensor)) for sensor in sensors], end, COLORS[0], up=False)
+    low, high = ax.get_ylim()
+    inside = 0.13 * (high - low)
+    for kind, color, names, nodes in (
+        ("correction plane", COLORS[1], planes, plane_nodes),
+        ("sensor", COLORS[0], [label(sensor) for sensor in sensors], sensor_nodes),
+    ):
+        if not nodes:
+            continue
+        at, plane = np.array(nodes) - 1, kind != "sensor"
+        x, end = rotor.positions[at], high - inside if plane else low + inside
+        other = np.full(len(at), -end) if plane else -1e3 * surface(rotor)[at]
+        style = (0, (5, 2, 1, 2)) if plane else "-"
+        ax.vlines(x, np.minimum(other, end), np.maximum(other, end), color=color, linestyle=style,
+                  linewidth=1.2, zorder=5, label=f"{kind}{_s(nodes)}")  # fmt: skip
+        for place, name, row in sorted(zip(x.tolist(), names, range(len(at)), strict=True)):
+            shift = 3 + 11 * (row % 2 if len(at) > 4 else 0)
+            below: dict[str, Any] = {"ha": "center", "va": "bottom" if plane else "top", "color": color}
+            note(ax, str(name), (place, end), (0, shift if plane else -shift), **below)
+        if not plane:
+            ax.scatter(x, other, marker="^", s=46, color=color, edgecolor="white", linewidth=0.6, zorder=5.5)
     if height is None and ax.get_legend_handles_labels()[0]:
         legend_above(ax, marker_scale=0.7)
     return ax
@@ -237,20 +245,3 @@ def _draw_supports(rotor: Rotor, ax: Axes, scale: float) -> None:
         ax.scatter(x, -radius, label=f"{noun}{_s(at)}{standing}{_s(at) if standing else ''}", **style)
         if "seal" in noun:
             ax.scatter(x, radius, **style)
-
-
-def _inside(ax: Axes, part: float) -> float:
-    """Height at this part of the vertical axis."""
-    low, high = ax.get_ylim()
-    return low + part * (high - low)
-
-
-def _names(ax: Axes, x: FloatArray, names: Sequence[str], height: float, color: str, *, up: bool) -> None:
-    """Names above or below places; neighbours that would overlap go to a second line."""
-    low, high = ax.get_xlim()
-    last, row = -math.inf, 0
-    for place, name in sorted(zip(x.tolist(), names, strict=True), key=lambda pair: pair[0]):
-        row = 1 - row if place - last < (high - low) * (0.035 + 0.008 * len(name)) else 0
-        last = place
-        shift = (0, (3 + 11 * row) * (1 if up else -1))
-        note(ax, name, (place, height), shift, ha="center", va="bottom" if up else "top", color=color)
