@@ -10,8 +10,8 @@ summed over the length,
     P(θ) = η L³ (a cos θ + b sin θ) / h³,
 
 positive on the half circle around α = atan2(b, a). With R = D / 2 and θ = β + φ, the film being the half
-circle around β (there φ runs from −π/2 to π/2), and p + i q = z n̄ / c, u + i w = (a + i b) n̄, the force on the
-journal, F = −R ∫ P exp(iθ) dθ, is F n̄ = −C (u I₁ + w I₂ + i (u I₂ + w I₃)), C = η L³ R / c³, with
+circle around β (there φ runs from −π/2 to π/2), and p + i q = z n̄ / c, u + i w = (a + i b) n̄, the force on
+the journal, F = −R ∫ P exp(iθ) dθ, is F n̄ = −C (u I₁ + w I₂ + i (u I₂ + w I₃)), C = η L³ R / c³, with
 
     I₁, I₂, I₃ = ∫ (cos² φ, sin φ cos φ, sin² φ) / (1 − p cos φ − q sin φ)³ dφ
                = ½ J_pp, ½ J_pq, ½ J_qq  of  J = ∫ dφ / (1 − p cos φ − q sin φ).
