@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fem._new.rotor import KINDS, Calibration, Pedestal, Rotor, Support, is_reading
+from fem._new.rotor import KINDS, Calibration, Disc, Pedestal, Rotor, Support, is_reading
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.registry import names
-from rotorid.base.suggestions import did_you_mean, one_of
-from rotorid.base.text import counted, listing
+from rotorid.base.suggestions import one_of
 
 __all__ = [
     "NORMAL_95",
@@ -55,20 +54,18 @@ _KEYS: dict[str, dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(names(KINDS), _SUPPORT),
     "disc": {name: (name,) for name in _DISC} | {"scale": _DISC},
     "material": {name: (name,) for name in _MATERIAL},
-    "probe": {"angle": (), "gain": ()},
-    "key_phasor": {"angle": ()},
 }
 """By kind and name: keys of `_numbers`."""
-_SUPPORTED = names(KINDS)
+_READINGS = ("probe[NAME].angle", "probe[NAME].gain", "key_phasor.angle")
 _SUFFIXES = ("", "scale", "offset")  # in the order in which they act
 
 
 class _Parameter(NamedTuple):
-    """A path, read: places in `rotor.supports` or `rotor.discs`, which of their numbers, and the suffix."""
+    """A path, read: items of its kind by place in `rotor.supports` or `rotor.discs`, keys, and the suffix."""
 
     path: str
     kind: str
-    items: tuple[int, ...]
+    items: dict[int, Any]
     keys: tuple[str, ...]
     suffix: str
 
@@ -108,17 +105,17 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
         parameter = _parameter(rotor, path)
         for i in parameter.items:
             changes[parameter.kind, i].append((parameter, number(value, path, signed=True)))
-    discs, supports = list(rotor.discs), list(rotor.supports)
-    material: dict[str, Any] = {}
-    for (kind, i), item_changes in changes.items():
-        numbers = _changed(_numbers(rotor, kind, i), item_changes)
+    new: dict[str, Any] = {"discs": list(rotor.discs), "supports": list(rotor.supports)}
+    for (kind, i), of_item in changes.items():
+        item = of_item[0][0].items[i]
+        numbers = _changed(_numbers(item), of_item)
         if kind == "material":
-            material = numbers
+            new |= numbers
         elif kind == "disc":
-            discs[i] = replace(discs[i], **{name: float(value[0]) for name, value in numbers.items()})
-        elif kind in _SUPPORTED:
-            supports[i] = _support(supports[i], numbers)
-    return replace(rotor, discs=discs, supports=supports, **material)
+            new["discs"][i] = replace(item, **{name: value[0] for name, value in numbers.items()})
+        else:
+            new["supports"][i] = _support(item, numbers)
+    return replace(rotor, **new)
 
 
 def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
@@ -183,9 +180,9 @@ def parameter_value(rotor: Rotor, path: str) -> float:
         For a path that the rotor does not have, a table, and several numbers that are not the same.
     """
     parameter = _parameter(rotor, path)
-    if parameter.suffix or not parameter.keys:
-        return float(parameter.suffix == "scale" or path.endswith(".gain"))
-    items = [_numbers(rotor, parameter.kind, i) for i in parameter.items]
+    if parameter.suffix:
+        return float(parameter.suffix == "scale")
+    items = [_numbers(item) for item in parameter.items.values()]
     values = [_single(path, key, numbers) for numbers in items for key in parameter.keys]
     if max(values) > min(values):
         raise ValueError(f"{path} is several numbers, {min(values):.6g} to {max(values):.6g}: {path}.scale")
@@ -203,15 +200,15 @@ def typical_size(rotor: Rotor, path: str) -> float:
     ValueError
         For a path that the rotor does not have.
     """
-    _, kind, items, keys, suffix = _parameter(rotor, path)
-    if suffix == "scale" or not keys:
+    parameter = _parameter(rotor, path)
+    if parameter.suffix == "scale" or not parameter.keys:
         return 1.0
-    for which in (keys, _alike(keys)):
-        numbers = (_numbers(rotor, kind, i) for i in items)
-        size = max(float(np.abs(item[key]).max()) for item in numbers for key in which)
-        if size:
-            return size
-    return 1.0
+    items = [_numbers(item) for item in parameter.items.values()]
+    sizes = (
+        max(float(np.abs(numbers[key]).max()) for numbers in items for key in keys)
+        for keys in (parameter.keys, _alike(parameter.keys))
+    )
+    return next(filter(None, sizes), 1.0)
 
 
 def expand(rotor: Rotor, path: str, probes: Sequence[str] = ()) -> tuple[str, ...]:
@@ -231,37 +228,34 @@ def expand(rotor: Rotor, path: str, probes: Sequence[str] = ()) -> tuple[str, ..
     ValueError
         For a path that the rotor does not have, or a probe that is not there.
     """
-    if probes and (match := re.fullmatch(r"probe\[(.*)\](.*)", path)):
-        _parameter(rotor, path.replace("*", "any"))
-        name = one_of(match[1], f"{path}: the probe", ("*", *probes))
-        return tuple(f"probe[{probe}]{match[2]}" for probe in probes if name in ("*", probe))
+    if probes and is_reading(path.replace("[*]", "[any]")) and "]" in path:
+        name, rest = path.removeprefix("probe[").split("]")
+        one_of(name, f"{path}: the probe", ("*", *probes))
+        return tuple(f"probe[{probe}]{rest}" for probe in probes if name in ("*", probe))
     parameter = _parameter(rotor, path)
     if "[*]" not in path:
         return (path,)
     places = list(_items(rotor, parameter.kind))
-    return tuple(path.replace("*", str(places.index(i) + 1), 1) for i in parameter.items)
+    return tuple(path.replace("*", str(places.index(i) + 1)) for i in parameter.items)
 
 
 def _parameter(rotor: Rotor, path: str) -> _Parameter:
     """A path, read and checked."""
+    if is_reading(path):
+        return _Parameter(path, "", {}, (), "scale" if path.endswith("gain") else "offset")
     match = re.fullmatch(r"([^.\[\]]+)(?:\[(.*)\])?\.([^.\[\]]+)(?:\.([^\[\]]+))?", path)
     if match is None:
         raise ValueError(f"{path!r} is no parameter: one looks like bearing[1].kxx or material.density.scale")
     kind, selection, name, suffix = match.groups(default="")
-    names_of_kind = _KEYS[one_of(kind, f"{path}: the kind", tuple(_KEYS))]
-    keys = names_of_kind[one_of(name, f"{path}: of a {kind},", tuple(names_of_kind))]
+    of_kind = _KEYS[one_of(kind, f"{path}: the kind", (*_KEYS, *_READINGS))]
+    keys = of_kind[one_of(name, f"{path}: of a {kind},", tuple(of_kind))]
     if suffix:
-        possible = _SUFFIXES[1:] if {*keys} <= {*_TABLED} else _SUFFIXES[1:2]
-        one_of(suffix, f"{path}: the suffix", possible if keys and name != "scale" else ())
-    suffix = suffix or name * (name == "scale")
-    if suffix == "scale" and name in ("stiffness", "damping"):
+        one_of(suffix, f"{path}: the suffix", _SUFFIXES[1:] if keys[0] in _TABLED else ("scale",))
+    if name == "scale":
+        suffix = name
+    elif suffix == "scale" and len(keys) > 1:
         keys = _alike(keys)
-    if kind == "disc" or kind in _SUPPORTED:
-        return _Parameter(path, kind, _selected(rotor, path, kind, selection, keys), keys, suffix)
-    if not is_reading(path) and (kind != "material" or selection):
-        named = path.rpartition("]")[2].removeprefix(kind)
-        raise ValueError(f"{path}: write {'probe[NAME]' if kind == 'probe' else kind}{named}")
-    return _Parameter(path, kind, (0,) if keys else (), keys, suffix)
+    return _Parameter(path, kind, _selected(rotor, path, kind, selection, keys), keys, suffix)
 
 
 def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:
@@ -270,55 +264,42 @@ def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _items(rotor: Rotor, kind: str) -> dict[int, Any]:
-    """Discs, or supports of a kind, by their place in `rotor.discs` or `rotor.supports`."""
-    if kind == "disc":
-        return dict(enumerate(rotor.discs))
-    return {i: support for i, support in enumerate(rotor.supports) if support.kind == kind}
+    """All of a kind by their place in `rotor.discs` or `rotor.supports`; the rotor itself: its material."""
+    items = {"material": [rotor], "disc": rotor.discs}.get(kind, rotor.supports)
+    return {i: item for i, item in enumerate(items) if getattr(item, "kind", kind) == kind}
 
 
-def _selected(rotor: Rotor, path: str, kind: str, selection: str, keys: tuple[str, ...]) -> tuple[int, ...]:
-    """Places of the items that stand in brackets; of all without or with *."""
+def _selected(rotor: Rotor, path: str, kind: str, selection: str, keys: tuple[str, ...]) -> dict[int, Any]:
+    """Items that stand in brackets, by number or name; all without or with *."""
     items = _items(rotor, kind)
     if not items:
         raise ValueError(f"{path}: the rotor has no {kind}")
-    chosen = list(items)
-    every = selection in ("", "*")
-    if not every:
-        called = {str(n): [i] for n, i in enumerate(items, start=1)}
+    if selection not in ("", "*"):
+        called = {str(n): i for n, i in enumerate(items, start=1)}
         for i, item in items.items():
-            if item.name:
-                called.setdefault(item.name, []).append(i)
-        chosen = []
-        for part in [selection] if selection in called else map(str.strip, selection.split(",")):
-            if len(called.get(part, ())) != 1:
-                what = "several are" if part in called else "none is"
-                raise ValueError(
-                    f"{path}: of {counted(len(items), kind)} {what} called {part!r}"
-                    f"{did_you_mean(part, called)}: {listing(list(called))}"
-                )
-            chosen += called[part]
-        if len({*chosen}) < len(chosen):
-            raise ValueError(f"{path}: it names one {kind} twice")
+            if (name := getattr(item, "name", "")) and called.setdefault(name, i) != i:
+                raise ValueError(f"{path}: several are called {name!r}")
+        parts = [selection] if selection in called else map(str.strip, selection.split(","))
+        places = [called[one_of(part, f"{path}: the {kind}", tuple(called))] for part in parts]
+        items = {i: items[i] for i in places}
     if keys[0] in _STAND:
-        standing = [i for i in chosen if items[i].pedestal]
-        if not standing or (standing != chosen and not every):
+        items = {i: support for i, support in items.items() if support.pedestal}
+        if not items:
             raise ValueError(f"{path}: the {kind} stands on no pedestal")
-        chosen = standing
-    return tuple(chosen)
+    return items
 
 
-def _numbers(rotor: Rotor, kind: str, i: int) -> dict[str, FloatArray]:
+def _numbers(item: Any) -> dict[str, FloatArray]:  # noqa: ANN401
     """Numbers of an item by key, each of shape (n,): rows of a table, elements of the shaft, or one."""
-    if kind in ("material", "disc"):
-        item, keys = (rotor, _MATERIAL) if kind == "material" else (rotor.discs[i], _DISC)
+    if not isinstance(item, Support):
+        keys = _DISC if isinstance(item, Disc) else _MATERIAL
         return {name: np.atleast_1d(getattr(item, name)) for name in keys}
-    support = rotor.supports[i]
-    table = np.moveaxis(support.at(support.speeds or (0.0,)), 1, -1)
+    table = np.moveaxis(item.at(item.speeds or (0.0,)), 1, -1)
     numbers = dict(zip(_TABLED, table.reshape(8, -1), strict=True))
-    numbers["tilting_stiffness"] = np.array([support.tilting_stiffness])
-    if (stand := support.pedestal) is not None:
+    numbers["tilting_stiffness"] = np.array([item.tilting_stiffness])
+    if (stand := item.pedestal) is not None:
         values = (stand.mass, *stand.xy("stiffness"), *stand.xy("damping"))
-        numbers |= {name: np.array([value]) for name, value in zip(_STAND, values, strict=True)}
+        numbers |= zip(_STAND, np.reshape(values, (5, 1)), strict=True)
     return numbers
 
 
@@ -358,9 +339,9 @@ def _support(support: Support, numbers: Mapping[str, FloatArray]) -> Support:
     stiffness, damping = table if support.speeds else table[:, 0]
     stand = support.pedestal
     if stand is not None:
-        mass, kx, ky, cx, cy = (float(numbers[key][0]) for key in _STAND)
+        mass, kx, ky, cx, cy = (numbers[key][0] for key in _STAND)
         stand = Pedestal(mass, (kx, ky), (cx, cy))
-    tilting = float(numbers["tilting_stiffness"][0])
+    tilting = numbers["tilting_stiffness"][0]
     return replace(support, stiffness=stiffness, damping=damping, pedestal=stand, tilting_stiffness=tilting)
 
 

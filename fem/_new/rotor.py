@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem._new.forces import InternalDamping, NodeForce, code_of
+from fem._new.forces import NodeForce, code_of
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, read_only
 from rotorid.base.checks import attachment, number, whole
 from rotorid.base.registry import Method, find
@@ -339,10 +339,9 @@ def _table_speeds(speeds: Iterable[float], what: str) -> tuple[float, ...]:
 
 def _coefficients(value: Any, n: int, what: str, signed: bool) -> object:  # noqa: ANN401
     """One coefficient, or n of them for a table."""
-    if not n:
-        return _coefficient(value, what, signed)
-    if _shape(value) in ((), (2, 2)):
-        return (_coefficient(value, what, signed),) * n
+    if not n or _shape(value) in ((), (2, 2)):
+        one = _coefficient(value, what, signed)
+        return (one,) * n if n else one
     if len(value) != n:
         raise ValueError(f"{what} has {len(value)} values for {n} speeds; give one for each speed, or one")
     return tuple(_coefficient(entry, f"{what} {i}", signed) for i, entry in enumerate(value, start=1))
@@ -527,7 +526,7 @@ class Rotor:
         What the elements take into account.
     forces
         At nodes (`fem.forces`), kept in the order of their kinds: for equilibrium and motion. Linear
-        equations take `internal_damping` and refuse the others, `nonlinear`.
+        equations take `InternalDamping` of them, which is linear at each speed, and refuse the others.
     calibration
         What a fit to readings found of its parameters, None without one; equal rotors may differ in it.
 
@@ -666,25 +665,8 @@ class Rotor:
         return np.unique([speed for support in self.supports for speed in support.speeds])
 
     @property
-    def internal_damping(self) -> FloatArray:
-        """Damping c that turns with the shaft at each node, of all `fem.InternalDamping`, shape (n + 1,).
-
-        N·s/m. The force −c (z' − i Ω z), z = x + i y, is linear at each speed Ω: c on the diagonal of the
-        damping matrix, and Ω c (xy) and −Ω c (yx) in the stiffness matrix.
-        """
-        internal = [force for force in self.forces if isinstance(force, InternalDamping)]
-        return np.bincount(
-            [force.node - 1 for force in internal], [force.damping for force in internal], self.n_nodes
-        )
-
-    @property
-    def nonlinear(self) -> tuple[NodeForce, ...]:
-        """Its forces that no linear equations take: all but internal damping."""
-        return tuple(force for force in self.forces if not isinstance(force, InternalDamping))
-
-    @property
     def linear(self) -> Rotor:
-        """The same without any of its forces, `internal_damping` included."""
+        """The same without any of its forces, internal damping included."""
         return replace(self, forces=()) if self.forces else self
 
     @property
