@@ -263,11 +263,11 @@ class Support:
             k, c = self._table[:, np.zeros(omega.shape, dtype=int)]
             return k, c
         first, last = self.speeds[0], self.speeds[-1]
-        outside = (omega < first - ROUNDED * last) | ~(omega <= last + ROUNDED * last)
-        if outside.any():
+        low, high = omega.min(initial=last), omega.max(initial=first)
+        if not (low >= first - ROUNDED * last and high <= last + ROUNDED * last):
             raise ValueError(
                 f"support{f' {self.name!r}' if self.name else ''} at node {self.node}: its table holds "
-                f"{first:.6g} to {last:.6g} rad/s, not {omega[outside][0]:.6g} rad/s; it is not "
+                f"{first:.6g} to {last:.6g} rad/s, not {high if high > last else low:.6g} rad/s; it is not "
                 "extrapolated, extend the table or stay inside"
             )
         place = np.interp(omega, self.speeds, np.arange(len(self.speeds)))
