@@ -73,6 +73,16 @@ Film = Literal["pressure", "line of centres"]
 centres bounds, on the side where a steady journal's pressure is positive (the textbook's π film)."""
 
 
+def check_numbers(item: Any, what: str, above_zero: Sequence[str] = ()) -> None:  # noqa: ANN401
+    """Make plain floats of the fields of that type of a frozen dataclass: finite and not negative."""
+    for each in fields(item):
+        if each.type == "float":
+            value = number(getattr(item, each.name), f"{what}: {each.name}")
+            if value < 1e-30 and each.name in above_zero:
+                raise ValueError(f"{what}: {each.name} must be above 0, not {value:g}")
+            object.__setattr__(item, each.name, value)
+
+
 @dataclass(frozen=True)
 class NodeForce:
     """What all of them have; their numbers are finite and not negative.
@@ -95,14 +105,7 @@ class NodeForce:
     """Numbers that must be so, 1e-30 at least."""
 
     def __post_init__(self) -> None:
-        what = attachment(self)
-        for item in fields(self):
-            if item.type != "float":
-                continue
-            value = number(getattr(self, item.name), f"{what}: {item.name}")
-            if value < 1e-30 and item.name in self.above_zero:
-                raise ValueError(f"{what}: {item.name} must be above 0, not {value:g}")
-            object.__setattr__(self, item.name, value)
+        check_numbers(self, attachment(self), self.above_zero)
 
     @property
     def parameters(self) -> FloatArray:

@@ -294,7 +294,7 @@ def _numbers(item: Any) -> dict[str, FloatArray]:  # noqa: ANN401
     if not isinstance(item, Support):
         keys = _DISC if isinstance(item, Disc) else _MATERIAL
         return {name: np.atleast_1d(getattr(item, name)) for name in keys}
-    table = np.moveaxis(item.at(item.speeds or (0.0,)), 1, -1)
+    table = np.moveaxis(np.array(item.at(item.speeds or (0.0,))), 1, -1)
     numbers = dict(zip(_TABLED, table.reshape(8, -1), strict=True))
     numbers["tilting_stiffness"] = np.array([item.tilting_stiffness])
     if (stand := item.pedestal) is not None:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem._new.forces import NodeForce, code_of
+from fem._new.forces import NodeForce, check_numbers, code_of
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, read_only
 from rotorid.base.checks import attachment, number, whole
 from rotorid.base.registry import Method, find
@@ -87,9 +87,7 @@ class Disc:
     name: str = ""
 
     def __post_init__(self) -> None:
-        what = attachment(self)
-        for name in ("mass", "polar_inertia", "diametral_inertia"):
-            object.__setattr__(self, name, number(getattr(self, name), f"{what}: {name}"))
+        check_numbers(self, attachment(self))
 
     @classmethod
     def from_geometry(
@@ -115,9 +113,8 @@ class Disc:
         (32.548, 0.3291, 0.1779)
         """
         what = f"disc{f' {name!r}' if name else ''} at node {node}"
-        w = number(width, f"{what}: width")
-        D = number(outer_diameter, f"{what}: outer_diameter")
-        d = number(inner_diameter, f"{what}: inner_diameter")
+        sizes = {"width": width, "outer_diameter": outer_diameter, "inner_diameter": inner_diameter}
+        w, D, d = (number(size, f"{what}: {key}") for key, size in sizes.items())
         if d >= D:
             raise ValueError(f"{what}: the inner diameter, {d} m, must be smaller than the outer, {D} m")
         mass = number(density, f"{what}: density") * w * math.pi / 4 * (D * D - d * d)
@@ -149,7 +146,7 @@ class Pedestal:
     damping: Pair = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", number(self.mass, "pedestal: mass"))
+        check_numbers(self, "pedestal")
         for name in ("stiffness", "damping"):
             object.__setattr__(self, name, _pair(getattr(self, name), f"pedestal: {name}"))
         if min(self.xy("stiffness")) <= 0:
@@ -211,6 +208,7 @@ class Support:
 
     def __post_init__(self) -> None:
         what = attachment(self)
+        check_numbers(self, what)
         signed = find(KINDS, self.kind, f"{what}: kind").function < 0
         if not isinstance(self.pedestal, Pedestal | None):
             raise ValueError(f"{what}: pedestal must be a Pedestal, not {self.pedestal!r}")
@@ -218,8 +216,6 @@ class Support:
         for name in ("stiffness", "damping"):
             value = _coefficients(getattr(self, name), len(self.speeds), f"{what}: {name}", signed)
             object.__setattr__(self, name, value)
-        tilting = number(self.tilting_stiffness, f"{what}: tilting_stiffness")
-        object.__setattr__(self, "tilting_stiffness", tilting)
 
     @property
     def constant(self) -> bool:
@@ -260,7 +256,7 @@ class Support:
         """
         omega = np.asarray(omega, dtype=float)
         if self.constant:
-            k, c = self._table[:, np.zeros(omega.shape, dtype=int)]
+            k, c = (np.broadcast_to(matrix, (*omega.shape, 2, 2)) for matrix in self._table[:, 0])
             return k, c
         first, last = self.speeds[0], self.speeds[-1]
         low, high = omega.min(initial=last), omega.max(initial=first)
@@ -308,10 +304,10 @@ class Support:
         )
 
 
-def _shape(value: object) -> tuple[int, ...] | None:
+def _shape(value: Any) -> tuple[int, ...] | None:  # noqa: ANN401
     """Of an array-like; None: entries of different shape, as of a table of numbers and matrices."""
     try:
-        return np.shape(value)  # type: ignore[arg-type]
+        return tuple(np.shape(value))
     except ValueError:
         return None
 
@@ -553,7 +549,8 @@ class Rotor:
     def __post_init__(self) -> None:
         for name, array in _per_element(self).items():
             object.__setattr__(self, name, array)
-        for name, kind in (("discs", Disc), ("supports", Support), ("forces", NodeForce)):
+        kinds: tuple[type[Any], ...] = (Disc, Support, NodeForce)
+        for name, kind in zip(("discs", "supports", "forces"), kinds, strict=True):
             object.__setattr__(self, name, _attached(getattr(self, name), kind, name[:-1], self.n_nodes))
         object.__setattr__(self, "forces", tuple(sorted(self.forces, key=code_of)))
         object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
@@ -567,10 +564,8 @@ class Rotor:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Rotor):
             return NotImplemented
-        same = ("discs", "supports", "stations", "model", "forces")
-        return all(getattr(self, name) == getattr(other, name) for name in same) and all(
-            np.array_equal(getattr(self, name), getattr(other, name)) for name in PER_ELEMENT
-        )
+        names = vars(self).keys() - {"calibration"}
+        return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in names)
 
     def __repr__(self) -> str:
         forces = f", {counted(len(self.forces), 'force')}" if self.forces else ""
@@ -732,19 +727,21 @@ def _all(right: BoolArray, wrong: Callable[[int], str]) -> None:
         raise ValueError(f"element {i + 1}: {wrong(i)}")
 
 
-def _attached(items: Sequence[Any], kind: type, what: str, n_nodes: int) -> tuple[Any, ...]:
+def _attached(
+    items: Iterable[Any], kind: type[NodeForce | Disc | Support], what: str, n_nodes: int
+) -> tuple[Any, ...]:
     try:
-        items = tuple(items)
+        attached = tuple(items)
     except TypeError:
         raise ValueError(f"{what}s must be a list of {kind.__name__} objects, not {items!r}") from None
-    for i, item in enumerate(items, start=1):
+    for i, item in enumerate(attached, start=1):
         if not isinstance(item, kind):
             raise ValueError(f"{what} {i} must be a {kind.__name__}, not {item!r}")
         if item.node > n_nodes:
             raise ValueError(
                 f"{what} {i} stands at node {item.node}, but the rotor has nodes 1 to {n_nodes} only"
             )
-    return items
+    return attached
 
 
 def _stations(stations: Mapping[str, int], n_nodes: int) -> Mapping[str, int]:
