@@ -84,7 +84,7 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
           `rotor.supports`; `bearing[DE].kxx` by name, `bearing[1,2].kxx` and `bearing.kxx` one value for
           several or all; `seal[…]` likewise. `stiffness` and `damping` are both directions of an isotropic
           one; `tilting_stiffness`; `pedestal_mass`; `pedestal_stiffness`, `pedestal_stiffness_x`, `…_y`;
-          `pedestal_damping` likewise.
+          `pedestal_damping` likewise, of those that stand on a pedestal.
         - `disc[2].mass`, `.polar_inertia`, `.diametral_inertia`; `disc[2].scale`, a factor on all three.
         - `material.youngs_modulus`, `.density`, `.poisson_ratio`, `.material_damping` of all elements.
         - Any of these with `.scale`: a factor, 1 as the rotor stands, on all rows of a table, and on all
@@ -107,7 +107,7 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
             changes[parameter.kind, i].append((parameter, number(value, path, signed=True)))
     new: dict[str, Any] = {"discs": list(rotor.discs), "supports": list(rotor.supports)}
     for (kind, i), of_item in changes.items():
-        item = of_item[0][0].items[i]
+        item = _items(rotor, kind)[i]
         numbers = _changed(_numbers(item), of_item)
         if kind == "material":
             new |= numbers
@@ -270,15 +270,16 @@ def _items(rotor: Rotor, kind: str) -> dict[int, Any]:
 
 
 def _selected(rotor: Rotor, path: str, kind: str, selection: str, keys: tuple[str, ...]) -> dict[int, Any]:
-    """Items that stand in brackets, by number or name; all without or with *."""
+    """Items that stand in brackets, by number or a name that comes once; all without or with *."""
     items = _items(rotor, kind)
     if not items:
         raise ValueError(f"{path}: the rotor has no {kind}")
     if selection not in ("", "*"):
         called = {str(n): i for n, i in enumerate(items, start=1)}
-        for i, item in items.items():
-            if (name := getattr(item, "name", "")) and called.setdefault(name, i) != i:
-                raise ValueError(f"{path}: several are called {name!r}")
+        by_name = [getattr(item, "name", "") for item in items.values()]
+        for i, name in zip(items, by_name, strict=True):
+            if name and by_name.count(name) == 1:
+                called.setdefault(name, i)
         parts = [selection] if selection in called else map(str.strip, selection.split(","))
         places = [called[one_of(part, f"{path}: the {kind}", tuple(called))] for part in parts]
         items = {i: items[i] for i in places}

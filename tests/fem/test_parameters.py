@@ -232,7 +232,7 @@ def test_values_that_are_not_one_number_are_refused():
     with pytest.raises(ValueError, match="finite and not negative, not -1"):
         with_parameters(ROTOR, {"bearing[1].kxx": -1.0})
     twins = fem.Rotor([0.1], 0.05, supports=[fem.Support(1, 1.0, name="A"), fem.Support(2, 1.0, name="A")])
-    with pytest.raises(ValueError, match="several are called 'A'"):
+    with pytest.raises(ValueError, match="the bearing 'A' is not known: one of 1, 2"):
         parameter_value(twins, "bearing[A].kxx")
     with pytest.raises(ValueError, match="the rotor has no seal"):
         parameter_value(twins, "seal.kxx")
