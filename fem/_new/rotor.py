@@ -113,8 +113,9 @@ class Disc:
         (32.548, 0.3291, 0.1779)
         """
         what = f"disc{f' {name!r}' if name else ''} at node {node}"
-        sizes = {"width": width, "outer_diameter": outer_diameter, "inner_diameter": inner_diameter}
-        w, D, d = (number(size, f"{what}: {key}") for key, size in sizes.items())
+        w = number(width, f"{what}: width")
+        D = number(outer_diameter, f"{what}: outer_diameter")
+        d = number(inner_diameter, f"{what}: inner_diameter")
         if d >= D:
             raise ValueError(f"{what}: the inner diameter, {d} m, must be smaller than the outer, {D} m")
         mass = number(density, f"{what}: density") * w * math.pi / 4 * (D * D - d * d)
@@ -262,9 +263,9 @@ class Support:
         low, high = omega.min(initial=last), omega.max(initial=first)
         if not (low >= first - ROUNDED * last and high <= last + ROUNDED * last):
             raise ValueError(
-                f"support{f' {self.name!r}' if self.name else ''} at node {self.node}: its table holds "
-                f"{first:.6g} to {last:.6g} rad/s, not {high if high > last else low:.6g} rad/s; it is not "
-                "extrapolated, extend the table or stay inside"
+                f"{attachment(self)}: its table holds {first:.6g} to {last:.6g} rad/s, not "
+                f"{high if high > last else low:.6g} rad/s; it is not extrapolated, extend the table or stay "
+                "inside"
             )
         place = np.interp(omega, self.speeds, np.arange(len(self.speeds)))
         below = np.floor(place).astype(int)
@@ -298,9 +299,9 @@ class Support:
     @cached_property
     def _table(self) -> FloatArray:
         """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
-        both = ((v if self.speeds else (v,)) for v in (self.stiffness, self.damping))
+        both = (self.stiffness, self.damping) if self.speeds else ([self.stiffness], [self.damping])
         return np.array(
-            [[v if isinstance(v, tuple) else ((v, 0.0), (0.0, v)) for v in entries] for entries in both]
+            [[v if isinstance(v, tuple) else ((v, 0.0), (0.0, v)) for v in rows] for rows in both]
         )
 
 
@@ -435,8 +436,9 @@ class Calibration:
 
     def __post_init__(self) -> None:
         for name in ("names", "sensors"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-            if len({*getattr(self, name)}) < len(getattr(self, name)):
+            labels = tuple(getattr(self, name))
+            object.__setattr__(self, name, labels)
+            if len({*labels}) < len(labels):
                 raise ValueError(f"calibration: one of its {name} comes twice")
         n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
         shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
@@ -444,7 +446,8 @@ class Calibration:
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != shape and (array.size or np.prod(shape)):
                 raise ValueError(f"calibration: {name} must have the shape {shape}, not {array.shape}")
-            if not np.isfinite(array).all() or (name in ("speeds", "lack_of_fit") and (array < 0).any()):
+            lowest = 0.0 if name in ("speeds", "lack_of_fit") else -np.inf
+            if not (np.isfinite(array) & (array >= lowest)).all():
                 raise ValueError(f"calibration: {name} must be finite, speeds and lack of fit not negative")
             array = array.reshape(shape)
             read_only(array)
@@ -774,18 +777,12 @@ def refined(rotor: Rotor, times: int) -> Rotor:
     if times < 1:
         raise ValueError(f"the number of parts must be at least 1, not {times}")
 
-    def moved(items: Sequence[Any]) -> list[Any]:
-        return [replace(item, node=times * (item.node - 1) + 1) for item in items]
-
-    per_element: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
-    return replace(
-        rotor,
-        **per_element | {"length": per_element["length"] / times},
-        discs=moved(rotor.discs),
-        supports=moved(rotor.supports),
-        forces=moved(rotor.forces),
-        stations={name: times * (node - 1) + 1 for name, node in rotor.stations.items()},
-    )
+    new: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
+    new["length"] /= times
+    for name in ("discs", "supports", "forces"):
+        new[name] = [replace(item, node=times * (item.node - 1) + 1) for item in getattr(rotor, name)]
+    stations = {name: times * (node - 1) + 1 for name, node in rotor.stations.items()}
+    return replace(rotor, **new, stations=stations)
 
 
 @dataclass(frozen=True)
