@@ -136,7 +136,7 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 def as_change(rotor: Rotor, path: str) -> str:
     """The parameter by which this one can be changed from where it stands: `.offset` of a coefficient."""
     parameter = _parameter(rotor, path)
-    return f"{path}.offset" if not parameter.suffix and {*parameter.keys} & {*_TABLED} else path
+    return f"{path}.offset" if not parameter.suffix and parameter.keys[0] in _TABLED else path
 
 
 def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
@@ -298,7 +298,7 @@ def _numbers(item: Any) -> dict[str, FloatArray]:  # noqa: ANN401
     table = np.moveaxis(np.array(item.at(item.speeds or (0.0,))), 1, -1)
     numbers = dict(zip(_TABLED, table.reshape(8, -1), strict=True))
     numbers["tilting_stiffness"] = np.array([item.tilting_stiffness])
-    if (stand := item.pedestal) is not None:
+    if stand := item.pedestal:
         values = (stand.mass, *stand.xy("stiffness"), *stand.xy("damping"))
         numbers |= zip(_STAND, np.reshape(values, (5, 1)), strict=True)
     return numbers
@@ -339,7 +339,7 @@ def _support(support: Support, numbers: Mapping[str, FloatArray]) -> Support:
     table = np.moveaxis(np.reshape([numbers[key] for key in _TABLED], (2, 2, 2, -1)), -1, 1)
     stiffness, damping = table if support.speeds else table[:, 0]
     stand = support.pedestal
-    if stand is not None:
+    if stand:
         mass, kx, ky, cx, cy = (numbers[key][0] for key in _STAND)
         stand = Pedestal(mass, (kx, ky), (cx, cy))
     tilting = numbers["tilting_stiffness"][0]
@@ -404,7 +404,7 @@ def band(
     sentences = []
     if rotor.calibration.needs_trial_run:
         sentences.append("the readings of the calibration contradict the model: its errors exceed the bands")
-    rough = int(np.count_nonzero(std > 0.15 * np.abs(evaluate(rotor))))  # no longer linear nor symmetric
+    rough = np.count_nonzero(std > 0.15 * np.abs(evaluate(rotor)))  # no longer linear nor symmetric
     if rough:
         sentences.append(
             f"{rough} of {std.size} error bands of {what} are wider than ±30 % and rough: a "
