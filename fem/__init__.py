@@ -9,13 +9,7 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem.api684_peaks import Peak, Peaks, required_margin
-from fem.campbell import Campbell, campbell
-from fem.critical import critical_speeds
-from fem.matrices.equations_of_motion import Motion, equations_of_motion
-from fem.mesh import MeshCheck, mesh_check, refined
-from fem.model.calibration import Calibration
-from fem.model.node_forces import (
+from fem._new.forces import (
     CubicSpring,
     InternalDamping,
     JournalBearing,
@@ -24,8 +18,24 @@ from fem.model.node_forces import (
     SqueezeFilm,
     Stop,
 )
-from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
-from fem.model.sensors import Sensor
+from fem._new.rotor import (
+    STEEL_DENSITY,
+    STEEL_MODULUS,
+    STEEL_POISSON,
+    Calibration,
+    Disc,
+    Model,
+    Pedestal,
+    Rotor,
+    Sensor,
+    Support,
+    refined,
+)
+from fem.api684_peaks import Peak, Peaks, required_margin
+from fem.campbell import Campbell, campbell
+from fem.critical import critical_speeds
+from fem.matrices.equations_of_motion import Motion, equations_of_motion
+from fem.mesh import MeshCheck, mesh_check
 from fem.modes_result import Modes
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peak_refinement import resolve_peaks

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fem._new.rotor import Rotor, refined
 from fem.critical import critical_speeds
-from fem.model.rotor import PER_ELEMENT, Rotor
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, read_only
-from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
@@ -81,40 +80,6 @@ class MeshCheck(Answered):
         speeds = Column("rpm", self.frequencies * RPM, "{:.2f}".format)
         columns = (Column("mode", range(1, self.rates.size + 1), str), speeds, *self._estimates())
         return Answer(sentence(said), tables=(text(columns),), more="errors of the mesh")
-
-
-def refined(rotor: Rotor, times: int) -> Rotor:
-    """The same rotor with each element cut into equal parts; nodes are renumbered.
-
-    Parameters
-    ----------
-    rotor
-        Whose elements are cut.
-    times
-        Into how many parts, 1 or more.
-
-    Raises
-    ------
-    ValueError
-        If `times` is no whole number from 1.
-    """
-    times = whole(times, "the number of parts")
-    if times < 1:
-        raise ValueError(f"the number of parts must be at least 1, not {times}")
-
-    def moved(node: int) -> int:
-        return times * (node - 1) + 1
-
-    per_element: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
-    per_element["length"] /= times
-    return replace(
-        rotor,
-        **per_element,
-        discs=[replace(disc, node=moved(disc.node)) for disc in rotor.discs],
-        supports=[replace(support, node=moved(support.node)) for support in rotor.supports],
-        forces=[replace(force, node=moved(force.node)) for force in rotor.forces],
-        stations={name: moved(node) for name, node in rotor.stations.items()},
-    )
 
 
 def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:

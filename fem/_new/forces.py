@@ -1,20 +1,55 @@
-"""Names of the old modules until this one is written."""
+"""Forces at nodes that are not linear: films, seals, springs, stops; their data, laws and derivatives.
 
-from fem.forces.laws import law, tables
-from fem.forces.short_film import short_film
-from fem.model.node_forces import (
-    FORCES,
-    CubicSpring,
-    Film,
-    InternalDamping,
-    JournalBearing,
-    MuszynskaSeal,
-    NodeForce,
-    ShortFilm,
-    SqueezeFilm,
-    Stop,
-    kind_of,
-)
+A law is F(z, z', Ω) with z = x + i y. In a frame that is turned by n = exp(iβ), components along n and across
+it being those of z n̄, a force f n has the derivatives by x and y that `_turn_back` writes.
+
+**Film of a short journal bearing or squeeze-film damper (Ocvirk).** With h = c − x cos θ − y sin θ and
+a = x' + Ω y / 2, b = y' − Ω x / 2, Reynolds' equation without flow around the journal gives the pressure,
+summed over the length,
+
+    P(θ) = η L³ (a cos θ + b sin θ) / h³,
+
+positive on the half circle around α = atan2(b, a). With R = D / 2 and θ = β + φ, the film being the half
+circle around β (there φ runs from −π/2 to π/2), and p + i q = z n̄ / c, u + i w = (a + i b) n̄, the force on
+the journal, F = −R ∫ P exp(iθ) dθ, is F n̄ = −C (u I₁ + w I₂ + i (u I₂ + w I₃)), C = η L³ R / c³, with
+
+    I₁, I₂, I₃ = ∫ (cos² φ, sin φ cos φ, sin² φ) / (1 − p cos φ − q sin φ)³ dφ
+               = ½ J_pp, ½ J_pq, ½ J_qq  of  J = ∫ dφ / (1 − p cos φ − q sin φ).
+
+With k² = 1 − p² − q²: J = (2 / k) atan2(k, −p), J_p = (2 + p J) / k², J_q = q (2 p / (1 − q²) + J) / k²,
+and so on by differentiation. Where the film is that of positive pressure, β = α, the force does not change
+with β alone, since the pressure is zero at both ends. Where it is bound to the line of centres, β = atan2(−x,
+y), so that p = 0 and q = |z| / c, the ends count, ∂(F n̄)/∂β = −i C w ((1 − q)⁻³ − (1 + q)⁻³)
+= −2 i C w q (3 + q²) (1 − q²)⁻³, and β changes with the displacement along n, by −1 / |z|.
+
+That film is the textbook's: where the line of centres turns faster than the fluid, u < 0, its pressure would
+pull, and the force along the line of centres keeps the sign that it has below: |u| I₂ in place of u I₂ there,
+which adds 2 C u I₂ (i n) to the force.
+
+**Stop.** With n = z / |z|, the normal force N = k (|z| − gap) + c |z|', not below 0, and the slip
+s = Im(z' n̄) + Ω R: F = −N (1 + i µ tanh(s / v₀)) n.
+
+**Seal, spring, internal damping.** F = −A z − B z' with complex functions A and B of |z|² and Ω.
+
+Sources: F. W. Ocvirk, NACA TN 2808 (1952); for the film of positive pressure G. Adiletta, A. R. Guido, C.
+Rossi, Nonlinear Dynamics 10 (1996) 251; R. F. Beatty, J. Vib. Acoust. Stress Reliab. Des. 107 (1985) 151, for
+a stop with Coulomb friction, here with damping, and smooth around no slip; others at their classes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal, get_args
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.checks import attachment, number
+from rotorid.base.compiled import compiled_part
+from rotorid.base.registry import Method, names
+from rotorid.base.suggestions import one_of
 
 __all__ = [
     "FORCES",
@@ -32,3 +67,415 @@ __all__ = [
     "short_film",
     "tables",
 ]
+
+Film = Literal["pressure", "line of centres"]
+"""Where a journal's film carries: where its pressure is positive, or on the half circle that the line of
+centres bounds, on the side where a steady journal's pressure is positive (the textbook's π film)."""
+
+
+def check_numbers(item: Any, what: str, above_zero: Sequence[str] = ()) -> None:  # noqa: ANN401
+    """Make plain floats of the fields of that type of a frozen dataclass: finite and not negative."""
+    for each in fields(item):
+        if each.type == "float":
+            value = number(getattr(item, each.name), f"{what}: {each.name}")
+            if value < 1e-30 and each.name in above_zero:
+                raise ValueError(f"{what}: {each.name} must be above 0, not {value:g}")
+            object.__setattr__(item, each.name, value)
+
+
+@dataclass(frozen=True)
+class NodeForce:
+    """What all of them have; their numbers are finite and not negative.
+
+    Attributes
+    ----------
+    node, name
+        From 1; for messages and drawings.
+
+    Raises
+    ------
+    ValueError
+        If the node is no whole number from 1 up, or a value is impossible; the message says which.
+    """
+
+    node: int
+    name: str = ""
+
+    above_zero: ClassVar[tuple[str, ...]] = ()
+    """Numbers that must be so, 1e-30 at least."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self, attachment(self), self.above_zero)
+
+    @property
+    def parameters(self) -> FloatArray:
+        """Its numbers in SI in the order in which the law takes them."""
+        return np.array([getattr(self, item.name) for item in fields(self) if item.type == "float"])
+
+    @property
+    def mass(self) -> float:
+        """Inertia that it adds at its node, kg: that of a seal's fluid."""
+        return float(getattr(self, "fluid_mass", 0.0))
+
+    @property
+    def wall(self) -> float:
+        """From the centre to where its law ends, m: its clearance; infinite without one."""
+        return float(getattr(self, "clearance", np.inf))
+
+
+@dataclass(frozen=True)
+class ShortFilm(NodeForce):
+    """A film that is short along the shaft: up to half the diameter; a longer one carries less than it says.
+
+    Attributes
+    ----------
+    node, name
+        As of `NodeForce`.
+    length, diameter, clearance, viscosity
+        Along the shaft, and of the journal; radial, m; Pa·s.
+    """
+
+    length: float = 0.0
+    diameter: float = 0.0
+    clearance: float = 0.0
+    viscosity: float = 0.0
+
+    above_zero: ClassVar[tuple[str, ...]] = ("length", "diameter", "clearance", "viscosity")
+
+
+@dataclass(frozen=True)
+class JournalBearing(ShortFilm):
+    """A short plain journal bearing (Ocvirk), its film where the rotor's weight and motion put it.
+
+    Attributes
+    ----------
+    node, name, length, diameter, clearance, viscosity
+        As of `ShortFilm`.
+    film
+        Where it carries, see `Film`.
+    """
+
+    film: Film = "pressure"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        one_of(self.film, "film", get_args(Film))
+
+
+@dataclass(frozen=True)
+class SqueezeFilm(ShortFilm):
+    """A short squeeze-film damper, its film where the pressure is positive; its ring does not turn.
+
+    Attributes
+    ----------
+    node, name, length, diameter, clearance, viscosity
+        As of `ShortFilm`.
+    centring_stiffness
+        N/m, of the spring that centres it; 0 for none.
+    """
+
+    centring_stiffness: float = 0.0
+
+
+@dataclass(frozen=True)
+class MuszynskaSeal(NodeForce):
+    """An annular seal after Muszynska: its fluid turns at τ Ω, the less the more eccentric the shaft is.
+
+    K = K₀ (1 − e²)⁻ⁿ, D = D₀ (1 − e²)⁻ⁿ, τ = τ₀ (1 − e)ᵇ with e = |z| / clearance, and, z = x + iy,
+
+        F = −(K − m τ² Ω² − i τ Ω D) z − (D − 2 i τ Ω m) z' − m z''.
+
+    With both exponents 0 its coefficients are constant. Sources: A. Muszynska, J. Sound Vib. 110 (1986) 443;
+    A. Muszynska, D. E. Bently, J. Sound Vib. 143 (1990) 103.
+
+    Attributes
+    ----------
+    node, name, stiffness, damping, fluid_mass
+        As of `NodeForce`; K₀ N/m, D₀ N·s/m, m kg.
+    swirl_ratio
+        τ₀, fluid's mean speed by the shaft's, about 0.5 or less.
+    clearance
+        m.
+    stiffness_exponent, swirl_exponent
+        n, from 0.5 to 3 in print, and b, from 0 to 1.
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    fluid_mass: float = 0.0
+    swirl_ratio: float = 0.0
+    clearance: float = 0.0
+    stiffness_exponent: float = 2.0
+    swirl_exponent: float = 0.5
+
+    above_zero: ClassVar[tuple[str, ...]] = ("clearance",)
+
+
+@dataclass(frozen=True)
+class CubicSpring(NodeForce):
+    """A spring with a cubic part: F = −(k + k₃ |z|²) z.
+
+    Attributes
+    ----------
+    node, name, stiffness, cubic_stiffness
+        As of `NodeForce`; k, N/m, and k₃, N/m³.
+    """
+
+    stiffness: float = 0.0
+    cubic_stiffness: float = 0.0
+
+
+@dataclass(frozen=True)
+class Stop(NodeForce):
+    """A ring around the shaft that it rubs on beyond a gap, with dry friction.
+
+    Normal force k (|z| − gap) + c |z|', not below 0; friction µ times it against the slip v = v_t + Ω R, as
+    tanh(v / v₀).
+
+    Attributes
+    ----------
+    node, name, gap, stiffness, damping
+        As of `NodeForce`; m; N/m and N·s/m of the contact.
+    friction, diameter
+        µ; 2 R of the shaft where it rubs, m.
+    slip_speed
+        v₀, m/s, below which friction grows with the slip.
+    """
+
+    gap: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    diameter: float = 0.0
+    slip_speed: float = 0.01
+
+    above_zero: ClassVar[tuple[str, ...]] = ("stiffness", "slip_speed")
+
+
+@dataclass(frozen=True)
+class InternalDamping(NodeForce):
+    """Damping that turns with the shaft, as of a shrink fit: F = −c (z' − i Ω z), linear at each speed.
+
+    Source: A. L. Kimball, Gen. Electr. Rev. 27 (1924) 244.
+
+    Attributes
+    ----------
+    node, name, damping
+        As of `NodeForce`; c, N·s/m.
+    """
+
+    damping: float = 0.0
+
+
+FORCES: tuple[Method[Any], ...] = (
+    Method("journal_bearing", "a short plain journal bearing (Ocvirk)", JournalBearing),
+    Method("squeeze_film", "a short squeeze-film damper", SqueezeFilm),
+    Method("annular_seal", "an annular seal after Muszynska", MuszynskaSeal),
+    Method("cubic_spring", "a spring with a cubic part", CubicSpring),
+    Method("stop", "a ring that the shaft rubs on beyond a gap", Stop),
+    Method("internal_damping", "damping that turns with the shaft", InternalDamping),
+)
+"""Kinds of forces as rotor files name them, in the order in which rotors keep and `law` numbers them."""
+_SQUEEZE, _SEAL, _SPRING, _STOP, _INTERNAL = 1, 2, 3, 4, 5
+_WALL = 1e-14  # of 1 − ε², below which it is rounding
+
+
+def kind_of(force: NodeForce) -> str:
+    """Its name in `FORCES`.
+
+    Raises
+    ------
+    ValueError
+        For what is none of them.
+    """
+    for method in FORCES:
+        if type(force) is method.function:
+            return method.name
+    raise ValueError(f"{attachment(force)} is no force: one of {', '.join(names(FORCES))} is")
+
+
+def code_of(force: NodeForce) -> int:
+    """Its place in `FORCES`; ValueError as `kind_of`."""
+    return names(FORCES).index(kind_of(force))
+
+
+def tables(forces: Sequence[NodeForce]) -> tuple[IndexArray, FloatArray]:
+    """Code of the law of each force, shape (f,), and its parameters, shape (f, 7), as `law` takes them."""
+    values = np.zeros((len(forces), 7))
+    for row, force in zip(values, forces, strict=True):
+        if isinstance(force, ShortFilm):
+            C = force.viscosity * force.length**3 * force.diameter / 2 / force.clearance**3
+            by_line = getattr(force, "film", "") == "line of centres"
+            row[:4] = C, force.clearance, by_line, getattr(force, "centring_stiffness", 0.0)
+        else:
+            row[: len(force.parameters)] = force.parameters
+    return np.array([code_of(force) for force in forces], dtype=np.intp), values
+
+
+@compiled_part
+def law(
+    code: int, v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray
+) -> None:
+    """Force of one kind at a node and its derivatives.
+
+    Parameters
+    ----------
+    code, v
+        Of `tables`.
+    x, y, vx, vy, omega
+        Of the node, m and m/s, and of the shaft, rad/s.
+    out
+        Written: (F_x, F_y) in N and their derivatives by x, y, x', y' and Ω, shape (2, 6); NaN on or beyond
+        the wall.
+    """
+    if code <= _SQUEEZE:
+        turns = 0.0 if code == _SQUEEZE else 1.0
+        short_film(v[0], v[1], x, y, vx, vy, omega * turns, v[2] > 0.0, out)
+        for i in range(2):
+            out[i, 5] *= turns
+            out[i, 0] -= v[3] * (x if i == 0 else y)
+            out[i, 1 + i] -= v[3]
+        return
+    if code == _STOP:
+        _stop(v, x, y, vx, vy, omega, out)
+        return
+    # A, B and their derivatives by |z|² (_e) and Ω (_o)
+    z, dz, e2 = complex(x, y), complex(vx, vy), x * x + y * y
+    A, B, A_e, B_e, A_o, B_o = 0j, 0j, 0j, 0j, 0j, 0j
+    if code == _SPRING:
+        A, A_e = v[0] + v[1] * e2 + 0j, v[1] + 0j
+    elif code == _INTERNAL:
+        A, B, A_o = -1j * omega * v[0], v[0] + 0j, -1j * v[0]
+    else:
+        K0, D0, m, tau0, c, n, b = v[0], v[1], v[2], v[3], v[4], v[5], v[6]
+        E = e2 / (c * c)
+        if not E < 1.0:
+            out[:, :] = math.nan
+            return
+        e = math.sqrt(E)
+        stiffer = (1.0 - E) ** -n
+        K, D, tau = K0 * stiffer, D0 * stiffer, tau0 * (1.0 - e) ** b
+        grow = n / (1.0 - E) / (c * c)  # of K and D by |z|²
+        less = -0.5 * b * tau / ((1.0 - e) * e) / (c * c) if e > 0.0 else 0.0  # of τ by |z|²
+        s = tau * omega
+        A, B = K - m * s * s - 1j * s * D, D - 2j * s * m
+        A_s, B_s = -2.0 * m * s - 1j * D, -2j * m
+        A_e = grow * (K - 1j * s * D) + A_s * less * omega
+        B_e = grow * D + B_s * less * omega
+        A_o, B_o = A_s * tau, B_s * tau
+    F_e = -A_e * z - B_e * dz
+    _put(out, 0, -A * z - B * dz)
+    _put(out, 1, 2.0 * x * F_e - A)
+    _put(out, 2, 2.0 * y * F_e - 1j * A)
+    _put(out, 3, -B)
+    _put(out, 4, -1j * B)
+    _put(out, 5, -A_o * z - B_o * dz)
+
+
+@compiled_part
+def _put(out: FloatArray, column: int, value: complex) -> None:
+    """Write F_x + i F_y or its derivative."""
+    out[0, column], out[1, column] = value.real, value.imag
+
+
+@compiled_part
+def _turn_back(out: FloatArray, column: int, n: complex, along: complex, across: complex) -> None:
+    """Write derivatives by x and y, from those of F n̄ by the components along n and across it."""
+    by_x, by_y = n * (along * n.real - across * n.imag), n * (along * n.imag + across * n.real)
+    out[0, column], out[1, column] = by_x.real, by_x.imag
+    out[0, column + 1], out[1, column + 1] = by_y.real, by_y.imag
+
+
+@compiled_part
+def short_film(  # noqa: PLR0913  what is compiled takes no objects
+    C: float,
+    c: float,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    omega: float,
+    line_of_centres: bool,
+    out: FloatArray,
+) -> None:
+    """Force on the journal and its derivatives, as `law` writes them.
+
+    Parameters
+    ----------
+    C, c
+        η L³ R / c³, N·s/m, and the radial clearance, m.
+    x, y, vx, vy, omega
+        Of the journal, m, m/s and rad/s; Ω is 0 for a damper.
+    line_of_centres
+        Which film; False: where the pressure is positive.
+    out
+        Written, shape (2, 6).
+    """
+    X, Y = x / c, y / c
+    k2 = 1.0 - X * X - Y * Y
+    if not k2 > _WALL:
+        out[:, :] = math.nan
+        return
+    a, b = vx + 0.5 * omega * y, vy - 0.5 * omega * x
+    beta = math.atan2(-x, y) if line_of_centres else math.atan2(b, a)
+    n = complex(math.cos(beta), math.sin(beta))
+    place, flow = complex(X, Y) * n.conjugate(), complex(a, b) * n.conjugate()
+    p, q, u, w = place.real, place.imag, flow.real, flow.imag
+
+    k = math.sqrt(k2)
+    r = 1.0 / k2
+    J = 2.0 / k * math.atan2(k, -p)
+    d = 1.0 / (1.0 - q * q)
+    Jp = (2.0 + p * J) * r
+    Jq = q * (2.0 * p * d + J) * r
+    Jpp = (J + 3.0 * p * Jp) * r
+    Jpq = (p * Jq + 2.0 * q * Jp) * r
+    Jqq = (2.0 * p * (1.0 + q * q) * d * d + J + 3.0 * q * Jq) * r
+    Jppp = (4.0 * Jp + 5.0 * p * Jpp) * r
+    Jppq = (Jq + 3.0 * p * Jpq + 2.0 * q * Jpp) * r
+    Jpqq = (p * Jqq + 2.0 * Jp + 4.0 * q * Jpq) * r
+    # d³J/dq³ of Jqq = (N + 3 q Jq) / k², N = 2 p (1 + q²) / (1 − q²)² + J
+    Jqqq = (4.0 * p * q * (3.0 + q * q) * d * d * d + 4.0 * Jq + 5.0 * q * Jqq) * r
+
+    h = -0.5 * C
+    at_line = line_of_centres and q > 0.0
+    sign = -1.0 if at_line and u < 0.0 else 1.0
+    by_u, by_w = h * complex(Jpp, sign * Jpq), h * complex(Jpq, Jqq)
+    by_p = h / c * (u * complex(Jppp, sign * Jppq) + w * complex(Jppq, Jpqq))
+    by_q = h / c * (u * complex(Jppq, sign * Jpqq) + w * complex(Jpqq, Jqqq))
+    if at_line:
+        by_beta = complex(0.0, 4.0 * h * w * q * (3.0 + q * q) * d * d * d)
+        if u < 0.0:
+            by_beta -= 2.0 * h * complex(-u * Jpq, w * Jpq + u * q * Jppq)
+        by_p -= by_beta / (q * c)
+    _put(out, 0, n * (u * by_u + w * by_w))
+    _turn_back(out, 1, n, by_p, by_q)
+    _turn_back(out, 3, n, by_u, by_w)
+    for i in range(2):  # a and b change with x, y and Ω
+        out[i, 1] -= 0.5 * omega * out[i, 4]
+        out[i, 2] += 0.5 * omega * out[i, 3]
+        out[i, 5] = 0.5 * (y * out[i, 3] - x * out[i, 4])
+
+
+@compiled_part
+def _stop(v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray) -> None:
+    """As `law` writes it; zeros without contact."""
+    out[:, :] = 0.0
+    gap, k, c, friction, R, v0 = v[0], v[1], v[2], v[3], v[4] / 2, v[5]
+    r = math.hypot(x, y)
+    if not r > gap:
+        return
+    n = complex(x, y) / r
+    speed = complex(vx, vy) * n.conjugate()
+    N = k * (r - gap) + c * speed.real
+    if not N > 0.0:
+        return
+    f = math.tanh((speed.imag + omega * R) / v0)
+    push = complex(-1.0, -friction * f)  # F n̄ = N push
+    by_slip = complex(0.0, -friction * N * (1.0 - f * f) / v0)
+    # along an arc n turns, and z' n̄ the other way
+    by_arc = (c * speed.imag * push - speed.real * by_slip + 1j * N * push) / r
+    _put(out, 0, N * push * n)
+    _turn_back(out, 1, n, k * push, by_arc)
+    _turn_back(out, 3, n, c * push, by_slip)
+    _put(out, 5, R * by_slip * n)

@@ -1,25 +1,33 @@
-"""Names of the old modules until this one is written."""
+"""A rotor as plain data: shaft elements, discs, supports and pedestals, sensors; what a calibration says."""
 
-from fem.mesh import refined
-from fem.model.rotor import (
-    SHORTEST,
-    STEEL_DENSITY,
-    STEEL_MODULUS,
-    STEEL_POISSON,
-    Disc,
-    Model,
-    Rotor,
-    too_short,
-)
-from fem.model.sensors import Sensor, SensorLike, as_sensor, label
-from fem.model.supports import KINDS, Coefficient, Pair, Pedestal, Support
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem._new.forces import NodeForce, check_numbers, code_of
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, read_only
+from rotorid.base.checks import attachment, number, whole
+from rotorid.base.registry import Method, find
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import counted
 
 __all__ = [
     "KINDS",
+    "ROUNDED",
     "SHORTEST",
     "STEEL_DENSITY",
     "STEEL_MODULUS",
     "STEEL_POISSON",
+    "Calibration",
     "Coefficient",
     "Disc",
     "Model",
@@ -30,7 +38,807 @@ __all__ = [
     "SensorLike",
     "Support",
     "as_sensor",
+    "is_reading",
     "label",
     "refined",
     "too_short",
 ]
+
+STEEL_MODULUS = 2.1e11
+STEEL_DENSITY = 7800.0
+STEEL_POISSON = 0.3
+SHORTEST = 3000
+"""A neighbour may be this many times as long as an element: float64 loses the stiffness of shorter ones."""
+ROUNDED = 5e-6  # relative error of a speed that was written with six digits: it does not end a table
+Coefficient = float | tuple[tuple[float, float], tuple[float, float]]  # isotropic, or ((xx, xy), (yx, yy))
+Pair = float | tuple[float, float]  # in both directions, or in x and in y
+KINDS = (
+    Method("bearing", "pushes back and brakes: its own stiffness and damping are not negative", 0.0),
+    Method("seal", "may push outwards or drive, and is left out of maps over bearing stiffness", -math.inf),
+)
+"""Kinds of supports, with the lowest diagonal entry of their stiffness and damping."""
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A rigid disc, or a concentrated mass, at a node.
+
+    Attributes
+    ----------
+    node
+        Node number, from 1.
+    mass
+        kg.
+    polar_inertia, diametral_inertia
+        About the shaft axis and about a diameter, kg·m².
+    name
+        For messages and drawings.
+
+    Raises
+    ------
+    ValueError
+        If the node is no whole number from 1 up, or the mass or an inertia is negative or not finite.
+    """
+
+    node: int
+    mass: float
+    polar_inertia: float = 0.0
+    diametral_inertia: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        check_numbers(self, attachment(self))
+
+    @classmethod
+    def from_geometry(
+        cls,
+        node: int,
+        width: float,
+        outer_diameter: float,
+        inner_diameter: float = 0.0,
+        density: float = STEEL_DENSITY,
+        name: str = "",
+    ) -> Disc:
+        """Disc from its sizes in m and its density in kg/m³: a hollow cylinder around the shaft.
+
+        m = ρ w π (D² − d²) / 4, I_p = m (D² + d²) / 8, I_d = m (D² + d²) / 16 + m w² / 12.
+
+        Raises
+        ------
+        ValueError
+            If a size is negative or not finite, or the bore is not smaller than the disc.
+
+        >>> disc = Disc.from_geometry(3, width=0.07, outer_diameter=0.28, inner_diameter=0.05)
+        >>> round(disc.mass, 3), round(disc.polar_inertia, 4), round(disc.diametral_inertia, 4)
+        (32.548, 0.3291, 0.1779)
+        """
+        what = f"disc{f' {name!r}' if name else ''} at node {node}"
+        w = number(width, f"{what}: width")
+        D = number(outer_diameter, f"{what}: outer_diameter")
+        d = number(inner_diameter, f"{what}: inner_diameter")
+        if d >= D:
+            raise ValueError(f"{what}: the inner diameter, {d} m, must be smaller than the outer, {D} m")
+        mass = number(density, f"{what}: density") * w * math.pi / 4 * (D * D - d * d)
+        polar = mass * (D * D + d * d) / 8
+        return cls(node, mass, polar, polar / 2 + mass * w * w / 12, name)
+
+
+@dataclass(frozen=True)
+class Pedestal:
+    """A mass on a spring and a damper, between a bearing and the ground.
+
+    Attributes
+    ----------
+    mass
+        kg; 0 for a mere spring in series.
+    stiffness
+        N/m, a number for both directions or one for each, (x, y); above 0.
+    damping
+        N·s/m, likewise.
+
+    Raises
+    ------
+    ValueError
+        If a value is negative or not finite, or a stiffness is zero.
+    """
+
+    mass: float = 0.0
+    stiffness: Pair = 0.0
+    damping: Pair = 0.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "pedestal")
+        for name in ("stiffness", "damping"):
+            object.__setattr__(self, name, _pair(getattr(self, name), f"pedestal: {name}"))
+        if min(self.xy("stiffness")) <= 0:
+            raise ValueError("pedestal: stiffness must be above 0 in x and y; leave out a rigid pedestal")
+
+    def xy(self, name: Literal["stiffness", "damping"]) -> tuple[float, float]:
+        """Stiffness or damping in x and in y."""
+        value = getattr(self, name)
+        return value if isinstance(value, tuple) else (value, value)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether both directions are equal."""
+        return not isinstance(self.stiffness, tuple) and not isinstance(self.damping, tuple)
+
+
+@dataclass(frozen=True)
+class Support:
+    """A bearing or an annular seal between a node and the ground, or a pedestal.
+
+    The force on the rotor is −k (x, y) − c (x', y') with 2 × 2 matrices k and c.
+
+    Attributes
+    ----------
+    node
+        Node number, from 1.
+    stiffness
+        N/m: a number (isotropic) or ((kxx, kxy), (kyx, kyy)); with `speeds`, one of these for each speed
+        (one alone counts for all speeds). Kept in one canonical form, so that equal supports compare equal.
+    damping
+        Viscous, N·s/m, likewise.
+    name
+        For messages and drawings.
+    speeds
+        Where stiffness and damping are tabulated, rad/s, ascending; between them both are interpolated
+        linearly, outside they are unknown. Empty: constant.
+    pedestal
+        What the bearing stands on, None for the ground.
+    kind
+        One of `KINDS`, which say what diagonal entries may be.
+    tilting_stiffness
+        N·m/rad, isotropic, of a spring that holds the slope, as a long bearing does; a very large one
+        clamps the shaft.
+
+    Raises
+    ------
+    ValueError
+        If the node is no whole number from 1 up, or a value is impossible; the message says which.
+    """
+
+    node: int
+    stiffness: Any = 0.0  # Coefficient, or one per speed
+    damping: Any = 0.0
+    name: str = ""
+    speeds: tuple[float, ...] = ()
+    pedestal: Pedestal | None = None
+    kind: str = KINDS[0].name
+    tilting_stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        what = attachment(self)
+        check_numbers(self, what)
+        signed = find(KINDS, self.kind, f"{what}: kind").function < 0
+        if not isinstance(self.pedestal, Pedestal | None):
+            raise ValueError(f"{what}: pedestal must be a Pedestal, not {self.pedestal!r}")
+        object.__setattr__(self, "speeds", _table_speeds(self.speeds, what))
+        for name in ("stiffness", "damping"):
+            value = _coefficients(getattr(self, name), len(self.speeds), f"{what}: {name}", signed)
+            object.__setattr__(self, name, value)
+
+    @property
+    def constant(self) -> bool:
+        """Whether stiffness and damping are the same at all speeds."""
+        return not self.speeds
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
+        turned = self._table[..., ::-1, ::-1] * ((1, -1), (-1, 1))
+        return np.array_equal(self._table, turned) and (self.pedestal is None or self.pedestal.symmetric)
+
+    @property
+    def plain(self) -> bool:
+        """Whether one stiffness and one damping are all: isotropic, constant, on the ground."""
+        numbers = isinstance(self.stiffness, float) and isinstance(self.damping, float)
+        return numbers and self.pedestal is None
+
+    @property
+    def coupled(self) -> bool:
+        """Whether any stiffness or damping couples x and y."""
+        return bool(self._table[..., (0, 1), (1, 0)].any())
+
+    @property
+    def damped(self) -> bool:
+        """Whether it has any damping, that of the pedestal included."""
+        return bool(self._table[1].any()) or (
+            self.pedestal is not None and max(self.pedestal.xy("damping")) > 0
+        )
+
+    def at(self, omega: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Stiffness and damping matrices at speeds in rad/s, each of shape (…, 2, 2), without the pedestal.
+
+        Raises
+        ------
+        ValueError
+            Outside the table, but for the rounding of six digits: it is never extrapolated.
+        """
+        omega = np.asarray(omega, dtype=float)
+        if self.constant:
+            k, c = (np.broadcast_to(matrix, (*omega.shape, 2, 2)) for matrix in self._table[:, 0])
+            return k, c
+        first, last = self.speeds[0], self.speeds[-1]
+        low, high = omega.min(initial=last), omega.max(initial=first)
+        if not (low >= first - ROUNDED * last and high <= last + ROUNDED * last):
+            raise ValueError(
+                f"{attachment(self)}: its table holds {first:.6g} to {last:.6g} rad/s, not "
+                f"{high if high > last else low:.6g} rad/s; it is not extrapolated, extend the table or stay "
+                "inside"
+            )
+        place = np.interp(omega, self.speeds, np.arange(len(self.speeds)))
+        below = np.floor(place).astype(int)
+        share = (place - below)[..., None, None]
+        k, c = (1 - share) * self._table[:, below] + share * self._table[:, np.ceil(place).astype(int)]
+        return k, c
+
+    def dynamic_stiffness(self, omega: ArrayLike, speed: ArrayLike | None = None) -> ComplexArray:
+        """Force per deflection of the rotor's node at frequencies ω, pedestal included, shape (…, 2, 2).
+
+        k + iωc in series with the pedestal's k − ω² m + iωc. Stiffness and damping are those at the
+        rotor's `speed`, rad/s; None: at the frequency itself (synchronous).
+        """
+        bearing, stand = self.dynamic_parts(omega, speed)
+        if stand is None:
+            return bearing
+        return np.asarray(bearing - bearing @ np.linalg.solve(bearing + stand, bearing))
+
+    def dynamic_parts(
+        self, omega: ArrayLike, speed: ArrayLike | None = None
+    ) -> tuple[ComplexArray, ComplexArray | None]:
+        """What `dynamic_stiffness` puts in series: bearing and pedestal, (…, 2, 2) each; None: the ground."""
+        k, c = self.at(omega if speed is None else speed)
+        w = np.asarray(omega, dtype=float)[..., None, None]
+        bearing = k + 1j * w * c
+        if self.pedestal is None:
+            return bearing, None
+        k, c = np.diag(self.pedestal.xy("stiffness")), np.diag(self.pedestal.xy("damping"))
+        return bearing, k - w * w * self.pedestal.mass * np.eye(2) + 1j * w * c
+
+    @cached_property
+    def _table(self) -> FloatArray:
+        """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
+        both = (self.stiffness, self.damping) if self.speeds else ([self.stiffness], [self.damping])
+        return np.array(
+            [[v if isinstance(v, tuple) else ((v, 0.0), (0.0, v)) for v in rows] for rows in both]
+        )
+
+
+def _shape(value: Any) -> tuple[int, ...] | None:  # noqa: ANN401
+    """Of an array-like; None: entries of different shape, as of a table of numbers and matrices."""
+    try:
+        return tuple(np.shape(value))
+    except ValueError:
+        return None
+
+
+def _pair(value: Any, what: str) -> Pair:  # noqa: ANN401
+    """In canonical form: a number where both directions are equal."""
+    if _shape(value) == ():
+        return number(value, what)
+    if _shape(value) != (2,):
+        raise ValueError(f"{what} must be a number or a pair (x, y), not {value!r}")
+    x, y = number(value[0], f"{what} in x"), number(value[1], f"{what} in y")
+    return x if x == y else (x, y)
+
+
+def _table_speeds(speeds: Iterable[float], what: str) -> tuple[float, ...]:
+    try:
+        values = tuple(map(float, speeds))
+    except (TypeError, ValueError):
+        raise ValueError(f"{what}: speeds must be a list of numbers in rad/s, not {speeds!r}") from None
+    ascending = len(values) > 1 and (np.diff(values) > 0).all()
+    if values and not (ascending and values[0] >= 0 and values[-1] < math.inf):
+        raise ValueError(f"{what}: speeds must be at least two, not negative and ascending, in rad/s")
+    return values
+
+
+def _coefficients(value: Any, n: int, what: str, signed: bool) -> object:  # noqa: ANN401
+    """One coefficient, or n of them for a table."""
+    if not n or _shape(value) in ((), (2, 2)):
+        one = _coefficient(value, what, signed)
+        return (one,) * n if n else one
+    if len(value) != n:
+        raise ValueError(f"{what} has {len(value)} values for {n} speeds; give one for each speed, or one")
+    return tuple(_coefficient(entry, f"{what} {i}", signed) for i, entry in enumerate(value, start=1))
+
+
+def _coefficient(value: Any, what: str, signed: bool) -> Coefficient:  # noqa: ANN401
+    """In canonical form: a number where it is isotropic."""
+    shape = _shape(value)
+    if shape == ():
+        return number(value, what, signed=signed)
+    if shape != (2, 2):
+        raise ValueError(f"{what} must be a number or 2 × 2, ((xx, xy), (yx, yy)), not {value!r}")
+    xx, xy, yx, yy = (
+        number(value[i][j], f"{what} {'xy'[i]}{'xy'[j]}", signed=signed or i != j)
+        for i in (0, 1)
+        for j in (0, 1)
+    )
+    return xx if xx == yy and xy == yx == 0 else ((xx, xy), (yx, yy))
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the beam elements take into account besides bending and mass.
+
+    Attributes
+    ----------
+    shear
+        Shear deformation (Timoshenko), with Cowper's coefficient.
+    rotary_inertia
+        Inertia of tilting cross-sections, and the diametral inertia of discs.
+    gyroscopic
+        Gyroscopic moments of shaft and discs (polar inertia).
+    """
+
+    shear: bool = False
+    rotary_inertia: bool = False
+    gyroscopic: bool = False
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            if not isinstance(getattr(self, item.name), bool):
+                raise ValueError(
+                    f"model: {item.name} must be True or False, not {getattr(self, item.name)!r}"
+                )
+
+
+def is_reading(path: str) -> bool:
+    """Whether it is `probe[NAME].angle`, `.gain` or `key_phasor.angle`: of readings, no number of a rotor.
+
+    Angles in degrees with the rotation: the true one less the one that the job says. A gain is what is
+    read over what is there.
+    """
+    return re.fullmatch(r"probe\[[^*]+\]\.(angle|gain)|key_phasor\.angle", path) is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Parameters that were fitted to readings, and how well the rotor with them agrees.
+
+    Attributes
+    ----------
+    names
+        Paths of the parameters, as `fem.parameters.with_parameters` has them, length n.
+    values
+        What they were found to be, shape (n,); scales relative to the rotor that was calibrated.
+    covariance
+        Of the parameters as they now stand in the rotor, shape (n, n): of absolute ones in their unit, of a
+        scale relative to the rotor as it is now.
+    speeds
+        Where the model was compared with readings, rad/s, shape (S,).
+    sensors
+        Of which it was, length C.
+    lack_of_fit
+        Relative standard deviation of a coefficient that the model leaves, shape (S, C).
+    needs_trial_run
+        Whether the data contradict the model, so that its coefficients alone are not to be trusted.
+    data
+        Files it was made from, `{name: SHA-256}`: they must not count twice.
+
+    Raises
+    ------
+    ValueError
+        For arrays of another shape, a covariance that is not symmetric or has negative variances, a negative
+        lack of fit, a name that comes twice.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    speeds: FloatArray = field(default_factory=lambda: np.zeros(0))
+    sensors: tuple[str, ...] = ()
+    lack_of_fit: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    needs_trial_run: bool = False
+    data: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("names", "sensors"):
+            labels = tuple(getattr(self, name))
+            object.__setattr__(self, name, labels)
+            if len({*labels}) < len(labels):
+                raise ValueError(f"calibration: one of its {name} comes twice")
+        n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
+        shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
+        for name, shape in shapes.items():
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape and (array.size or np.prod(shape)):
+                raise ValueError(f"calibration: {name} must have the shape {shape}, not {array.shape}")
+            lowest = 0.0 if name in ("speeds", "lack_of_fit") else -np.inf
+            if not (np.isfinite(array) & (array >= lowest)).all():
+                raise ValueError(f"calibration: {name} must be finite, speeds and lack of fit not negative")
+            array = array.reshape(shape)
+            read_only(array)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "data", dict(self.data))
+        R = self.correlation
+        if not np.allclose(R, R.T, rtol=0.0, atol=1e-9):
+            raise ValueError("calibration: the covariance must be symmetric")
+        if (np.linalg.eigvalsh(R) < -1e-9).any():
+            raise ValueError("calibration: the covariance must not be negative in any direction")
+
+    @property
+    def readings(self) -> dict[str, float]:
+        """Those of the parameters that are no numbers of a rotor: angles in degrees, and gains."""
+        pairs = zip(self.names, self.values.tolist(), strict=True)
+        return {name: value for name, value in pairs if is_reading(name)}
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations, shape (n,)."""
+        return np.sqrt(np.abs(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlations of the parameters, shape (n, n); 0 of what has no error."""
+        scale = np.where(self.std > 0, self.std, 1.0)
+        return np.asarray(self.covariance / scale / scale[:, None])
+
+    def columns(self) -> FloatArray:
+        """Principal columns L of the covariance, L Lᵀ = covariance, shape (n, m).
+
+        Those of the correlations, so that units do not count, with an eigenvalue above 1e-12 of the largest.
+        """
+        values, V = np.linalg.eigh(self.correlation)
+        kept = values > 1e-12 * max(values, default=0.0)
+        return np.asarray(self.std[:, None] * V[:, kept] * np.sqrt(values[kept]))
+
+    def lack_at(self, speeds: ArrayLike, sensors: Sequence[str]) -> FloatArray:
+        """Lack of fit at other speeds, rad/s, and sensors, shape (S', C').
+
+        That of the nearest speed; of a sensor that was not compared the largest of all; 0 where nothing was.
+        """
+        omega = np.atleast_1d(np.asarray(speeds, dtype=float))
+        if not self.lack_of_fit.size:
+            return np.zeros((omega.size, len(sensors)))
+        rows = self.lack_of_fit[np.abs(omega[:, None] - self.speeds).argmin(axis=1)]
+        rows = np.column_stack((rows, rows.max(axis=1)))
+        return rows[:, [self.sensors.index(c) if c in self.sensors else -1 for c in sensors]]
+
+
+@dataclass(frozen=True, eq=False)
+class Rotor:
+    """A shaft of beam elements with discs and supports.
+
+    Element *i* (from 1) lies between nodes *i* and *i + 1*; nodes are numbered from 1, left to right,
+    in every function and file of this project.
+
+    Attributes
+    ----------
+    length, outer_diameter, inner_diameter
+        Of each element, m, shape (n,); a scalar counts for all elements.
+    youngs_modulus, density
+        Of each element, Pa and kg/m³, shape (n,).
+    discs, supports
+        What is attached to nodes; several may share a node.
+    stations
+        Names of nodes, `{name: node}`.
+    poisson_ratio
+        Of each element, shape (n,); shear alone depends on it.
+    material_damping
+        Viscous damping of each element's material per its stiffness, s, shape (n,): the stress grows by
+        this many times its rate of change in the turning shaft. It damps whirl below, and drives it above,
+        the speed of the whirl.
+    model
+        What the elements take into account.
+    forces
+        At nodes (`fem.forces`), kept in the order of their kinds: for equilibrium and motion. Linear
+        equations take `InternalDamping` of them, which is linear at each speed, and refuse the others.
+    calibration
+        What a fit to readings found of its parameters, None without one; equal rotors may differ in it.
+
+    Raises
+    ------
+    ValueError
+        With one sentence that says which element, disc or support is impossible, and why.
+    """
+
+    length: FloatArray
+    outer_diameter: FloatArray
+    inner_diameter: FloatArray = field(default_factory=lambda: np.array(0.0))
+    youngs_modulus: FloatArray = field(default_factory=lambda: np.array(STEEL_MODULUS))
+    density: FloatArray = field(default_factory=lambda: np.array(STEEL_DENSITY))
+    discs: Sequence[Disc] = ()
+    supports: Sequence[Support] = ()
+    stations: Mapping[str, int] = field(default_factory=dict)
+    poisson_ratio: FloatArray = field(default_factory=lambda: np.array(STEEL_POISSON))
+    material_damping: FloatArray = field(default_factory=lambda: np.array(0.0))
+    model: Model = Model()
+    forces: Sequence[NodeForce] = ()
+    calibration: Calibration | None = None
+
+    def __post_init__(self) -> None:
+        for name, array in _per_element(self).items():
+            object.__setattr__(self, name, array)
+        kinds: tuple[type[Any], ...] = (Disc, Support, NodeForce)
+        for name, kind in zip(("discs", "supports", "forces"), kinds, strict=True):
+            object.__setattr__(self, name, _attached(getattr(self, name), kind, name[:-1], self.n_nodes))
+        object.__setattr__(self, "forces", tuple(sorted(self.forces, key=code_of)))
+        object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
+        if not isinstance(self.model, Model):
+            raise ValueError(f"model must be a Model, not {self.model!r}")
+        if not isinstance(self.calibration, Calibration | None):
+            raise ValueError(f"calibration must be a Calibration, not {self.calibration!r}")
+
+    __hash__ = None  # type: ignore[assignment]  # compared by value, and arrays have no hash
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Rotor):
+            return NotImplemented
+        names = vars(self).keys() - {"calibration"}
+        return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in names)
+
+    def __repr__(self) -> str:
+        forces = f", {counted(len(self.forces), 'force')}" if self.forces else ""
+        return (
+            f"Rotor({counted(self.n_elements, 'element')}, {self.positions[-1]:.4g} m, "
+            f"{self.total_mass:.4g} kg, {counted(len(self.discs), 'disc')}, "
+            f"{counted(len(self.supports), 'support')}{forces})"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A mapping proxy can be neither pickled nor deep-copied: rebuild from plain data.
+        return type(self), tuple((vars(self) | {"stations": dict(self.stations)}).values())
+
+    def node(self, name_or_number: str | int) -> int:
+        """Number of a node, given as the name of a station or as a number, from 1.
+
+        Raises
+        ------
+        ValueError
+            If there is no such station or node.
+        """
+        if isinstance(name_or_number, str):
+            if name_or_number in self.stations:
+                return self.stations[name_or_number]
+            if not name_or_number.strip().isdecimal():
+                raise ValueError(
+                    f"no station is called {name_or_number!r}{did_you_mean(name_or_number, self.stations)} "
+                    f"(stations: {', '.join(self.stations) or 'none'}); "
+                    f"give one of these or a node number from 1 to {self.n_nodes}"
+                )
+            name_or_number = int(name_or_number)
+        node = whole(name_or_number, "a node number")
+        if not 1 <= node <= self.n_nodes:
+            raise ValueError(f"node {node} does not exist: the rotor has nodes 1 to {self.n_nodes}")
+        return node
+
+    @property
+    def n_elements(self) -> int:
+        """Number of shaft elements."""
+        return len(self.length)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, one more than elements."""
+        return len(self.length) + 1
+
+    @property
+    def positions(self) -> FloatArray:
+        """Axial position of each node from the left end, m, shape (n + 1,)."""
+        return np.concatenate(([0.0], np.cumsum(self.length)))
+
+    @property
+    def area(self) -> FloatArray:
+        """Cross-section of each element, m², shape (n,)."""
+        return np.asarray(math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
+
+    @property
+    def second_moment(self) -> FloatArray:
+        """Second moment of area of each element about a diameter, m⁴, shape (n,)."""
+        outer, inner = self.outer_diameter**2, self.inner_diameter**2
+        return np.asarray(math.pi / 64 * (outer - inner) * (outer + inner))
+
+    @property
+    def shear_modulus(self) -> FloatArray:
+        """G = E / (2 (1 + ν)) of each element, Pa, shape (n,)."""
+        return np.asarray(self.youngs_modulus / (2 * (1 + self.poisson_ratio)))
+
+    @property
+    def shear_coefficient(self) -> FloatArray:
+        """Cowper's κ of each element, a circle or a circular ring, shape (n,).
+
+        κ = 6 (1 + ν)(1 + m²)² / ((7 + 6 ν)(1 + m²)² + (20 + 12 ν) m²), m = inner by outer diameter
+        (G. R. Cowper, J. Appl. Mech. 33 (1966) 335).
+        """
+        nu, m2 = self.poisson_ratio, (self.inner_diameter / self.outer_diameter) ** 2
+        ring = (1 + m2) ** 2
+        return np.asarray(6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * m2))
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether every support is rotationally symmetric, so that one complex coordinate is enough."""
+        return all(support.symmetric for support in self.supports)
+
+    @property
+    def constant(self) -> bool:
+        """Whether no support depends on speed."""
+        return all(support.constant for support in self.supports)
+
+    @property
+    def knots(self) -> FloatArray:
+        """Speeds at which a table of a support may change its slope, rad/s, ascending."""
+        return np.unique([speed for support in self.supports for speed in support.speeds])
+
+    @property
+    def linear(self) -> Rotor:
+        """The same without any of its forces, internal damping included."""
+        return replace(self, forces=()) if self.forces else self
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of shaft and discs, kg."""
+        shaft = float(np.sum(self.density * self.area * self.length))
+        return shaft + math.fsum(disc.mass for disc in self.discs)
+
+
+_FROM_ZERO = ("inner_diameter", "density", "material_damping")
+PER_ELEMENT = ("length", "outer_diameter", "youngs_modulus", "poisson_ratio", *_FROM_ZERO)
+
+
+def too_short(length: FloatArray) -> BoolArray:
+    """Which elements are too short beside their longer neighbour, from lengths of shape (n,)."""
+    beside = np.concatenate(([0.0], length, [0.0]))
+    return np.asarray(SHORTEST * length < np.maximum(beside[:-2], beside[2:]))
+
+
+def _per_element(rotor: Rotor) -> dict[str, FloatArray]:
+    """Checked, read-only copies, of one length, of what was given for each element."""
+    arrays = {}
+    for name in PER_ELEMENT:
+        try:
+            arrays[name] = np.array(getattr(rotor, name), dtype=float, ndmin=1)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name} must be a number or one number per element") from None
+        if (shape := arrays[name].shape)[1:]:
+            raise ValueError(f"{name} must be one number per element, not an array of shape {shape}")
+    n = max(array.size for array in arrays.values())
+    for name, array in arrays.items():
+        if array.size not in (1, n) or not n:
+            raise ValueError(f"{name} has {array.size} values for {n} elements; give one value, or {n}")
+        if name == "poisson_ratio":
+            right, limit = (array > -1) & (array <= 0.5), "above -1, at most 0.5"
+        elif name in _FROM_ZERO:
+            right, limit = array >= 0, "not negative"
+        else:
+            right, limit = array > 0, "greater than zero"
+        right &= np.isfinite(array)
+        _all(right, lambda i: f"{name} must be finite and {limit}, not {array[i]}")  # noqa: B023  at once
+        arrays[name] = np.resize(array, n)
+    read_only(*arrays.values())
+    length, outer, inner = (arrays[name] for name in ("length", "outer_diameter", "inner_diameter"))
+    _all(
+        ~too_short(length),
+        lambda i: (
+            f"its length, {length[i]:g} m, is less than 1/{SHORTEST} of its longer neighbour's, too "
+            "short for float64; join it with this neighbour"
+        ),
+    )
+    _all(
+        inner < outer,
+        lambda i: f"the inner diameter, {inner[i]} m, must be smaller than the outer, {outer[i]} m",
+    )
+    return arrays
+
+
+def _all(right: BoolArray, wrong: Callable[[int], str]) -> None:
+    """Refuse the first element that is not right."""
+    if not right.all():
+        i = int(np.argmin(right))
+        raise ValueError(f"element {i + 1}: {wrong(i)}")
+
+
+def _attached(
+    items: Iterable[Any], kind: type[NodeForce | Disc | Support], what: str, n_nodes: int
+) -> tuple[Any, ...]:
+    try:
+        attached = tuple(items)
+    except TypeError:
+        raise ValueError(f"{what}s must be a list of {kind.__name__} objects, not {items!r}") from None
+    for i, item in enumerate(attached, start=1):
+        if not isinstance(item, kind):
+            raise ValueError(f"{what} {i} must be a {kind.__name__}, not {item!r}")
+        if item.node > n_nodes:
+            raise ValueError(
+                f"{what} {i} stands at node {item.node}, but the rotor has nodes 1 to {n_nodes} only"
+            )
+    return attached
+
+
+def _stations(stations: Mapping[str, int], n_nodes: int) -> Mapping[str, int]:
+    checked = {}
+    for name, node in dict(stations).items():
+        checked[str(name)] = whole(node, f"the node of station {name!r}")
+        if not 1 <= checked[str(name)] <= n_nodes:
+            raise ValueError(
+                f"station {name!r} stands at node {node}, but the rotor has nodes 1 to {n_nodes}"
+            )
+    return MappingProxyType(checked)
+
+
+def refined(rotor: Rotor, times: int) -> Rotor:
+    """The same rotor with each element cut into equal parts; nodes are renumbered.
+
+    Parameters
+    ----------
+    rotor
+        Whose elements are cut.
+    times
+        Into how many parts, 1 or more.
+
+    Raises
+    ------
+    ValueError
+        If `times` is no whole number from 1.
+    """
+    times = whole(times, "the number of parts")
+    if times < 1:
+        raise ValueError(f"the number of parts must be at least 1, not {times}")
+
+    new: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
+    new["length"] /= times
+    for name in ("discs", "supports", "forces"):
+        new[name] = [replace(item, node=times * (item.node - 1) + 1) for item in getattr(rotor, name)]
+    stations = {name: times * (node - 1) + 1 for name, node in rotor.stations.items()}
+    return replace(rotor, **new, stations=stations)
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A probe at a node that reads the deflection in one direction.
+
+    Attributes
+    ----------
+    node
+        Number, from 1, or name of a station.
+    angle
+        Of its direction from x with the rotation, degrees.
+
+    Raises
+    ------
+    ValueError
+        If the angle is not finite.
+    """
+
+    node: str | int
+    angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        what = f"sensor at {self.node!r}: angle"
+        object.__setattr__(self, "angle", number(self.angle, what, signed=True))
+
+    def __str__(self) -> str:
+        return f"{self.node} at {self.angle:g}°" if self.angle else str(self.node)
+
+    @property
+    def radians(self) -> float:
+        """The angle in rad."""
+        return math.radians(self.angle)
+
+
+SensorLike = str | int | tuple[str | int, float] | Sensor
+
+
+def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
+    """A sensor from a node, a station, a pair (node, angle in degrees) or a Sensor.
+
+    Raises
+    ------
+    ValueError
+        If there is no such node, or it is none of these.
+    """
+    if isinstance(sensor, tuple) and len(sensor) != 2:
+        raise ValueError(f"a sensor is a node or a pair (node, angle in degrees), not {sensor!r}")
+    if not isinstance(sensor, Sensor):
+        sensor = Sensor(*sensor) if isinstance(sensor, tuple) else Sensor(sensor)
+    rotor.node(sensor.node)
+    return sensor
+
+
+def label(sensor: SensorLike) -> str | int:
+    """How a table names it: as given, or "5 at 45°"."""
+    if isinstance(sensor, tuple):
+        sensor = Sensor(*sensor)
+    return str(sensor) if isinstance(sensor, Sensor) else sensor

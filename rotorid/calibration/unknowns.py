@@ -11,9 +11,9 @@ from fem.model.calibration import is_reading
 from fem.model.rotor import Rotor
 from fem.model.rotor_parameters import numbers_of, parameter_value
 
-_SIGNED = ("kxy", "kyx", "cxy", "cyx", "offset", "slope", "curve", "angle")
+_SIGNED = ("kxy", "kyx", "cxy", "cyx", "offset", "angle")
 """Last words of paths of numbers that may have either sign."""
-_CHANGES = (".scale", ".offset", ".slope", ".curve")
+_CHANGES = (".scale", ".offset")
 _ABOVE_ZERO = ("youngs_modulus", "density", "pedestal_stiffness")
 LEAST = 1e-3
 """Of its value: the lower bound of what must be above zero."""
@@ -83,6 +83,5 @@ def check_different(rotor: Rotor, paths: Sequence[str]) -> None:
     for k, path in enumerate(paths):
         for i in range(k):
             how = {ways[i], ways[k]}
-            value = "" in how and how <= {"", "scale", "offset"}
-            if numbers[i] & numbers[k] and (value or (len(how) == 1 and numbers[i] == numbers[k])):
+            if numbers[i] & numbers[k] and ("" in how or (len(how) == 1 and numbers[i] == numbers[k])):
                 raise ValueError(f"{paths[i]} and {path} are the same number of the rotor: estimate one")

@@ -8,8 +8,14 @@ import pytest
 from fem_rotors import uniform
 
 import fem
+from fem._new.parameters import (
+    as_they_stand,
+    parameter_value,
+    typical_size,
+    with_changes,
+    with_parameters,
+)
 from fem.matrices.banded_matrices import assemble
-from fem.model.rotor_parameters import parameter_value, typical_size, with_changes, with_parameters
 from fem.solvers.receptance import unit_loads
 from fem.solvers.receptance_derivatives import matrix_change, receptance_with_derivatives
 
@@ -83,7 +89,7 @@ def paths_of(rotor):
     for i, support in enumerate(bearings, start=1):
         own = [
             *("kxx", "kxy", "kyy", "cxx", "cyx"),
-            *("kxx.scale", "stiffness.scale", "cyy.slope", "kyy.curve"),
+            *("kxx.scale", "stiffness.scale", "cyy.offset", "kyy.offset"),
         ]
         own += ["pedestal_mass", "pedestal_stiffness_x", "pedestal_damping_y"] * bool(support.pedestal)
         own += ["tilting_stiffness"] * bool(support.tilting_stiffness)
@@ -253,11 +259,9 @@ def test_a_number_at_its_end_changes_to_one_side():
 
 def test_of_a_scale_and_what_is_added_to_the_same_numbers():
     """As they stand together the scale multiplies what is added: that is not its derivative."""
-    from fem.model.rotor_parameters import as_they_stand
-
     start = drawn(9)
     table = next(f"bearing[{i}]" for i, s in enumerate(start.supports, 1) if s.speeds)
-    values = {f"{table}.kxx.scale": 1.3, f"{table}.kxx.slope": 2e4, f"{table}.kxx.offset": -1e5}
+    values = {f"{table}.kxx.scale": 1.3, f"{table}.kxx.offset": -1e5}
     rotor = with_parameters(start, values)
     found = computed(rotor, [1], [2], [300.0], list(values)).by_number[:, 0, 0, 0]
     by_values = as_they_stand(start, values).T @ found

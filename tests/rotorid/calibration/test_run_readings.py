@@ -45,7 +45,7 @@ def test_derivatives_are_differences_of_the_dense_rotor():
     data, rotor = runs.data(runs.readings(machine())), machine()
     values = {
         "bearing[1].kxx": 4.4e7,
-        "bearing[1].kxx.slope": 2e4,
+        "bearing[1].kxx.offset": 2e6,
         "bearing[2].kyy.scale": 1.2,
         "bearing[2].pedestal_stiffness.scale": 0.9,
         "disc[1].scale": 1.05,

@@ -209,7 +209,7 @@ def test_ends_of_searches_are_told_apart_by_their_numbers():
         ),
         ("= 500\n", '= 500\n[scatter]\n"probe[probe].angle" = 10\n', "each number of the rotor once"),
         ("= 500\n", '= 500\n[scatter]\n"bearing.cxx" = 10\n', "bearing.cxx is 0, and so is any share of it"),
-        ("= 500\n", '= 500\n[scatter]\n"bearing[3].stiffness" = 9\n', "of 2 bearings none is called '3'"),
+        ("= 500\n", '= 500\n[scatter]\n"bearing[3].stiffness" = 9\n', "the bearing '3' is not known"),
         ("= 500\n", "= 500\n[readings]\nrun_percent = 200\n", "key readings.run_percent"),
         ("= 500\n", '= 500\n[calibrate]\ndata = ["a.csv"]\nestimate = "disc.scale"\n', "key calibrate"),
         ('kind = "balance"', 'kind = "calibrate"', "key calibrate"),

@@ -39,7 +39,7 @@ def read(tmp_path):
 
 def drawn(rng, rotor):
     """A calibration as a fit of full correlation gives it, in units of very different size."""
-    names = ("bearing[1].kxx.scale", "bearing[2].cyy.slope", "material.youngs_modulus")
+    names = ("bearing[1].kxx.scale", "bearing[2].cyy.offset", "material.youngs_modulus")
     names += ("probe[DE, x].angle", "key_phasor.angle")
     A = rng.normal(size=(5, 5)) * [[1e-2], [1e-3], [3e9], [2.0], [0.5]]
     return fem.Calibration(
@@ -104,7 +104,7 @@ COMPARED = '[calibration]\nspeeds_rad_s = [100, 200]\n[[calibration.compared]]\n
         (
             PLAIN.replace("[DE]", "[DF]"),
             "calibration.parameter[1].name",
-            r"of 1 bearing none is called 'DF': 1 or DE",
+            r"the bearing 'DF' is not known: one of 1, DE",
         ),
         (PLAIN.replace("kxx", "kxxx"), "calibration.parameter[1].name", "did you mean 'kxx'"),
         (PLAIN.replace("[DE]", "[*]"), "calibration.parameter[1].name", r"single parameter, without \[\*\]"),

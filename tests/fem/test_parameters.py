@@ -1,4 +1,7 @@
-"""Parameters of a rotor by name: what is read is what is set, and what is refused is said."""
+"""Parameters of a rotor by name: what is read is what is set, and what is refused is said.
+
+Error bands against rotors drawn from the covariance, which are built by hand.
+"""
 
 from dataclasses import replace
 
@@ -6,12 +9,16 @@ import numpy as np
 import pytest
 from fem_rotors import machines, rotor23
 from hypothesis import given
+from repetitions import FULL
 
 import fem
-from fem.model.calibration import is_reading
-from fem.model.rotor_parameters import (
+from fem._new.parameters import (
+    band,
     expand,
+    is_reading,
+    nearest_modes,
     parameter_value,
+    spread,
     typical_size,
     with_changes,
     with_parameters,
@@ -32,6 +39,21 @@ ROTOR = fem.Rotor(
     ],
 )
 
+TABLE = replace(
+    ROTOR,
+    supports=[
+        *ROTOR.supports[:2],
+        fem.Support(
+            5,
+            (((2e7, 0.0), (0.0, 3e7)), ((2e7, 2e6), (-1e6, 3e7))),
+            ((200.0, 0.0), (0.0, 300.0)),
+            "NDE",
+            (100.0, 300.0),
+        ),
+    ],
+)
+"""The same with a table."""
+
 
 def compressor():
     return read_rotor(sample_data() / "compressor" / "rotor.toml")
@@ -44,9 +66,7 @@ def all_paths(rotor):
         for i, support in enumerate(own, start=1):
             names = [*PLAIN, *(f"pedestal_{n}" for n in STAND if support.pedestal)]
             yield from (f"{kind}[{i}].{name}" for name in names)
-            yield from (
-                f"{kind}[{i}].{q}.{s}" for q in ("kxx", "damping") for s in ("scale", "slope", "curve")
-            )
+            yield from (f"{kind}[{i}].{q}.{s}" for q in ("kxx", "damping") for s in ("scale", "offset"))
     for i in range(1, len(rotor.discs) + 1):
         yield from (f"disc[{i}].{name}" for name in ("mass", "polar_inertia", "diametral_inertia", "scale"))
 
@@ -127,39 +147,21 @@ def test_scales_multiply_and_a_scale_twice_is_its_square():
     np.testing.assert_array_equal(scaled.at(at)[1], table.supports[i].at(at)[1])
 
 
-def test_slope_and_curve_add_to_constants_and_tables():
-    sloped = with_parameters(ROTOR, {"bearing[2].kxy.slope": 50.0, "bearing[2].kxy": 7.0})
-    assert sloped.supports[2].speeds == (0.0, 1e4)
-    k, c = sloped.supports[2].at(500.0)
-    np.testing.assert_allclose(k, [[2e7, 7.0 + 25e3], [-1e6, 3e7]], rtol=1e-14)
-    np.testing.assert_array_equal(c, np.diag([200.0, 300.0]))
-    curved = with_parameters(sloped, {"bearing[2].cyy.curve": 1e-3, "bearing[2].kxy.scale": 2.0}).supports[2]
-    k, c = curved.at([250.0, 312.5])
-    np.testing.assert_allclose(k[:, 0, 1], 14 + 100 * np.array([250.0, 312.5]), rtol=1e-12)
-    np.testing.assert_allclose(c[1, 1, 1], 300 + 1e-3 * 312.5**2, rtol=1e-12)
-    constant = with_parameters(ROTOR, {"seal[1].kxx.curve": -2.0, "seal[1].stiffness.slope": 3.0}).supports[1]
-    np.testing.assert_allclose(constant.speeds, np.linspace(0, 3000, 97), rtol=1e-15)
-    np.testing.assert_allclose(constant.at(3000.0)[0][0, 0], -1e5 - 2 * 9e6 + 9e3, rtol=1e-14)
-    np.testing.assert_allclose(constant.at(3000.0)[0][1, 1], -1e5 + 9e3, rtol=1e-14)
+def test_offsets_add_to_constants_and_tables():
     offset = with_parameters(ROTOR, {"bearing[1].stiffness.offset": 5.0}).supports[0]
     assert (offset.speeds, offset.stiffness) == ((), 1e7 + 5)
-
-
-def test_a_table_ends_before_a_bearing_pushes_outwards():
-    sloped = with_parameters(ROTOR, {"bearing[2].kxx.slope": -4e4, "bearing[2].cxx.slope": -0.1})
-    assert sloped.supports[2].speeds == pytest.approx((0.0, 500.0), rel=1e-8)
-    curved = with_parameters(ROTOR, {"bearing[2].kxx.curve": -80.0}).supports[2]
-    assert (curved.speeds[-1], len(curved.speeds)) == (pytest.approx(500.0, rel=1e-8), 17)
-    assert parameter_value(sloped, "bearing[2].kxx.slope") == 0
+    values = {"bearing[2].kxy.offset": 50.0, "bearing[2].kxy": 7.0, "bearing[2].kxy.scale": 2.0}
+    assert with_parameters(ROTOR, values).supports[2].stiffness == ((2e7, 64.0), (-1e6, 3e7))
+    k, _ = with_parameters(TABLE, {"bearing[2].kxy.offset": 50.0}).supports[2].at([100.0, 200.0])
+    np.testing.assert_array_equal(k[:, 0, 1], [50.0, 1e6 + 50.0])
 
 
 def test_changes_from_where_the_rotor_stands_go_for_tables_too():
-    sloped = with_parameters(ROTOR, {"bearing[2].kxx.slope": 100.0})
     changed = with_changes(
-        sloped, {"bearing[2].kxx": 5e5, "disc[2].mass": 0.5, "bearing.kyy.scale": 0.1, "bearing.cxx": -1.0}
+        TABLE, {"bearing[2].kxx": 5e5, "disc[2].mass": 0.5, "bearing.kyy.scale": 0.1, "bearing.cxx": -1.0}
     )
     k, c = changed.supports[2].at(200.0)
-    np.testing.assert_allclose([k[0, 0], k[1, 1], c[0, 0]], [2e7 + 2e4 + 5e5, 3.3e7, 199.0], rtol=1e-14)
+    np.testing.assert_allclose([k[0, 0], k[1, 1], c[0, 0]], [2e7 + 5e5, 3.3e7, 199.0], rtol=1e-14)
     assert changed.discs[1].mass == 7.5
 
 
@@ -168,8 +170,7 @@ def test_sizes_for_steps():
     assert typical_size(ROTOR, "bearing[2].kxy") == 1e6
     assert typical_size(ROTOR, "bearing[2].cxy") == 300.0
     assert typical_size(ROTOR, "seal[1].cxx") == 1.0
-    assert typical_size(ROTOR, "bearing[1].kxx.slope") == 1e4
-    assert typical_size(ROTOR, "bearing[2].kyy.curve") == 30.0
+    assert typical_size(ROTOR, "bearing[1].kxx.offset") == 1e7
     assert typical_size(ROTOR, "disc.scale") == typical_size(ROTOR, "key_phasor.angle") == 1.0
 
 
@@ -198,20 +199,17 @@ def test_wildcards():
         ("bearing[1].kxxx", "did you mean 'kxx'"),
         ("bearing[1].stiffnes", "did you mean 'stiffness'"),
         ("bearing[1].kxx.scal", "did you mean 'scale'"),
-        ("bearing[1].pedestal_mass.slope", "suffix 'slope' is not known"),
-        ("bearing[DEE].kxx", r"of 2 bearings none is called 'DEE' \(did you mean 'DE'"),
-        ("bearing[3].kxx", "of 2 bearings none is called '3': .*1, 2, DE or NDE"),
-        ("bearing[1,1].kxx", "names one bearing twice"),
-        ("bearing[1,DE].kxx", "names one bearing twice"),
+        ("bearing[1].kxx.slope", "suffix 'slope' is not known .*one of scale, offset"),
+        ("bearing[1].pedestal_mass.offset", "suffix 'offset' is not known"),
+        ("bearing[DEE].kxx", r"the bearing 'DEE' is not known \(did you mean 'DE'"),
+        ("bearing[1, 3].kxx", "the bearing '3' is not known: one of 1, 2, DE, NDE"),
         ("bearing[2].pedestal_mass", "stands on no pedestal"),
         ("seal.pedestal_mass", "stands on no pedestal"),
         ("disc[wheal].mass", "did you mean 'wheel'"),
         ("disc[1].width", "of a disc, 'width' is not known"),
-        ("disc.scale.scale", "suffix 'scale' is not known"),
-        ("material[1].density", r"write material\.density"),
-        ("probe.angle", r"write probe\[NAME\]\.angle"),
+        ("material[2].density", "the material '2' is not known"),
+        ("probe.angle", r"the kind 'probe' is not known: .*probe\[NAME\]\.angle"),
         ("probe[C].angle", "the probe 'C' is not known"),
-        ("probe[A].angl", "did you mean 'angle'"),
     ],
 )
 def test_a_wrong_path_is_refused_in_words(path, words):
@@ -222,10 +220,9 @@ def test_a_wrong_path_is_refused_in_words(path, words):
 def test_values_that_are_not_one_number_are_refused():
     with pytest.raises(ValueError, match=r"bearing\.kxx is several numbers, 1e\+07 to 2e\+07"):
         parameter_value(ROTOR, "bearing.kxx")
-    table = with_parameters(ROTOR, {"bearing[1].kxx.slope": 1.0})
     for refused in (parameter_value, lambda rotor, path: with_parameters(rotor, {path: 1.0})):
-        with pytest.raises(ValueError, match=r"bearing\[1\]\.kyy is a table: bearing\[1\]\.kyy\.scale"):
-            refused(table, "bearing[1].kyy")
+        with pytest.raises(ValueError, match=r"bearing\[2\]\.kyy is a table: bearing\[2\]\.kyy\.scale"):
+            refused(TABLE, "bearing[2].kyy")
         with pytest.raises(ValueError, match=r"differs along the shaft: material\.density\.scale"):
             refused(replace(ROTOR, density=[7800.0, 7000, 7800, 7800]), "material.density")
     with pytest.raises(ValueError, match="another parameter has this number"):
@@ -235,7 +232,98 @@ def test_values_that_are_not_one_number_are_refused():
     with pytest.raises(ValueError, match="finite and not negative, not -1"):
         with_parameters(ROTOR, {"bearing[1].kxx": -1.0})
     twins = fem.Rotor([0.1], 0.05, supports=[fem.Support(1, 1.0, name="A"), fem.Support(2, 1.0, name="A")])
-    with pytest.raises(ValueError, match="of 2 bearings several are called 'A'"):
+    with pytest.raises(ValueError, match="the bearing 'A' is not known: one of 1, 2"):
         parameter_value(twins, "bearing[A].kxx")
     with pytest.raises(ValueError, match="the rotor has no seal"):
         parameter_value(twins, "seal.kxx")
+
+
+NAMES = ("bearing[1].kxx", "bearing[2].stiffness.scale", "material.youngs_modulus", "disc[wheel].mass")
+VALUES = np.array([4e7, 1.0, 2.1e11, 60.0])
+RELATIVE = np.array([[0.03, 0, 0, 0], [-0.02, 0.03, 0, 0], [0.01, 0.005, 0.01, 0], [0, 0, 0.01, 0.02]])
+ERRORS = RELATIVE * VALUES[:, None]
+DRAWS = 800 if FULL else 300
+WITHIN = 4 / np.sqrt(2 * DRAWS)  # four standard errors of a standard deviation
+
+
+def built(values):
+    k, scale, modulus, mass = values
+    return fem.Rotor(
+        [0.15] * 8,
+        0.08,
+        youngs_modulus=modulus,
+        discs=[fem.Disc(4, mass, 1.0, 0.6, "wheel"), fem.Disc(7, 30.0)],
+        supports=[
+            fem.Support(1, ((k, 0.0), (0.0, 3e7)), 4e3),
+            fem.Support(9, ((5e7 * scale, 5e6 * scale), (-5e6 * scale, 5e7 * scale)), 4e3),
+        ],
+        model=fem.Model(rotary_inertia=True, gyroscopic=True),
+    )
+
+
+CALIBRATED = replace(built(VALUES), calibration=fem.Calibration(NAMES, VALUES, ERRORS @ ERRORS.T))
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    rng = np.random.default_rng(7)
+    return [built(VALUES + ERRORS @ rng.normal(size=4)) for _ in range(DRAWS)]
+
+
+def criticals(rotor):
+    return fem.critical_speeds(rotor, 4).frequencies
+
+
+def amplitudes(rotor, speeds):
+    return np.abs(fem.unbalance_response(rotor, {4: 1e-3}, speeds).readings([1, (4, 30.0)]))
+
+
+def test_critical_speeds_scatter_as_the_band_says(drawn):
+    scatter = np.std([criticals(rotor) for rotor in drawn], axis=0)
+    np.testing.assert_allclose(spread(CALIBRATED, criticals), scatter, rtol=WITHIN)
+
+
+@pytest.mark.full
+def test_the_band_does_not_close_at_a_resonance_and_is_said_to_be_rough(drawn):
+    fine = np.linspace(150.0, 400.0, 501)
+    top = fine[[np.argmax(amplitudes(CALIBRATED, fine)[:, 1])]]
+    std, (said,) = band(CALIBRATED, "the amplitudes", lambda rotor: amplitudes(rotor, top))
+    scatter = np.std([amplitudes(rotor, top)[0, 1] for rotor in drawn])
+    assert 0.5 * scatter < std[0, 1] < 3 * scatter
+    assert "2 of 2 error bands of the amplitudes are wider than ±30 % and rough" in said
+
+
+def test_what_is_linear_is_exact_and_complex_values_count_by_size():
+    def stiffness(rotor):
+        return np.array([rotor.supports[0].stiffness[0][0], 2j * rotor.discs[0].mass])
+
+    std = np.sqrt(np.diag(ERRORS @ ERRORS.T))
+    np.testing.assert_allclose(spread(CALIBRATED, stiffness), [std[0], 2 * std[3]], rtol=1e-6)
+
+
+def test_where_no_band_can_be_given_words_say_why():
+    assert band(replace(CALIBRATED, calibration=None), "x", criticals) == (None, ())
+    with pytest.raises(ValueError, match="no calibration"):
+        spread(replace(CALIBRATED, calibration=None), criticals)
+    wild = fem.Calibration(("bearing[1].kxx",), [4e7], [[2.5e15]])
+    std, said = band(replace(CALIBRATED, calibration=wild), "the critical speeds", criticals)
+    assert std is None
+    begins = (
+        "no error bands of the critical speeds: within the errors of the calibration, support at node 1: "
+    )
+    assert said[0].startswith(begins)
+    std, said = band(CALIBRATED, "them", lambda rotor: np.zeros(2 + (rotor.discs[0].mass > 60.0)))
+    assert std is None
+    assert said == ("no error bands of them: within the errors of the calibration, their number changes",)
+    contradicted = replace(CALIBRATED.calibration, needs_trial_run=True)
+    std, said = band(replace(CALIBRATED, calibration=contradicted), "the critical speeds", criticals)
+    np.testing.assert_array_equal(std, spread(CALIBRATED, criticals))
+    assert "contradict the model" in said[0]
+    assert len(said) == 1
+
+
+def test_modes_that_exchange_their_numbers_keep_them():
+    middle = np.array([[10.0, 11.0, 30.0], [10.0, 21.0, 30.0], [10.0, np.nan, 30.0]])
+    np.testing.assert_array_equal(nearest_modes(middle, middle[:, [1, 2, 0]] + 0.9), middle + 0.9)
+    np.testing.assert_array_equal(nearest_modes(middle, middle - 2.0), middle - 2.0)
+    assert nearest_modes(middle, middle[:, :2]).shape == (3, 2)

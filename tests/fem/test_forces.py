@@ -1,0 +1,316 @@
+"""Forces at nodes that are not linear: their data, laws and derivatives.
+
+Films against quadrature of Reynolds' pressure and closed forms.
+"""
+
+import copy
+import math
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from cases import each_of
+from scipy.optimize import brentq, root
+
+import fem
+from fem._new.forces import law, short_film, tables
+
+BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
+SPEED = 50 * math.pi  # 1500 rpm
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(80)
+
+STOP = {"gap": 0.2, "stiffness": 50.0, "damping": 3.0, "friction": 0.3, "diameter": 0.4, "slip_speed": 0.5}
+SEAL = {"stiffness": 4.0, "damping": 3.0, "fluid_mass": 0.5, "swirl_ratio": 0.45, "clearance": 1.2}
+LAWS = {
+    "bearing": fem.JournalBearing(1, length=0.5, diameter=2.0, clearance=1.2, viscosity=4.0),
+    "damper": fem.SqueezeFilm(
+        1, length=0.5, diameter=2.0, clearance=1.2, viscosity=4.0, centring_stiffness=1.0
+    ),
+    "seal": fem.MuszynskaSeal(1, **SEAL, stiffness_exponent=1.7, swirl_exponent=0.6),
+    "spring": fem.CubicSpring(1, stiffness=2.0, cubic_stiffness=5.0),
+    "stop": fem.Stop(1, **STOP),
+    "internal": fem.InternalDamping(1, damping=0.7),
+}
+STATES = [(0.3, 0.4, 0.2, -0.5, 1.5), (-0.6, 0.2, 0.4, 0.3, 0.7), (0.1, -0.7, -0.2, -0.4, 2.5)]
+
+
+def act(force, state, *, machine=False):
+    (code,), (values,) = tables([force])
+    out = np.empty((2, 6))
+    function = getattr(law, "machine", law) if machine else law
+    function(code, values, *map(float, state), out)
+    return out
+
+
+def force_of(force, state):
+    return complex(*act(force, state)[:, 0])
+
+
+@each_of("name", LAWS)
+def test_derivatives(name):
+    step = 1e-4
+    for state in STATES:
+        found = act(LAWS[name], state)
+        assert np.abs(found).max() > 0
+        for k in range(5):
+            d = step * np.eye(5)[k]
+            at = [act(LAWS[name], np.add(state, m * d))[:, 0] for m in (-2, -1, 1, 2)]
+            expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step)
+            np.testing.assert_allclose(found[:, 1 + k], expected, rtol=1e-7, atol=1e-8)
+
+
+@each_of("name", LAWS)
+def test_interpreted_and_compiled_agree(name):
+    for state in STATES:
+        found = act(LAWS[name], state, machine=True)
+        np.testing.assert_allclose(found, act(LAWS[name], state), rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_a_seal_after_muszynska(state):
+    x, y, vx, vy, omega = state
+    z, v = complex(x, y), complex(vx, vy)
+    e = abs(z) / 1.2
+    K, D = (k0 * (1 - e**2) ** -1.7 for k0 in (4.0, 3.0))
+    tau = 0.45 * (1 - e) ** 0.6
+    expected = -(K - 0.5 * tau**2 * omega**2 - 1j * tau * omega * D) * z - (D - 2j * tau * omega * 0.5) * v
+    assert force_of(LAWS["seal"], state) == pytest.approx(expected, rel=1e-13)
+    assert LAWS["seal"].mass == 0.5
+    assert LAWS["seal"].wall == 1.2
+    same = fem.MuszynskaSeal(1, **SEAL, stiffness_exponent=0.0, swirl_exponent=0.0)
+    s = 0.45 * omega
+    expected = -(4 - 0.5 * s**2 - 3j * s) * z - (3 - 1j * s) * v
+    assert force_of(same, state) == pytest.approx(expected, rel=1e-13)
+    centred = act(same, (0.0, 0.0, *state[2:]))
+    np.testing.assert_allclose(act(same, state)[:, 1:5], centred[:, 1:5], atol=1e-13)
+
+
+def test_a_seal_at_its_centre_and_at_its_wall():
+    assert np.isfinite(act(LAWS["seal"], (0.0, 0.0, 0.1, 0.2, 3.0))).all()
+    for x in (1.2, 2.0):
+        for machine in (False, True):
+            assert np.isnan(act(LAWS["seal"], (x, 0.0, 0.0, 0.0, 1.0), machine=machine)).all()
+
+
+def test_a_cubic_spring():
+    z = complex(0.3, 0.4)
+    assert force_of(LAWS["spring"], (0.3, 0.4, 9.0, 9.0, 9.0)) == pytest.approx(-(2 + 5 * 0.25) * z)
+
+
+def test_internal_damping_drives_above_the_speed_of_the_whirl():
+    out = act(LAWS["internal"], (0.1, 0.2, 0.0, 0.0, 30.0))
+    np.testing.assert_allclose(-out[:, 1:3], [[0, 0.7 * 30], [-0.7 * 30, 0]])
+    np.testing.assert_allclose(-out[:, 3:5], 0.7 * np.eye(2))
+    for whirl, sign in ((40.0, -1), (30.0, 0), (20.0, 1)):  # power into the whirl
+        assert np.sign(round((force_of(LAWS["internal"], (1, 0, 0, whirl, 30.0)) * -1j).real, 9)) == sign
+
+
+def test_a_stop():
+    assert not act(LAWS["stop"], (0.12, 0.16 - 1e-9, 1.0, 1.0, 5.0)).any(), "not yet there"
+    assert not act(LAWS["stop"], (0.21, 0.0, -1.0, 0.0, 5.0)).any(), "leaves faster than the ring follows"
+    deep = force_of(LAWS["stop"], (0.0, 0.5, 0.0, 0.0, 1e3))
+    assert deep == pytest.approx(complex(0.3, -1) * 50 * 0.3), "friction against the turning surface"
+    rolls = force_of(LAWS["stop"], (0.5, 0.0, 0.0, -0.2 * 7, 7.0))
+    assert rolls == pytest.approx(-50 * 0.3), "backward whirl that rolls has no friction"
+    faster = force_of(LAWS["stop"], (0.5, 0.0, 0.1, -100.0, 7.0))
+    assert faster == pytest.approx(complex(-1, 0.3) * (50 * 0.3 + 3 * 0.1))
+
+
+def film(x, y, vx, vy, omega, line_of_centres, C=3.0, c=1.0):
+    out = np.empty((2, 6))
+    short_film(C, c, x, y, vx, vy, omega, line_of_centres, out)
+    return out
+
+
+def by_quadrature(x, y, vx, vy, omega, line_of_centres):
+    """The pressure that Reynolds' equation gives, 6 η ∂(h² ...)/..., integrated where the film is.
+
+    ∂/∂s (h³ / (6 η) ∂p/∂s) = Ω ∂h/∂θ + 2 ∂h/∂t, zero at both ends of the length L = 1; here η R = 3.
+    """
+
+    def pressure(theta):
+        h = 1 - x * np.cos(theta) - y * np.sin(theta)
+        squeeze = omega * (x * np.sin(theta) - y * np.cos(theta)) - 2 * (
+            vx * np.cos(theta) + vy * np.sin(theta)
+        )
+        return -squeeze / (2 * h**3)  # ∫ s (1 − s) ds = 1/6 of the length, 6 η / 2 of the equation
+
+    def there(theta):
+        return y * np.cos(theta) - x * np.sin(theta) if line_of_centres else pressure(theta)
+
+    scan = np.linspace(0, 2 * np.pi, 1001)
+    ends = [brentq(there, a, b) for a, b in pairwise(scan) if there(a) * there(b) < 0]
+    assert len(ends) == 2
+    left, right = ends if there(sum(ends) / 2) > 0 else (ends[1], ends[0] + 2 * math.pi)
+    theta = (left + right) / 2 + (right - left) / 2 * NODES
+    P = 3.0 * pressure(theta) * WEIGHTS * (right - left) / 2
+    return -(P * np.cos(theta)).sum(), -(P * np.sin(theta)).sum()
+
+
+def textbook(x, y, vx, vy, omega):
+    """The same on the half circle at the line of centres: with |Ω − 2 ψ'| in the radial force."""
+    e2 = x * x + y * y
+    turns = (x * vy - y * vx) / e2
+    force = np.array(by_quadrature(x, y, vx, vy, omega, True))
+    wedge = by_quadrature(x, y, -y * turns, x * turns, omega, True)  # without e'
+    radial = np.array([x, y]) * (wedge[0] * x + wedge[1] * y) / e2
+    return force - 2 * radial * (turns > omega / 2)
+
+
+def states(n, seed=0):
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        z = rng.uniform(0.02, 0.8) * np.exp(2j * np.pi * rng.random())
+        vx, vy, omega = rng.normal(size=3)
+        yield z.real, z.imag, vx, vy, omega
+
+
+@pytest.mark.parametrize("line_of_centres", [False, True])
+def test_the_force_is_the_pressure_integrated(line_of_centres):
+    for state in states(20):
+        expected = textbook(*state) if line_of_centres else by_quadrature(*state, False)
+        np.testing.assert_allclose(
+            film(*state, line_of_centres)[:, 0], expected, rtol=1e-9, atol=1e-9 * np.hypot(*expected)
+        )
+
+
+@pytest.mark.parametrize("line_of_centres", [False, True])
+def test_derivatives_of_a_film(line_of_centres):
+    step = 1e-4
+    for state in states(20, seed=1):
+        found = film(*state, line_of_centres)
+        size = np.abs(found).max()
+        for k in range(5):
+            d = step * np.eye(5)[k]
+            at = [film(*np.add(state, m * d), line_of_centres)[:, 0] for m in (-2, -1, 1, 2)]
+            expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step)
+            np.testing.assert_allclose(found[:, 1 + k], expected, rtol=1e-6, atol=1e-8 * size)
+
+
+@pytest.mark.parametrize("where", ["pressure", "line of centres"])
+def test_coefficients_of_the_bearing_of_the_issue(where):
+    """D 100, L 30, c 0.1 mm, η 0.1 Pa·s, 525 N, 1500 rpm; both films agree, to their derivatives."""
+    bearing = fem.JournalBearing(1, **BEARING, film=where)
+    rest = root(
+        lambda q: act(bearing, (*1e-4 * q, 0, 0, SPEED))[:, 0] / 525 + (0, -1), (0.1, -0.1), tol=1e-13
+    ).x
+    assert math.hypot(*rest) == pytest.approx(0.2663, abs=5e-5)
+    found = act(bearing, (*1e-4 * rest, 0, 0, SPEED))
+    stiffness, damping = [[12.808, 16.394], [-25.060, 8.815]], [[232.90, -81.92], [-81.92, 294.91]]
+    np.testing.assert_allclose(-found[:, 1:3] / 1e6, stiffness, atol=5.1e-4)
+    np.testing.assert_allclose(-found[:, 3:5] / 1e3, damping, atol=5.1e-3)
+
+
+def test_a_journal_at_rest_is_held_by_ocvirk_s_force():
+    """Against the eccentricity 4 ε² / (1 − ε²)², across it π ε / (1 − ε²)^1.5, in η Ω L³ R / (4 c²)."""
+    unit = 0.1 * SPEED * 0.03**3 * 0.05 / (4 * 1e-8)
+    for eps in (0.1, 0.5, 0.9):
+        F = act(fem.JournalBearing(1, **BEARING), (1e-4 * eps, 0, 0, 0, SPEED))[:, 0]
+        expected = unit * np.array([-4 * eps**2 / (1 - eps**2) ** 2, math.pi * eps / (1 - eps**2) ** 1.5])
+        np.testing.assert_allclose(F, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0, 4.0])
+def test_a_damper_on_a_circle(angle):
+    """The π film of a centred circular orbit, at ω: −2 ε² / (1 − ε²)² and −π ε / (2 (1 − ε²)^1.5)."""
+    damper = fem.SqueezeFilm(1, **BEARING, centring_stiffness=2e6)
+    unit, omega, turn = 0.1 * 0.03**3 * 0.05 / 1e-8, 300.0, np.exp(1j * angle)
+    for eps in (0.05, 0.4, 0.85):
+        z = 1e-4 * eps * turn
+        v = 1j * omega * z
+        out = act(damper, (z.real, z.imag, v.real, v.imag, SPEED))
+        F = complex(*out[:, 0]) / turn + 2e6 * 1e-4 * eps
+        radial = -unit * omega * 2 * eps**2 / (1 - eps**2) ** 2
+        across = -unit * omega * math.pi * eps / (2 * (1 - eps**2) ** 1.5)
+        np.testing.assert_allclose([F.real, F.imag], [radial, across], rtol=1e-10)
+        np.testing.assert_array_equal(out[:, 5], 0)  # its ring does not turn
+
+
+def test_a_centred_journal_that_does_not_move_carries_nothing():
+    for line_of_centres in (False, True):
+        out = film(0.0, 0.0, 0.0, 0.0, 2.0, line_of_centres)
+        assert np.isfinite(out).all()
+        np.testing.assert_array_equal(out[:, 0], 0)
+
+
+def test_at_the_wall_there_is_no_number():
+    for r in (1 - 1e-17, 1.0, 1.5, np.inf):
+        for line_of_centres in (False, True):
+            assert np.isnan(film(0.0, r, 0.1, 0.0, 2.0, line_of_centres)).all()
+    rng = np.random.default_rng(2)
+    for gap in (1e-13, 1e-15, 1e-16):
+        angle = rng.uniform(0, 7, 200).tolist()
+        for a in angle:
+            out = np.empty((2, 6))
+            r = 1 - gap
+            short_film(1.0, 1.0, r * math.cos(a), r * math.sin(a), 0.3, 0.2, 1.0, a > 3, out)
+            assert np.isfinite(out).all() or np.isnan(out).all()
+
+
+@pytest.mark.parametrize("line_of_centres", [False, True])
+def test_a_film_interpreted_and_compiled_agree(line_of_centres):
+    machine = getattr(short_film, "machine", short_film)
+    for state in states(5, seed=3):
+        out = np.empty((2, 6))
+        machine(3.0, 1.0, *map(float, state), line_of_centres, out)
+        np.testing.assert_allclose(out, film(*state, line_of_centres), rtol=1e-12, atol=1e-14)
+
+
+@each_of(
+    "make, words",
+    [
+        (
+            lambda: fem.JournalBearing(1, **BEARING | {"clearance": 0.0}),
+            "journal bearing at node 1: clearance must",
+        ),
+        (
+            lambda: fem.JournalBearing(1, "DE", **BEARING | {"length": -1}),
+            "bearing 'DE' at node 1: length must",
+        ),
+        (lambda: fem.JournalBearing(1, **BEARING, film="pi"), "film 'pi' is not known"),
+        (
+            lambda: fem.SqueezeFilm(1, **BEARING | {"clearance": 1e-200}),
+            "clearance must be above 0, not 1e-200",
+        ),
+        (lambda: fem.SqueezeFilm(0, **BEARING), "squeeze film: node 0 does not exist"),
+        (lambda: fem.SqueezeFilm(1.5, **BEARING), "the node of squeeze film must be a whole number"),
+        (lambda: fem.MuszynskaSeal(1), "clearance must be above 0"),
+        (lambda: fem.CubicSpring(1, stiffness=np.nan), "stiffness must be finite and not negative"),
+        (lambda: fem.Stop(1, gap=1.0), "stiffness must be above 0"),
+        (lambda: fem.InternalDamping(1, damping="much"), "damping must be a number"),
+    ],
+)
+def test_impossible_values(make, words):
+    with pytest.raises(ValueError, match=words):
+        make()
+
+
+def test_a_rotor_keeps_them_by_kind_and_compares_them():
+    damping, film = fem.InternalDamping(2, damping=3.0), fem.JournalBearing(3, **BEARING)
+    rotor = fem.Rotor([0.4, 0.6], 0.1, forces=[damping, film])
+    assert rotor.forces == (film, damping)
+    assert rotor == fem.Rotor([0.4, 0.6], 0.1, forces=[film, damping])
+    assert rotor != rotor.linear
+    plain = rotor.linear
+    assert plain.forces == ()
+    assert plain.linear is plain
+    assert pickle.loads(pickle.dumps(rotor)) == copy.deepcopy(rotor) == rotor
+    assert "2 forces" in repr(rotor)
+    assert "force" not in repr(rotor.linear)
+
+
+def test_a_refined_rotor_has_them_at_the_same_places():
+    rotor = fem.Rotor([0.4, 0.6], 0.1, forces=[fem.JournalBearing(2, **BEARING), fem.Stop(3, stiffness=1.0)])
+    finer = fem.refined(rotor, 3)
+    places = [finer.positions[force.node - 1] for force in finer.forces]
+    np.testing.assert_allclose(places, [0.4, 1.0])
+
+
+def test_what_no_rotor_takes():
+    with pytest.raises(ValueError, match="force 1 stands at node 4"):
+        fem.Rotor([0.4, 0.6], 0.1, forces=[fem.Stop(4, stiffness=1.0)])
+    with pytest.raises(ValueError, match="force 1 must be a NodeForce"):
+        fem.Rotor([0.4], 0.1, forces=[fem.Support(1, 1e6)])
+    with pytest.raises(ValueError, match="node force at node 1 is no force: one of journal_bearing, "):
+        fem.Rotor([0.4], 0.1, forces=[fem.NodeForce(1)])

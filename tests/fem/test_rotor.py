@@ -1,0 +1,335 @@
+"""The data of a rotor: shaft, discs, supports, pedestals, sensors, and of its calibration."""
+
+import copy
+import doctest
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import each_of
+from fem_rotors import rotor23
+
+import fem
+
+TABLE = fem.Support(3, [1e7, ((2e7, 1e6), (-1e6, 3e7))], [0.0, 1e4], name="journal", speeds=[100.0, 300.0])
+
+A = np.array([[2e6, 0.0], [-1e6, 5e5], [0.01, 0.02]])
+FOUND = fem.Calibration(
+    ("bearing[1].kxx", "bearing[2].kxx", "probe[DE].angle"),
+    [1.2e7, 1.1e7, 1.02],
+    A @ A.T,
+    [100.0, 200.0],
+    ("DE", "NDE"),
+    [[0.01, 0.02], [0.04, 0.03]],
+)
+
+
+def test_a_scalar_counts_for_all_elements_and_nothing_can_be_written():
+    lengths = np.array([0.1, 0.2])
+    rotor = fem.Rotor(lengths, 0.05, 0.02)
+    assert rotor.n_elements == 2
+    assert rotor.n_nodes == 3
+    np.testing.assert_allclose(rotor.positions, [0, 0.1, 0.3], rtol=1e-15)
+    np.testing.assert_array_equal(rotor.youngs_modulus, [2.1e11, 2.1e11])
+    lengths[0] = 9.0
+    assert rotor.length[0] == 0.1
+    with pytest.raises(ValueError, match="read-only"):
+        rotor.length[0] = 1.0
+    with pytest.raises(AttributeError):
+        rotor.density = 1.0
+    with pytest.raises(TypeError):
+        rotor.stations["a"] = 1
+
+
+def test_mass_and_sections_of_a_tube():
+    tube = fem.Rotor([0.5, 0.5], 0.1, 0.06, density=1000.0, discs=[fem.Disc(2, 3.0)])
+    area = math.pi / 4 * (0.1**2 - 0.06**2)
+    assert tube.total_mass == pytest.approx(1000 * area + 3.0, rel=1e-14)
+    assert tube.second_moment[0] == pytest.approx(math.pi / 64 * (0.1**4 - 0.06**4), rel=1e-14)
+
+
+def test_equal_by_value_and_copied():
+    rotor = fem.Rotor([0.1, 0.2], 0.05, discs=[fem.Disc(1, 2)], stations={"A": 2})
+    same = fem.Rotor(
+        np.array([0.1, 0.2]), [0.05, 0.05], discs=(fem.Disc(1, 2.0),), stations={"A": np.int64(2)}
+    )
+    assert rotor == same
+    assert rotor != fem.Rotor([0.1, 0.2], 0.05, discs=[fem.Disc(2, 2)], stations={"A": 2})
+    assert rotor != fem.Rotor([0.1, 0.2], 0.05, discs=[fem.Disc(1, 2)])
+    assert rotor != fem.Rotor([0.1, 0.2, 0.3], 0.05)
+    assert rotor != "rotor"
+    assert pickle.loads(pickle.dumps(rotor)) == rotor
+    assert copy.deepcopy(rotor) == rotor
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(rotor)
+
+
+def test_repr_is_short():
+    assert repr(rotor23()) == "Rotor(23 elements, 3.243 m, 558.5 kg, 12 discs, 2 supports)"
+
+
+def test_stations_and_numbers_name_nodes():
+    rotor = fem.Rotor([0.1] * 4, 0.05, stations={"bearing": 2, "4": 5})
+    assert [rotor.node("bearing"), rotor.node(3), rotor.node("3"), rotor.node("4")] == [2, 3, 3, 5]
+    assert type(rotor.node(np.int64(3))) is int
+    with pytest.raises(ValueError, match=r"'bering'.*stations: bearing, 4.*1 to 5"):
+        rotor.node("bering")
+    with pytest.raises(ValueError, match=r"node 6 does not exist.*1 to 5"):
+        rotor.node(6)
+    with pytest.raises(ValueError, match="node 0 does not exist"):
+        rotor.node("0")
+    with pytest.raises(ValueError, match=r"whole number, not 2.5"):
+        rotor.node(2.5)
+
+
+@each_of(
+    ("arguments", "message"),
+    [
+        ({"length": [0.1, -0.2]}, "element 2: length must be finite and greater than zero, not -0.2"),
+        ({"length": [0.1, 0.0]}, "element 2: length"),
+        ({"length": [0.1, float("nan")]}, "element 2: length must be finite"),
+        ({"length": []}, "length has 0 values"),
+        ({"length": "long"}, "length must be a number"),
+        ({"length": [[0.1]]}, r"length must be one number per element, not an array of shape \(1, 1\)"),
+        ({"outer_diameter": [0.1, 0.1, 0.1]}, "length has 2 values for 3 elements"),
+        ({"outer_diameter": float("inf")}, "element 1: outer_diameter"),
+        ({"inner_diameter": [0, 0.05]}, "element 2: the inner diameter, 0.05 m, must be smaller"),
+        ({"inner_diameter": -0.01}, "element 1: inner_diameter must be finite and not negative"),
+        ({"youngs_modulus": 0.0}, "youngs_modulus must be finite and greater than zero"),
+        ({"density": -1.0}, "density must be finite and not negative"),
+        ({"discs": [fem.Disc(4, 1)]}, "disc 1 stands at node 4, but the rotor has nodes 1 to 3 only"),
+        ({"supports": [fem.Support(1, 1), fem.Support(9, 1)]}, "support 2 stands at node 9"),
+        ({"discs": [fem.Support(1, 1)]}, "disc 1 must be a Disc"),
+        ({"supports": 3}, "supports must be a list of Support objects"),
+        ({"stations": {"A": 4}}, "station 'A' stands at node 4"),
+        ({"stations": {"A": 1.5}}, "the node of station 'A' must be a whole number"),
+    ],
+)
+def test_an_impossible_rotor_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        fem.Rotor(**{"length": [0.1, 0.2], "outer_diameter": 0.05, **arguments})
+
+
+@each_of(
+    ("make", "message"),
+    [
+        (lambda: fem.Disc(0, 1.0), "disc: node 0 does not exist, nodes are numbered from 1"),
+        (lambda: fem.Disc(True, 1.0), "whole number, not True"),
+        (
+            lambda: fem.Disc(2, -1.0, name="wheel"),
+            "disc 'wheel' at node 2: mass must be finite and not negative",
+        ),
+        (lambda: fem.Disc(2, 1.0, polar_inertia=float("nan")), "polar_inertia must be finite"),
+        (lambda: fem.Disc(2, 1.0, diametral_inertia=-1), "diametral_inertia must be finite and not negative"),
+        (lambda: fem.Disc(2, "heavy"), "mass must be a number, not 'heavy'"),
+        (lambda: fem.Support(1.0, 1e8), "the node of support must be a whole number, not 1.0"),
+        (lambda: fem.Support(1, -1e8), "support at node 1: stiffness must be finite and not negative"),
+        (lambda: fem.Support(1, 1e8, float("inf")), "damping must be finite"),
+    ],
+)
+def test_an_impossible_disc_or_support_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_the_example_of_the_package_is_true():
+    assert doctest.testmod(fem) == (0, 4)
+
+
+def test_equal_bearings_compare_equal_however_they_are_written():
+    assert fem.Support(1, [[2e7, 0], [0, 2e7]], np.eye(2) * 5) == fem.Support(1, 2e7, 5.0)
+    assert fem.Support(1, np.array([[1.0, 2], [3, 4]])) == fem.Support(1, ((1, 2), (3, 4)))
+    assert fem.Support(1, [1e7, 2e7], 3.0, speeds=np.array([0, 9.0])) == fem.Support(
+        1, (1e7, [[2e7, 0], [0, 2e7]]), (3.0, 3.0), speeds=(0, 9)
+    )
+    assert fem.Support(3, 1e7) != TABLE
+    assert hash(fem.Support(1, ((1, 2), (3, 4)))) == hash(fem.Support(1, [[1, 2], [3, 4]]))
+    assert pickle.loads(pickle.dumps(TABLE)) == copy.deepcopy(TABLE) == TABLE
+    assert fem.Pedestal(5.0, (1e8, 1e8)) == fem.Pedestal(5.0, 1e8)
+
+
+def test_what_kind_of_support_it_is():
+    plain = fem.Support(1, 1e7, 10.0)
+    assert (plain.plain, plain.symmetric, plain.constant, plain.damped) == (True, True, True, True)
+    swirl = fem.Support(1, ((1e7, 5e5), (-5e5, 1e7)))
+    assert (swirl.plain, swirl.symmetric, swirl.constant, swirl.damped) == (False, True, True, False)
+    assert not fem.Support(1, ((1e7, 5e5), (5e5, 1e7))).symmetric
+    assert not TABLE.symmetric
+    assert not TABLE.constant
+    on_stand = fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8, 3.0))
+    assert (on_stand.plain, on_stand.symmetric, on_stand.damped) == (False, True, True)
+    assert not fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8))).symmetric
+    hardly = fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8), (0.0, 1e-6)))
+    assert hardly.damped, "however little it is, in however few directions"
+    assert not fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8)).damped
+    rotor = fem.Rotor([0.1, 0.1], 0.05, supports=[plain, TABLE])
+    assert not rotor.symmetric
+    assert not rotor.constant
+    assert fem.Rotor([0.1], 0.05, supports=[plain, swirl]).symmetric
+
+
+def test_a_table_is_interpolated_and_never_extrapolated():
+    k, c = TABLE.at(np.array([[100.0, 200.0], [250.0, 300.0]]))
+    assert k.shape == c.shape == (2, 2, 2, 2)
+    np.testing.assert_allclose(k[0, 1], [[1.5e7, 5e5], [-5e5, 2e7]], rtol=1e-14)
+    np.testing.assert_allclose(c[1, 0], np.eye(2) * 7.5e3, rtol=1e-14)
+    np.testing.assert_allclose(k[1, 1], [[2e7, 1e6], [-1e6, 3e7]], rtol=1e-14)
+    for speed in (99.0, 301.0):
+        with pytest.raises(
+            ValueError, match=rf"support 'journal' at node 3: its table holds 100 to 300 rad/s, not {speed:g}"
+        ):
+            TABLE.at([200.0, speed])
+    k, c = fem.Support(1, 5.0, 2.0).at(1e9)
+    np.testing.assert_array_equal(k, 5 * np.eye(2))
+    np.testing.assert_array_equal(c, 2 * np.eye(2))
+
+
+def test_a_pedestal_is_a_spring_in_series_with_a_mass():
+    stand = fem.Pedestal(20.0, (4e7, 1e7), (100.0, 50.0))
+    D = fem.Support(1, 2e7, 300.0, pedestal=stand).dynamic_stiffness([0.0, 700.0])
+    np.testing.assert_allclose(D[0], np.diag([4 * 2 / 6, 1 * 2 / 3]) * 1e7, rtol=1e-14)
+    bearing, ground = 2e7 + 700j * 300, 4e7 + 700j * 100 - 700**2 * 20
+    assert D[1, 0, 0] == pytest.approx(1 / (1 / bearing + 1 / ground), rel=1e-12)
+    assert D[1, 0, 1] == 0
+    assert fem.Support(1, 2e7).dynamic_stiffness(3.0, speed=1.0)[0, 0] == 2e7
+
+
+def test_a_disc_from_its_sizes():
+    disc = fem.Disc.from_geometry(2, 0.1, 0.4, 0.1, density=7000.0, name="wheel")
+    mass = 7000 * 0.1 * math.pi / 4 * (0.16 - 0.01)
+    assert disc.mass == pytest.approx(mass, rel=1e-14)
+    assert disc.polar_inertia == pytest.approx(mass / 8 * 0.17, rel=1e-14)
+    assert disc.diametral_inertia == pytest.approx(mass / 16 * 0.17 + mass / 12 * 0.01, rel=1e-14)
+    assert (disc.node, disc.name) == (2, "wheel")
+
+
+def test_a_rotor_with_everything_survives_copying():
+    rotor = fem.Rotor(
+        [0.1, 0.1],
+        0.05,
+        supports=[TABLE],
+        stations={"A": 1},
+        poisson_ratio=0.25,
+        material_damping=[0, 1e-5],
+        model=fem.Model(shear=True),
+    )
+    assert pickle.loads(pickle.dumps(rotor)) == copy.deepcopy(rotor) == rotor
+    for change in ({"model": fem.Model()}, {"poisson_ratio": 0.3}, {"material_damping": 0.0}):
+        assert replace(rotor, **change) != rotor
+
+
+@each_of(
+    ("make", "message"),
+    [
+        (lambda: fem.Support(1, ((1, 2), (3, "x"))), "support at node 1: stiffness yy must be a number"),
+        (lambda: fem.Support(1, [1.0, 2.0]), r"stiffness must be a number or 2 × 2"),
+        (lambda: fem.Support(1, 0.0, ((1, math.nan), (0, 1))), "damping xy must be finite"),
+        (lambda: fem.Support(2, [1.0, 2, 3], speeds=[1, 2]), "stiffness has 3 values for 2 speeds"),
+        (lambda: fem.Support(2, [1.0, -2.0], speeds=[1, 2]), "stiffness 2 must be finite and not negative"),
+        (lambda: fem.Support(2, 1.0, speeds=[2, 1]), "at least two, not negative and ascending"),
+        (lambda: fem.Support(2, 1.0, speeds=[2]), "speeds must be at least two"),
+        (lambda: fem.Support(2, 1.0, speeds="ab"), "speeds must be a list of numbers"),
+        (lambda: fem.Support(1, 1e8, kind="spring"), "kind 'spring' is not known .*: one of bearing, seal"),
+        (lambda: fem.Support(1, 1e8, pedestal=3), "pedestal must be a Pedestal, not 3"),
+        (
+            lambda: fem.Support(1, 1e8, tilting_stiffness=-1),
+            "tilting_stiffness must be finite and not negative",
+        ),
+        (lambda: fem.Pedestal(1.0), "pedestal: stiffness must be above 0 in x and y"),
+        (lambda: fem.Pedestal(1.0, (1e8, -1)), "pedestal: stiffness in y must be finite and not negative"),
+        (lambda: fem.Pedestal(1.0, (1, 2, 3)), r"a number or a pair \(x, y\)"),
+        (lambda: fem.Pedestal(-1.0, 1e8), "pedestal: mass must be finite and not negative"),
+        (lambda: fem.Disc.from_geometry(1, 0.1, 0.2, 0.2), "inner diameter, 0.2 m, must be smaller"),
+        (lambda: fem.Disc.from_geometry(1, -0.1, 0.2), "width must be finite and not negative"),
+        (lambda: fem.Model(shear=1), "model: shear must be True or False, not 1"),
+        (lambda: fem.Rotor([1.0], 0.1, model=True), "model must be a Model"),
+        (
+            lambda: fem.Rotor([1.0], 0.1, poisson_ratio=0.6),
+            "element 1: poisson_ratio must be finite and above",
+        ),
+        (lambda: fem.Rotor([1.0], 0.1, material_damping=-1), "material_damping must be finite and not neg"),
+        (lambda: fem.Sensor(1, math.inf), "sensor at 1: angle must be finite"),
+    ],
+)
+def test_impossible_data_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_seal_may_push():
+    seal = fem.Support(1, -1e5, kind="seal")
+    assert seal.stiffness == -1e5
+    rotor = fem.Rotor(
+        [0.5, 0.5],
+        0.05,
+        supports=[fem.Support(1, 1e7), fem.Support(3, 1e7), fem.Support(2, -1e5, kind="seal")],
+    )
+    softer = fem.critical_speeds(rotor, 1).frequencies[0]
+    assert (
+        softer
+        < fem.critical_speeds(fem.Rotor([0.5, 0.5], 0.05, supports=rotor.supports[:2]), 1).frequencies[0]
+    )
+    unstable = fem.Rotor(
+        [0.5, 0.5],
+        0.05,
+        supports=[fem.Support(1, 1e3), fem.Support(3, 1e3), fem.Support(2, -1e7, kind="seal")],
+    )
+    with pytest.raises(ValueError, match="statically unstable"):
+        fem.critical_speeds(unstable, 1)
+
+
+def test_principal_columns_give_the_covariance_in_as_many_directions_as_it_has():
+    L = FOUND.columns()
+    assert L.shape == (3, 2)
+    scale = np.outer(FOUND.std, FOUND.std)
+    np.testing.assert_allclose(L @ L.T / scale, FOUND.covariance / scale, atol=1e-14)
+    known = replace(FOUND, covariance=np.diag([0.0, 4e10, 1e-4]))
+    assert known.columns().shape == (3, 2)
+    assert not known.columns()[0].any()
+    assert fem.Calibration((), [], np.zeros((0, 0))).columns().shape == (0, 0)
+    assert replace(FOUND, covariance=np.zeros((3, 3))).columns().shape == (3, 0)
+
+
+def test_lack_of_fit_elsewhere_is_that_of_the_nearest_speed_and_the_worst_sensor():
+    np.testing.assert_array_equal(
+        FOUND.lack_at([0.0, 149.0, 151.0, 1e4], ("NDE", "top")),
+        [[0.02, 0.02], [0.02, 0.02], [0.03, 0.04], [0.03, 0.04]],
+    )
+    nothing = replace(FOUND, speeds=[], sensors=(), lack_of_fit=np.zeros((0, 0)))
+    np.testing.assert_array_equal(nothing.lack_at([5.0], ("DE", "NDE")), np.zeros((1, 2)))
+    assert FOUND.lack_at([5.0, 6.0], ()).shape == (2, 0)
+
+
+def test_a_rotor_keeps_its_calibration_and_stays_equal():
+    rotor = fem.Rotor([0.1], 0.05, supports=[fem.Support(1, 1e7)], stations={"DE": 1})
+    calibrated = replace(rotor, calibration=FOUND)
+    assert calibrated == rotor
+    assert replace(calibrated, supports=()).calibration is FOUND
+    for copied in (pickle.loads(pickle.dumps(calibrated)), copy.deepcopy(calibrated)):
+        assert copied == rotor
+        np.testing.assert_array_equal(copied.calibration.covariance, FOUND.covariance)
+        assert copied.calibration.readings == {"probe[DE].angle": 1.02}
+    with pytest.raises(ValueError, match="calibration must be a Calibration"):
+        replace(rotor, calibration=3)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"values": [1.0]}, r"values must have the shape \(3,\), not \(1,\)"),
+        ({"covariance": np.eye(2)}, r"covariance must have the shape \(3, 3\)"),
+        ({"lack_of_fit": [[0.1, 0.1]]}, r"lack_of_fit must have the shape \(2, 2\)"),
+        ({"lack_of_fit": [[0.1, -0.1], [0, 0]]}, "not negative"),
+        ({"values": [1.0, np.nan, 1.0]}, "values must be finite"),
+        ({"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "must be symmetric"),
+        ({"covariance": np.diag([1.0, -1.0, 1.0])}, "negative in any direction"),
+        ({"covariance": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "negative in any direction"),
+        ({"names": ("disc.scale",) * 3}, "one of its names comes twice"),
+        ({"sensors": ("DE", "DE")}, "one of its sensors comes twice"),
+    ],
+)
+def test_what_is_no_calibration_is_refused(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        replace(FOUND, **wrong)
