@@ -1,23 +1,39 @@
-"""Names of the old modules until this one is written."""
+"""The equations of motion of a rotor: matrices of one plane in bands, and both planes in a basis or whole.
 
-from fem.matrices.banded_matrices import (
-    Matrices,
-    assemble,
-    dense,
-    free_motions,
-    general,
-    held,
-    ignored_inertia,
-    multiply,
-    rounding_error,
-    shaft_energy,
-)
-from fem.matrices.equations_of_motion import Motion, equations_of_motion
-from fem.matrices.lateral_planes import Planes, both_planes, project
-from fem.matrices.lateral_planes import Quadratic as Reduced
-from fem.matrices.support_dynamic_stiffness import Supported, on_whirl, supported, whirl_change
-from fem.matrices.undamped_matrices import FROM_XY, TO_XY, static_stiffness
-from fem.solvers.full_band import Factored, WholeBand
+Unknowns of one plane: `stride` per node, the deflection w (m) first, then the tilt θ (rad); with `shear` two
+shear angles of the element to the right follow, and the last node has w and θ only. Both planes have the
+same real symmetric matrices M, K of the shaft, G (polar inertia on the tilts) and B = Σ β K of the elements.
+With rotation from x to y at the speed Ω and z = x + i y
+
+    M z'' + (B − i Ω G) z' + (K − i Ω B) z + supports = f:
+
+    x:  M x'' + B x' + Ω G y' + K x + Ω B y + supports = f_x
+    y:  M y'' + B y' − Ω G x' + K y − Ω B x + supports = f_y.
+
+Supports are matrices of (x, y) at their nodes: force −k (x, y) − c (x', y'). Internal damping at a node,
+F = −c (z' − i Ω z), is the same as material damping there, c in the place of B: a support of damping c and of
+stiffness Ω c ((0, 1), (−1, 0)). On a forward orbit z = e^{iωt} it does the work of −i c (ω − Ω): it damps
+below and drives above the speed of the whirl. Where every support is rotationally symmetric, z takes half of
+the unknowns, with scalars k = kxx − i kxy and c = cxx − i cxy. A pedestal is one more unknown in each plane.
+
+Synchronous motion z = F e^{iωt} + b̄ e^{−iωt} has x = F + b, y = −i (F − b), so that a matrix D of (x, y) acts
+on (F, b) as T⁻¹ D T with T = [[1, 1], [−i, i]]. A load f that turns with the rotor is f on x and −i f on y.
+
+Symmetric bands are kept as LAPACK does, upper form: `band[width + i - j, j]` is entry (i, j) for i ≤ j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fem._new.elements import Layout, bending_terms, gyroscopic_terms, mass_terms, strains
+from fem._new.forces import InternalDamping, kind_of
+from fem._new.rotor import Rotor, Support
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 __all__ = [
     "FROM_XY",
@@ -32,13 +48,13 @@ __all__ = [
     "assemble",
     "both_planes",
     "dense",
+    "dynamic_stiffness",
     "equations_of_motion",
     "free_motions",
     "general",
     "held",
     "ignored_inertia",
     "multiply",
-    "on_whirl",
     "project",
     "rounding_error",
     "shaft_energy",
@@ -46,3 +62,592 @@ __all__ = [
     "supported",
     "whirl_change",
 ]
+
+TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
+FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
+_ACROSS = np.array([[0.0, 1.0], [-1.0, 0.0]])  # force in x from y, and with the opposite sign in y from x
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """The assembled rotor, one plane.
+
+    Attributes
+    ----------
+    shaft
+        Stiffness of the shaft (and tilting springs) without the supports' stiffness, upper band of shape
+        (width + 1, size).
+    mass
+        Shaft and discs; tilting inertia if the model has `rotary_inertia`.
+    gyroscopic
+        G, polar inertia of shaft and discs on the slopes; zero unless the model has `gyroscopic`.
+    material
+        B, Σ β K of the elements.
+    stride, width
+        Unknowns per node, and entries of a band above its diagonal.
+    """
+
+    shaft: FloatArray
+    mass: FloatArray
+    gyroscopic: FloatArray
+    material: FloatArray
+    stride: int
+    width: int
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.shaft.shape[1])
+
+    def deflection(self, node: int) -> int:
+        """Unknown, from 0, of the deflection of a node, from 1; that of its slope is the next."""
+        return self.stride * (node - 1)
+
+    @property
+    def deflections(self) -> IndexArray:
+        """Unknowns of the deflections of all nodes, shape (N,)."""
+        return np.arange(0, self.size, self.stride)
+
+
+def assemble(rotor: Rotor) -> Matrices:
+    """Matrices of a rotor; internal damping at nodes acts like a support and is not in them.
+
+    Raises
+    ------
+    ValueError
+        For a rotor with forces that are not linear.
+    """
+    for force in rotor.forces:
+        if not isinstance(force, InternalDamping):
+            raise ValueError(
+                f"the {kind_of(force).replace('_', ' ')} at node {force.node} is not linear, and this asks for "
+                "linear equations: write the coefficients of all such forces at rest first, `rotorid bearings "
+                "ROTOR --speeds A:B --output linear.toml`, or take rotor.linear, which leaves them out"
+            )
+    layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
+    bending = bending_terms(rotor)
+    K, M = layout.band(bending), layout.band(mass_terms(rotor))
+    G = layout.band(gyroscopic_terms(rotor)) if model.gyroscopic else np.zeros_like(M)
+    B = layout.band([(beta * factor, form) for factor, form in bending]) if beta.any() else np.zeros_like(M)
+    A = Matrices(K, M, G, B, layout.stride, layout.width)
+    for disc in rotor.discs:
+        w = A.deflection(disc.node)
+        M[-1, w] += disc.mass
+        M[-1, w + 1] += disc.diametral_inertia * model.rotary_inertia
+        G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
+    for support in rotor.supports:
+        K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
+    return A
+
+
+def free_motions(rotor: Rotor, held: set[int]) -> int:
+    """Number of rigid-body motions, of 2, left by springs at the nodes `held` and by tilting springs."""
+    tilting = any(support.tilting_stiffness > 0 for support in rotor.supports)
+    return max(2 - len(held) - tilting, 0) if held else 2 - tilting
+
+
+def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
+    """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
+    width = band.shape[0] - 1
+    Y = band[width, :, None] * X
+    for above in range(1, width + 1):
+        entries = band[width - above, above:, None]
+        Y[:-above] += entries * X[above:]
+        Y[above:] += entries.conj() * X[:-above]
+    return np.asarray(Y)
+
+
+def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
+    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
+    free = np.ones(band.shape[1])
+    free[unknowns] = 0.0
+    K = np.asfortranarray(band * free)
+    for above in range(1, len(K)):
+        K[-1 - above, above:] *= free[:-above]
+    K[-1, unknowns] = 1.0
+    return K
+
+
+def dense(band: AnyArray) -> AnyArray:
+    """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
+    widest = min(len(band), band.shape[1])
+    upper = sum(np.diag(band[-1 - above, above:], above) for above in range(widest))
+    return np.asarray(upper + np.triu(upper, 1).conj().T)
+
+
+def general(band: FloatArray) -> FloatArray:
+    """The columns of a symmetric band from the highest entry to the lowest, shape (size, 2 width + 1)."""
+    width, size = len(band) - 1, band.shape[1]
+    columns = np.zeros((size, 2 * width + 1))
+    columns[:, : width + 1] = band.T
+    for below in range(1, width + 1):
+        columns[:-below, width + below] = band[width - below, below:]
+    return columns
+
+
+def shaft_energy(rotor: Rotor, X: FloatArray) -> FloatArray:
+    """Twice the strain energy of the shaft and of tilting springs for each column of X, N·m, shape (m,).
+
+    Summed from strains it loses rounding of the order (number of elements)² instead of the fourth power
+    that xᵀ K x itself loses.
+    """
+    S = strains(rotor, X)
+    energy = np.einsum("kem,kem->m", S, S)
+    stride = 4 if rotor.model.shear else 2
+    for support in rotor.supports:
+        if support.tilting_stiffness:
+            energy = energy + support.tilting_stiffness * X[stride * (support.node - 1) + 1] ** 2
+    return np.asarray(energy)
+
+
+def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
+    """Relative error of xᴴ K x that rounding the entries of K may cause, for each column of X, shape (m,).
+
+    It grows with the fourth power of the number of elements: about 1e-13 at 20, 1e-5 at 2000. Solutions
+    of K x = f are wrong by as much. The `energy` xᴴ K x is computed unless it is known.
+    """
+    if energy is None:
+        energy = np.abs(np.einsum("ij,ij->j", X.conj(), multiply(band, X)))
+    size = np.abs(X)
+    scatter = np.einsum("ij,ij->j", size, multiply(np.abs(band), size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(scatter > 0, np.finfo(float).eps * scatter / energy, 0.0))
+
+
+def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
+    """One warning for each disc whose moments of inertia the model leaves out."""
+    model, warnings = rotor.model, []
+    diametral = ("diametral", "no rotary inertia", model.rotary_inertia)
+    polar = ("polar", "no gyroscopic effect", model.gyroscopic)
+    left_out = [moment for moment in (diametral, polar) if not moment[-1]]
+    missing = " and ".join(effect for _, effect, _ in left_out)
+    for disc in rotor.discs:
+        kinds = [kind for kind, _, _ in left_out if getattr(disc, f"{kind}_inertia") > 0]
+        if not kinds:
+            continue
+        name = f" {disc.name!r}" if disc.name else ""
+        what = "moments of inertia are" if len(left_out) > 1 else f"{kinds[0]} moment of inertia is"
+        warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {missing}")
+    return tuple(warnings)
+
+
+def static_stiffness(support: Support, speed: float) -> FloatArray:
+    """Symmetric part of a support's stiffness without its pedestal, N/m, shape (2, 2).
+
+    The antisymmetric part (kxy − kyx)/2 does work over an orbit, as damping does: it belongs to no
+    conservative rotor.
+    """
+    k = support.at(speed)[0]
+    return np.asarray((k + k.T) / 2)
+
+
+def _attached(rotor: Rotor, speeds: FloatArray) -> FloatArray:
+    """Stiffness and damping of supports and of internal dampers at speeds, shape (2, S, s, 2, 2)."""
+    parts = [support.at(speeds) for support in rotor.supports]
+    for force in rotor.forces:
+        c = np.broadcast_to(force.damping * np.eye(2), (speeds.size, 2, 2))
+        parts.append((speeds[:, None, None] * (_ACROSS @ c), c))
+    return np.array(parts).reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
+
+
+def _turned(D: AnyArray) -> ComplexArray:
+    """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
+    return np.asarray(FROM_XY @ D @ TO_XY)
+
+
+def dynamic_stiffness(rotor: Rotor, values: AnyArray, speeds: FloatArray) -> ComplexArray:
+    """Of all attachments on (F, b) at one λ for each speed, rad/s: N/m, pedestals in series, (S, s, 2, 2)."""
+    k, c = _attached(rotor, speeds)
+    value = np.asarray(values, complex)[:, None, None]
+    D = k + value[..., None] * c
+    for i, support in enumerate(rotor.supports):
+        if support.pedestal is not None:
+            spring, damper = (np.diag(support.pedestal.xy(name)) for name in ("stiffness", "damping"))
+            stand = spring + value * damper + value**2 * support.pedestal.mass * np.eye(2)
+            D[:, i] -= D[:, i] @ np.linalg.solve(D[:, i] + stand, D[:, i])
+    return _turned(D)
+
+
+@dataclass(frozen=True, eq=False)
+class Supported:
+    """Dynamic stiffness at the supported nodes at synchronous vibration, all that stands at a node added up.
+
+    Attributes
+    ----------
+    nodes
+        Numbers from 1, length s.
+    stiffness
+        D on forward and backward amplitudes (F, b), N/m, shape (S, s, 2, 2); on rotationally symmetric
+        supports only entry (0, 0) matters.
+    reference
+        Real spring nearest to D at each node, N/m, shape (s,): what the conservative rotor stands on.
+    planes
+        1: forward only; 2: forward and backward are coupled.
+    """
+
+    nodes: tuple[int, ...]
+    stiffness: ComplexArray
+    reference: FloatArray
+    planes: int
+
+
+def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
+    """Dynamic stiffness of all supports, and of internal damping at nodes, at speeds in rad/s.
+
+    Internal damping takes no part in forward whirl, which does not strain what turns with the shaft.
+
+    Raises
+    ------
+    ValueError
+        If a speed lies outside a bearing table.
+    """
+    D, attached = dynamic_stiffness(rotor, 1j * speeds, speeds), (*rotor.supports, *rotor.forces)
+    nodes = tuple(dict.fromkeys(item.node for item in attached))
+    stiffness, reference = np.zeros((speeds.size, len(nodes), 2, 2), complex), np.zeros(len(nodes))
+    for i, item in enumerate(attached):
+        at = nodes.index(item.node)
+        stiffness[:, at] += D[:, i]
+        # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
+        reference[at] += max(float(np.median(D[:, i, 0, 0].real)), 0.0)
+    return Supported(nodes, stiffness, reference, 1 if rotor.symmetric else 2)
+
+
+def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArray:
+    """The differential between two neighbouring supports, as `on_whirl`, with no digits lost to the pedestal.
+
+    Bearing B and pedestal S in series are D = B − B (B + S)⁻¹ B: dD = S G dB G S + B G dS G B, G = (B + S)⁻¹.
+    """
+    (B, S), (other, beneath) = (support.dynamic_parts(speeds) for support in (more, less))
+    change = B - other
+    if S is not None and beneath is not None:
+        moved, B, S = S - beneath, (B + other) / 2, (S + beneath) / 2
+        G = np.linalg.inv(B + S)
+        change = S @ G @ change @ G @ S + B @ G @ moved @ G @ B
+    return _turned(change)
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """A rotor as both planes see it.
+
+    Attributes
+    ----------
+    rotor, A
+        The rotor and its single-plane bands.
+    planes
+        2: unknowns x and y, real matrices; 1: the complex coordinate z, complex matrices.
+    rows
+        Unknown of the deflection, from 0, at each of the s attachments: the supports, then the internal
+        dampers.
+    pedestals
+        Which supports stand on a pedestal, shape (f,).
+    pedestal_mass, pedestal_stiffness, pedestal_damping
+        Of the pedestals, shapes (f, planes).
+    """
+
+    rotor: Rotor
+    A: Matrices
+    planes: int
+    rows: IndexArray
+    pedestals: IndexArray
+    pedestal_mass: FloatArray
+    pedestal_stiffness: FloatArray
+    pedestal_damping: FloatArray
+
+    def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
+        """Stiffness and damping of all attachments, each of shape (S, s, planes, planes).
+
+        Raises
+        ------
+        ValueError
+            Outside the table of a support.
+        """
+        k, c = _attached(self.rotor, speeds) if self.planes == 2 else _turned(_attached(self.rotor, speeds))
+        return k[..., : self.planes, : self.planes], c[..., : self.planes, : self.planes]
+
+    def mirrored(self, speeds: FloatArray) -> bool:
+        """Whether left eigenvectors are the right ones with y reversed (or, of z, are equal to them).
+
+        So it is where no support has a symmetric cross-coupling: kxy = −kyx, the same for damping.
+        """
+        if self.planes == 1:
+            return True
+        return all(np.array_equal(matrix[..., 0, 1], -matrix[..., 1, 0]) for matrix in self.supports(speeds))
+
+    @property
+    def dtype(self) -> type[Any]:
+        """Of the matrices."""
+        return float if self.planes == 2 else complex
+
+
+def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
+    """Look at a rotor in both planes; by default with the complex coordinate where that is enough."""
+    one = rotor.symmetric if complex_coordinate is None else complex_coordinate
+    A, p = assemble(rotor), 1 if one else 2
+    rows = [A.deflection(item.node) for item in (*rotor.supports, *rotor.forces)]
+    stands = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
+    feet = [(2 * (stand.mass,), stand.xy("stiffness"), stand.xy("damping")) for stand in stands.values()]
+    mass, stiffness, damping = np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p]
+    return Planes(
+        rotor, A, p, np.array(rows, np.intp), np.array(list(stands), np.intp), mass, stiffness, damping
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """λ² M + λ (D₀ + Ω D₁ + supports) + K₀ + Ω K₁ + supports, in a basis of d shaft vectors per plane.
+
+    Unknowns: d per plane, plane after plane, then the pedestals, again plane after plane; R in all.
+
+    Attributes
+    ----------
+    P
+        The rotor.
+    basis
+        Vectors of one plane, shape (size, d).
+    M, D0, D1, K0, K1
+        Shape (R, R).
+    ties
+        What a unit entry (i, j) of each attachment's matrices adds, shape (s · planes², R²).
+    """
+
+    P: Planes
+    basis: FloatArray
+    M: FloatArray
+    D0: FloatArray
+    D1: AnyArray
+    K0: FloatArray
+    K1: AnyArray
+    ties: FloatArray
+
+    @property
+    def size(self) -> int:
+        """R."""
+        return len(self.M)
+
+    def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
+        """D and K at each speed, shape (S, R, R)."""
+        k, c = (
+            (matrix.reshape(speeds.size, len(self.ties)) @ self.ties).reshape(-1, *self.M.shape)
+            for matrix in self.P.supports(speeds)
+        )
+        omega = speeds[:, None, None]
+        return self.D0 + omega * self.D1 + c, self.K0 + omega * self.K1 + k
+
+    def mirror(self, vectors: AnyArray) -> AnyArray:
+        """Reduced vectors (…, R) with y reversed; a complex coordinate stays as it is."""
+        if self.P.planes == 1:
+            return vectors
+        d, f = self.basis.shape[1], len(self.P.pedestals)
+        return np.asarray(vectors * np.repeat([1, -1, 1, -1], [d, d, f, f]))
+
+    def expand(self, vectors: AnyArray, every: int = 1) -> AnyArray:
+        """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size), or each so-many-th of them."""
+        planes, d = self.P.planes, self.basis.shape[1]
+        coefficients = vectors[..., : planes * d].reshape(*vectors.shape[:-1], planes, d)
+        return np.asarray(coefficients @ self.basis[::every].T)
+
+    def nodes(self, vectors: AnyArray) -> AnyArray:
+        """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
+        return self.expand(vectors, self.P.A.stride)
+
+
+def project(P: Planes, basis: FloatArray) -> Reduced:
+    """The equations in a basis of the shaft, shape (size, d), the same in both planes.
+
+    Stiffness and material damping are summed from strains: so they keep their digits on any mesh.
+    """
+    d, p, f = basis.shape[1], P.planes, len(P.pedestals)
+    strain = strains(P.rotor, basis)
+    beta = np.tile(P.rotor.material_damping, len(strain))[:, None]
+    strain = strain.reshape(-1, d)
+    K, B = strain.T @ strain, strain.T @ (beta * strain)
+    for support in P.rotor.supports:
+        tilt = basis[P.A.deflection(support.node) + 1]
+        K += support.tilting_stiffness * np.outer(tilt, tilt)
+    M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
+
+    def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
+        """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
+        matrix = np.zeros((p * (d + f), p * (d + f)), dtype=sides.dtype)
+        matrix[: p * d, : p * d] = np.kron(sides, (shaft + shaft.T) / 2)
+        np.fill_diagonal(matrix[p * d :, p * d :], pedestals.T.ravel())
+        return matrix
+
+    along, across, none = np.eye(p), _ACROSS if p == 2 else np.array([[-1j]]), np.zeros((f, p))
+    # What an attachment feels: motion of its node against the ground or the foot, in each plane.
+    felt = np.zeros((len(P.rows), p, p * (d + f)))
+    for plane in range(p):
+        felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
+        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
+    return Reduced(
+        P=P,
+        basis=basis,
+        M=whole(along, M, P.pedestal_mass),
+        D0=whole(along, B, P.pedestal_damping),
+        D1=whole(across, G, none),
+        K0=whole(along, K, P.pedestal_stiffness),
+        K1=whole(across, B, none),
+        ties=np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2),
+    )
+
+
+class WholeBand:
+    """The full model at complex frequencies, its bands prepared once; pedestals are condensed.
+
+    The unknowns F and b alternate, or are F alone: where λ is any complex number they are the parts of
+    x = F + b, y = −i (F − b), which the supports alone couple.
+    """
+
+    def __init__(self, P: Planes) -> None:
+        self.P, self.size, self.reach = P, P.planes * P.A.size, P.planes * P.A.width
+        bands = (P.A.mass, P.A.gyroscopic, P.A.material, P.A.shaft)
+        self._bands = np.array([general(band) for band in bands], complex)
+
+    def factor(self, value: complex, speed: float) -> Factored:
+        """LU factors of λ² M + λ D + K at one λ and speed."""
+        return next(self.factors(np.array([value]), np.array([speed])))
+
+    def factors(self, values: AnyArray, speeds: FloatArray) -> Iterator[Factored]:
+        """LU factors at each λ and speed, one after another."""
+        from scipy.linalg.lapack import zgbtrf
+
+        p, reach = self.P.planes, self.reach
+        row, column = np.indices((p, p))
+        columns = p * self.P.rows[:, None, None] + column
+        supports = dynamic_stiffness(self.P.rotor, values, speeds)[..., :p, :p]
+        for value, speed, matrices in zip(values, speeds, supports, strict=True):
+            band = np.zeros((self.size, 3 * reach + 1), complex)
+            for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
+                powers = np.array([value * value, -value * turning, value - turning, 1.0])
+                band[plane::p, reach::p] = np.tensordot(powers, self._bands, 1)
+            np.add.at(band, (columns, 2 * reach + row - column), matrices)
+            lu, pivots, info = zgbtrf(band.T, reach, reach, overwrite_ab=True)
+            if info > 0:  # singular to the last bit: an eigenvalue
+                lu[2 * reach, info - 1] = 1e-16 * np.abs(self._bands[3]).max()
+            yield Factored(p, reach, lu, pivots)
+
+    def inertia(self, X: AnyArray) -> ComplexArray:
+        """M x of shaft motions (planes, size), in the order of the band."""
+        return self.interleaved(multiply(self.P.A.mass, X.T).T)
+
+    def interleaved(self, X: AnyArray) -> ComplexArray:
+        """From (…, planes, size) to the order of the band, (…, planes · size)."""
+        X = np.swapaxes(X, -1, -2).astype(complex)
+        return np.asarray(X if self.P.planes == 1 else X @ FROM_XY.T).reshape(*X.shape[:-2], self.size)
+
+    def planes(self, X: AnyArray) -> AnyArray:
+        """Back to (…, planes, size)."""
+        X = X.reshape(*X.shape[:-1], -1, self.P.planes)
+        return np.swapaxes(X if self.P.planes == 1 else X @ TO_XY.T, -1, -2)
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """Solutions with one factored matrix."""
+
+    planes: int
+    reach: int
+    lu: ComplexArray
+    pivots: AnyArray
+
+    def solve(self, b: ComplexArray, *, transposed: bool = False) -> ComplexArray:
+        """P⁻¹ b, or P⁻ᵀ b, for b of shape (size,) or (size, m).
+
+        The transpose in x and y is that in (F, b) with both of them exchanged: Tᵀ T = 2 ((0, 1), (1, 0)).
+        """
+        from scipy.linalg.lapack import zgbtrs
+
+        order = np.arange(len(b))
+        if transposed and self.planes == 2:
+            order ^= 1
+        x, _ = zgbtrs(self.lu, self.reach, self.reach, b[order], self.pivots, trans=int(transposed))
+        return np.asarray(x[order])
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """M q'' + C q' + K q = f of a rotor at one speed; real, in SI.
+
+    Attributes
+    ----------
+    M, C, K
+        Mass, damping (with the gyroscopic effect) and stiffness, shape (n, n).
+    coordinates
+        Name of each unknown: `x3` and `y3` are the deflections of node 3, m; `tilt_x3` and `tilt_y3` the tilt
+        of the cross-section there (the slope dx/dz without shear); with shear `left_x3` and `right_x3` the
+        shear angles at the ends of element 3; `foot_x1` and `foot_y1` the pedestal of the first support, m.
+    speed
+        rad/s.
+    """
+
+    M: FloatArray
+    C: FloatArray
+    K: FloatArray
+    coordinates: tuple[str, ...]
+    speed: float
+
+    def index(self, name: str) -> int:
+        """Where an unknown stands, from 0.
+
+        Raises
+        ------
+        ValueError
+            For an unknown that does not exist.
+        """
+        if name not in self.coordinates:
+            raise ValueError(f"no unknown {name!r}: they are {self.coordinates[0]} … {self.coordinates[-1]}")
+        return self.coordinates.index(name)
+
+
+def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both") -> Motion:
+    """Mass, damping and stiffness matrices of a rotor.
+
+    Parameters
+    ----------
+    rotor
+        With all that its model holds; tables of supports are read at `speed`.
+    speed
+        rad/s.
+    plane
+        "both", or "x" alone: without gyroscopic effect and coupling between the planes, so only for a rotor
+        that has neither.
+
+    Raises
+    ------
+    ValueError
+        A plane that does not exist or is coupled to the other, a speed that is not finite, negative, or
+        outside the table of a support, forces that are not linear.
+
+    Examples
+    --------
+    >>> from fem import Rotor, Support
+    >>> shaft = Rotor(length=[0.5, 0.5], outer_diameter=0.05, supports=[Support(1, 1e7), Support(3, 1e7)])
+    >>> motion = equations_of_motion(shaft, plane="x")
+    >>> motion.coordinates
+    ('x1', 'tilt_x1', 'x2', 'tilt_x2', 'x3', 'tilt_x3')
+
+    Notes
+    -----
+    The signs are those of `fem.assembly`: rotation from x to y; M y'' … − Ω G x'.
+    """
+    if plane not in ("both", "x"):
+        raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
+    if not (np.isfinite(speed) and speed >= 0):
+        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
+    P = both_planes(rotor, complex_coordinate=False)
+    equations = project(P, np.eye(P.A.size))
+    damping, stiffness = (matrix[0] for matrix in equations.at(np.array([float(speed)])))
+    kinds = ("", "tilt_", "left_", "right_")
+    shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
+    feet = [("foot_", int(i) + 1) for i in P.pedestals]
+    names = [f"{kind}{axis}{number}" for part in (shaft, feet) for axis in "xy" for kind, number in part]
+    in_x = np.array([name.split("_")[-1].startswith("x") for name in names])
+    across = np.ix_(in_x, ~in_x)
+    if plane == "both":
+        in_x[:] = True
+    elif damping[across].any() or stiffness[across].any():
+        raise ValueError("the planes x and y of this rotor are coupled: take both")
+    pick = np.ix_(in_x, in_x)
+    kept = tuple(name for name, inside in zip(names, in_x, strict=True) if inside)
+    return Motion(equations.M[pick], damping[pick], stiffness[pick], kept, float(speed))
