@@ -12,7 +12,6 @@ array([632.11])
 from fem.api684_peaks import Peak, Peaks, required_margin
 from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
-from fem.matrices.equations_of_motion import Motion, equations_of_motion
 from fem.mesh import MeshCheck, mesh_check, refined
 from fem.model.calibration import Calibration
 from fem.model.node_forces import (
@@ -34,8 +33,8 @@ from fem.response import influence, response_peaks, unbalance_response
 from fem.response_result import BearingForces, InfluenceCoefficients, Response
 from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
-from fem.state_space import StateSpace, state_space
-from fem.static import StaticDeflection, compliance, static_deflection
+from fem._new.state_space import Motion, StateSpace, equations_of_motion, state_space
+from fem._new.static import StaticDeflection, compliance, static_deflection
 from fem.whirl import WhirlModes, whirl_modes
 from fem.windows import Window
 

@@ -24,13 +24,18 @@ Symmetric bands are kept as LAPACK does, upper form: `band[width + i - j, j]` is
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from fem._new.elements import Layout, bending_terms, gyroscopic_terms, mass_terms, strains
+from fem._new.elements import (
+    Layout,
+    bending_terms,
+    gyroscopic_terms,
+    mass_terms,
+    multiply,
+    strains,
+)
 from fem._new.forces import InternalDamping, kind_of
 from fem._new.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
@@ -40,7 +45,6 @@ __all__ = [
     "TO_XY",
     "Factored",
     "Matrices",
-    "Motion",
     "Planes",
     "Reduced",
     "Supported",
@@ -48,8 +52,6 @@ __all__ = [
     "assemble",
     "both_planes",
     "dense",
-    "dynamic_stiffness",
-    "equations_of_motion",
     "free_motions",
     "general",
     "held",
@@ -57,7 +59,6 @@ __all__ = [
     "multiply",
     "project",
     "rounding_error",
-    "shaft_energy",
     "static_stiffness",
     "supported",
     "whirl_change",
@@ -82,7 +83,7 @@ class Matrices:
     gyroscopic
         G, polar inertia of shaft and discs on the slopes; zero unless the model has `gyroscopic`.
     material
-        B, Σ β K of the elements.
+        B, Σ β K of the elements, and internal damping at nodes.
     stride, width
         Unknowns per node, and entries of a band above its diagonal.
     """
@@ -110,7 +111,7 @@ class Matrices:
 
 
 def assemble(rotor: Rotor) -> Matrices:
-    """Matrices of a rotor; internal damping at nodes acts like a support and is not in them.
+    """Matrices of a rotor.
 
     Raises
     ------
@@ -119,10 +120,11 @@ def assemble(rotor: Rotor) -> Matrices:
     """
     for force in rotor.forces:
         if not isinstance(force, InternalDamping):
+            kind = kind_of(force).replace("_", " ")
             raise ValueError(
-                f"the {kind_of(force).replace('_', ' ')} at node {force.node} is not linear, and this asks for "
-                "linear equations: write the coefficients of all such forces at rest first, `rotorid bearings "
-                "ROTOR --speeds A:B --output linear.toml`, or take rotor.linear, which leaves them out"
+                f"the {kind} at node {force.node} is not linear, and this asks for linear equations: "
+                "write the coefficients of all such forces at rest first, `rotorid bearings ROTOR --speeds "
+                "A:B --output linear.toml`, or take rotor.linear, which leaves them out"
             )
     layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
     bending = bending_terms(rotor)
@@ -137,6 +139,8 @@ def assemble(rotor: Rotor) -> Matrices:
         G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
     for support in rotor.supports:
         K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
+    for damper in rotor.forces:
+        B[-1, A.deflection(damper.node)] += damper.damping
     return A
 
 
@@ -144,17 +148,6 @@ def free_motions(rotor: Rotor, held: set[int]) -> int:
     """Number of rigid-body motions, of 2, left by springs at the nodes `held` and by tilting springs."""
     tilting = any(support.tilting_stiffness > 0 for support in rotor.supports)
     return max(2 - len(held) - tilting, 0) if held else 2 - tilting
-
-
-def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
-    """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
-    width = band.shape[0] - 1
-    Y = band[width, :, None] * X
-    for above in range(1, width + 1):
-        entries = band[width - above, above:, None]
-        Y[:-above] += entries * X[above:]
-        Y[above:] += entries.conj() * X[:-above]
-    return np.asarray(Y)
 
 
 def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
@@ -176,28 +169,13 @@ def dense(band: AnyArray) -> AnyArray:
 
 
 def general(band: FloatArray) -> FloatArray:
-    """The columns of a symmetric band from the highest entry to the lowest, shape (size, 2 width + 1)."""
-    width, size = len(band) - 1, band.shape[1]
-    columns = np.zeros((size, 2 * width + 1))
-    columns[:, : width + 1] = band.T
+    """The same matrix in LAPACK's general band form with room for pivoting, shape (3 width + 1, size)."""
+    width = len(band) - 1
+    A = np.zeros((3 * width + 1, band.shape[1]))
+    A[width : 2 * width + 1] = band
     for below in range(1, width + 1):
-        columns[:-below, width + below] = band[width - below, below:]
-    return columns
-
-
-def shaft_energy(rotor: Rotor, X: FloatArray) -> FloatArray:
-    """Twice the strain energy of the shaft and of tilting springs for each column of X, N·m, shape (m,).
-
-    Summed from strains it loses rounding of the order (number of elements)² instead of the fourth power
-    that xᵀ K x itself loses.
-    """
-    S = strains(rotor, X)
-    energy = np.einsum("kem,kem->m", S, S)
-    stride = 4 if rotor.model.shear else 2
-    for support in rotor.supports:
-        if support.tilting_stiffness:
-            energy = energy + support.tilting_stiffness * X[stride * (support.node - 1) + 1] ** 2
-    return np.asarray(energy)
+        A[2 * width + below, :-below] = band[width - below, below:]
+    return A
 
 
 def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
@@ -207,27 +185,30 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
     of K x = f are wrong by as much. The `energy` xᴴ K x is computed unless it is known.
     """
     if energy is None:
-        energy = np.abs(np.einsum("ij,ij->j", X.conj(), multiply(band, X)))
+        energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
     size = np.abs(X)
-    scatter = np.einsum("ij,ij->j", size, multiply(np.abs(band), size))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(scatter > 0, np.finfo(float).eps * scatter / energy, 0.0))
+    scatter = (size * multiply(np.abs(band), size)).sum(axis=0)
+    return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
 
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     """One warning for each disc whose moments of inertia the model leaves out."""
-    model, warnings = rotor.model, []
-    diametral = ("diametral", "no rotary inertia", model.rotary_inertia)
-    polar = ("polar", "no gyroscopic effect", model.gyroscopic)
-    left_out = [moment for moment in (diametral, polar) if not moment[-1]]
-    missing = " and ".join(effect for _, effect, _ in left_out)
+    moments = (
+        ("diametral", "no rotary inertia", rotor.model.rotary_inertia),
+        ("polar", "no gyroscopic effect", rotor.model.gyroscopic),
+    )
+    warnings = []
     for disc in rotor.discs:
-        kinds = [kind for kind, _, _ in left_out if getattr(disc, f"{kind}_inertia") > 0]
-        if not kinds:
-            continue
-        name = f" {disc.name!r}" if disc.name else ""
-        what = "moments of inertia are" if len(left_out) > 1 else f"{kinds[0]} moment of inertia is"
-        warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {missing}")
+        missing = {
+            kind: effect
+            for kind, effect, counted in moments
+            if not counted and getattr(disc, f"{kind}_inertia") > 0
+        }
+        if missing:
+            what = "moments of inertia are" if len(missing) > 1 else f"{min(missing)} moment of inertia is"
+            name = f" {disc.name!r}" if disc.name else ""
+            effects = " and ".join(missing.values())
+            warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {effects}")
     return tuple(warnings)
 
 
@@ -241,31 +222,9 @@ def static_stiffness(support: Support, speed: float) -> FloatArray:
     return np.asarray((k + k.T) / 2)
 
 
-def _attached(rotor: Rotor, speeds: FloatArray) -> FloatArray:
-    """Stiffness and damping of supports and of internal dampers at speeds, shape (2, S, s, 2, 2)."""
-    parts = [support.at(speeds) for support in rotor.supports]
-    for force in rotor.forces:
-        c = np.broadcast_to(force.damping * np.eye(2), (speeds.size, 2, 2))
-        parts.append((speeds[:, None, None] * (_ACROSS @ c), c))
-    return np.array(parts).reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
-
-
 def _turned(D: AnyArray) -> ComplexArray:
     """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
     return np.asarray(FROM_XY @ D @ TO_XY)
-
-
-def dynamic_stiffness(rotor: Rotor, values: AnyArray, speeds: FloatArray) -> ComplexArray:
-    """Of all attachments on (F, b) at one λ for each speed, rad/s: N/m, pedestals in series, (S, s, 2, 2)."""
-    k, c = _attached(rotor, speeds)
-    value = np.asarray(values, complex)[:, None, None]
-    D = k + value[..., None] * c
-    for i, support in enumerate(rotor.supports):
-        if support.pedestal is not None:
-            spring, damper = (np.diag(support.pedestal.xy(name)) for name in ("stiffness", "damping"))
-            stand = spring + value * damper + value**2 * support.pedestal.mass * np.eye(2)
-            D[:, i] -= D[:, i] @ np.linalg.solve(D[:, i] + stand, D[:, i])
-    return _turned(D)
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,14 +260,15 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     ValueError
         If a speed lies outside a bearing table.
     """
-    D, attached = dynamic_stiffness(rotor, 1j * speeds, speeds), (*rotor.supports, *rotor.forces)
-    nodes = tuple(dict.fromkeys(item.node for item in attached))
-    stiffness, reference = np.zeros((speeds.size, len(nodes), 2, 2), complex), np.zeros(len(nodes))
-    for i, item in enumerate(attached):
-        at = nodes.index(item.node)
-        stiffness[:, at] += D[:, i]
-        # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
-        reference[at] += max(float(np.median(D[:, i, 0, 0].real)), 0.0)
+    parts = [(support.node, _turned(support.dynamic_stiffness(speeds))) for support in rotor.supports]
+    backward = 2j * speeds[:, None, None] * np.diag([0.0, 1.0])
+    parts += [(damper.node, damper.damping * backward) for damper in rotor.forces]
+    nodes = tuple(dict.fromkeys(node for node, _ in parts))
+    stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
+    for node, D in parts:
+        stiffness[:, nodes.index(node)] += D
+    # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
+    reference = np.maximum(np.median(stiffness[..., 0, 0].real, axis=0), 0.0)
     return Supported(nodes, stiffness, reference, 1 if rotor.symmetric else 2)
 
 
@@ -337,8 +297,7 @@ class Planes:
     planes
         2: unknowns x and y, real matrices; 1: the complex coordinate z, complex matrices.
     rows
-        Unknown of the deflection, from 0, at each of the s attachments: the supports, then the internal
-        dampers.
+        Unknown of the deflection at each support, from 0, shape (s,).
     pedestals
         Which supports stand on a pedestal, shape (f,).
     pedestal_mass, pedestal_stiffness, pedestal_damping
@@ -355,15 +314,18 @@ class Planes:
     pedestal_damping: FloatArray
 
     def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
-        """Stiffness and damping of all attachments, each of shape (S, s, planes, planes).
+        """Stiffness and damping of all supports, each of shape (S, s, planes, planes).
 
         Raises
         ------
         ValueError
             Outside the table of a support.
         """
-        k, c = _attached(self.rotor, speeds) if self.planes == 2 else _turned(_attached(self.rotor, speeds))
-        return k[..., : self.planes, : self.planes], c[..., : self.planes, : self.planes]
+        parts = [support.at(speeds) for support in self.rotor.supports]
+        k, c = np.array(parts).reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
+        if self.planes == 1:
+            k, c = (X[..., :1, :1] - 1j * X[..., :1, 1:] for X in (k, c))
+        return k, c
 
     def mirrored(self, speeds: FloatArray) -> bool:
         """Whether left eigenvectors are the right ones with y reversed (or, of z, are equal to them).
@@ -374,17 +336,12 @@ class Planes:
             return True
         return all(np.array_equal(matrix[..., 0, 1], -matrix[..., 1, 0]) for matrix in self.supports(speeds))
 
-    @property
-    def dtype(self) -> type[Any]:
-        """Of the matrices."""
-        return float if self.planes == 2 else complex
-
 
 def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
     """Look at a rotor in both planes; by default with the complex coordinate where that is enough."""
     one = rotor.symmetric if complex_coordinate is None else complex_coordinate
     A, p = assemble(rotor), 1 if one else 2
-    rows = [A.deflection(item.node) for item in (*rotor.supports, *rotor.forces)]
+    rows = [A.deflection(support.node) for support in rotor.supports]
     stands = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
     feet = [(2 * (stand.mass,), stand.xy("stiffness"), stand.xy("damping")) for stand in stands.values()]
     mass, stiffness, damping = np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p]
@@ -408,7 +365,7 @@ class Reduced:
     M, D0, D1, K0, K1
         Shape (R, R).
     ties
-        What a unit entry (i, j) of each attachment's matrices adds, shape (s · planes², R²).
+        What a unit entry (i, j) of each support's matrices adds, shape (s · planes², R²).
     """
 
     P: Planes
@@ -457,29 +414,30 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
 
     Stiffness and material damping are summed from strains: so they keep their digits on any mesh.
     """
-    d, p, f = basis.shape[1], P.planes, len(P.pedestals)
+    from scipy.linalg import block_diag
+
+    p, f = P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
     beta = np.tile(P.rotor.material_damping, len(strain))[:, None]
-    strain = strain.reshape(-1, d)
+    strain = strain.reshape(-1, basis.shape[1])
     K, B = strain.T @ strain, strain.T @ (beta * strain)
     for support in P.rotor.supports:
         tilt = basis[P.A.deflection(support.node) + 1]
         K += support.tilting_stiffness * np.outer(tilt, tilt)
+    for damper in P.rotor.forces:
+        w = basis[P.A.deflection(damper.node)]
+        B += damper.damping * np.outer(w, w)
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
+    along, across, none = np.eye(p), _ACROSS if p == 2 else np.array([[-1j]]), np.zeros((f, p))
 
     def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
         """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        matrix = np.zeros((p * (d + f), p * (d + f)), dtype=sides.dtype)
-        matrix[: p * d, : p * d] = np.kron(sides, (shaft + shaft.T) / 2)
-        np.fill_diagonal(matrix[p * d :, p * d :], pedestals.T.ravel())
-        return matrix
+        return block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(pedestals.T.ravel()))
 
-    along, across, none = np.eye(p), _ACROSS if p == 2 else np.array([[-1j]]), np.zeros((f, p))
-    # What an attachment feels: motion of its node against the ground or the foot, in each plane.
-    felt = np.zeros((len(P.rows), p, p * (d + f)))
-    for plane in range(p):
-        felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
-        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
+    # What a support feels: motion of its node against the ground or the foot, in each plane.
+    feet = np.zeros((len(P.rows), f))
+    feet[P.pedestals, np.arange(f)] = -1.0
+    felt = [np.hstack((np.kron(np.eye(p)[i], basis[P.rows]), np.kron(np.eye(p)[i], feet))) for i in range(p)]
     return Reduced(
         P=P,
         basis=basis,
@@ -488,7 +446,7 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
         D1=whole(across, G, none),
         K0=whole(along, K, P.pedestal_stiffness),
         K1=whole(across, B, none),
-        ties=np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2),
+        ties=np.einsum("isa,jsb->sijab", felt, felt).reshape(-1, felt[0].shape[1] ** 2),
     )
 
 
@@ -502,34 +460,30 @@ class WholeBand:
     def __init__(self, P: Planes) -> None:
         self.P, self.size, self.reach = P, P.planes * P.A.size, P.planes * P.A.width
         bands = (P.A.mass, P.A.gyroscopic, P.A.material, P.A.shaft)
-        self._bands = np.array([general(band) for band in bands], complex)
+        self._bands = np.array([general(band)[P.A.width :] for band in bands], complex)
 
     def factor(self, value: complex, speed: float) -> Factored:
         """LU factors of λ² M + λ D + K at one λ and speed."""
-        return next(self.factors(np.array([value]), np.array([speed])))
-
-    def factors(self, values: AnyArray, speeds: FloatArray) -> Iterator[Factored]:
-        """LU factors at each λ and speed, one after another."""
         from scipy.linalg.lapack import zgbtrf
 
-        p, reach = self.P.planes, self.reach
-        row, column = np.indices((p, p))
-        columns = p * self.P.rows[:, None, None] + column
-        supports = dynamic_stiffness(self.P.rotor, values, speeds)[..., :p, :p]
-        for value, speed, matrices in zip(values, speeds, supports, strict=True):
-            band = np.zeros((self.size, 3 * reach + 1), complex)
-            for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
-                powers = np.array([value * value, -value * turning, value - turning, 1.0])
-                band[plane::p, reach::p] = np.tensordot(powers, self._bands, 1)
-            np.add.at(band, (columns, 2 * reach + row - column), matrices)
-            lu, pivots, info = zgbtrf(band.T, reach, reach, overwrite_ab=True)
-            if info > 0:  # singular to the last bit: an eigenvalue
-                lu[2 * reach, info - 1] = 1e-16 * np.abs(self._bands[3]).max()
-            yield Factored(p, reach, lu, pivots)
-
-    def inertia(self, X: AnyArray) -> ComplexArray:
-        """M x of shaft motions (planes, size), in the order of the band."""
-        return self.interleaved(multiply(self.P.A.mass, X.T).T)
+        P, p, reach = self.P, self.P.planes, self.reach
+        band = np.zeros((3 * reach + 1, self.size), complex, order="F")
+        for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
+            powers = np.array([value * value, -value * turning, value - turning, 1.0])
+            band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
+        k, c = P.supports(np.array([speed]))
+        D = k[0] + value * c[0]
+        for j, i in enumerate(P.pedestals):
+            stand = P.pedestal_stiffness[j] + value * P.pedestal_damping[j] + value**2 * P.pedestal_mass[j]
+            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(stand), D[i])
+        D = D if p == 1 else _turned(D)
+        for row, matrix in zip(P.rows, D, strict=True):
+            for a, b in np.ndindex(p, p):
+                band[2 * reach + a - b, p * row + b] += matrix[a, b]
+        lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
+        if info > 0:  # singular to the last bit: an eigenvalue
+            lu[2 * reach, info - 1] = 1e-16 * np.abs(self._bands[3]).max()
+        return Factored(p, reach, lu, pivots)
 
     def interleaved(self, X: AnyArray) -> ComplexArray:
         """From (…, planes, size) to the order of the band, (…, planes · size)."""
@@ -563,91 +517,3 @@ class Factored:
             order ^= 1
         x, _ = zgbtrs(self.lu, self.reach, self.reach, b[order], self.pivots, trans=int(transposed))
         return np.asarray(x[order])
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """M q'' + C q' + K q = f of a rotor at one speed; real, in SI.
-
-    Attributes
-    ----------
-    M, C, K
-        Mass, damping (with the gyroscopic effect) and stiffness, shape (n, n).
-    coordinates
-        Name of each unknown: `x3` and `y3` are the deflections of node 3, m; `tilt_x3` and `tilt_y3` the tilt
-        of the cross-section there (the slope dx/dz without shear); with shear `left_x3` and `right_x3` the
-        shear angles at the ends of element 3; `foot_x1` and `foot_y1` the pedestal of the first support, m.
-    speed
-        rad/s.
-    """
-
-    M: FloatArray
-    C: FloatArray
-    K: FloatArray
-    coordinates: tuple[str, ...]
-    speed: float
-
-    def index(self, name: str) -> int:
-        """Where an unknown stands, from 0.
-
-        Raises
-        ------
-        ValueError
-            For an unknown that does not exist.
-        """
-        if name not in self.coordinates:
-            raise ValueError(f"no unknown {name!r}: they are {self.coordinates[0]} … {self.coordinates[-1]}")
-        return self.coordinates.index(name)
-
-
-def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both") -> Motion:
-    """Mass, damping and stiffness matrices of a rotor.
-
-    Parameters
-    ----------
-    rotor
-        With all that its model holds; tables of supports are read at `speed`.
-    speed
-        rad/s.
-    plane
-        "both", or "x" alone: without gyroscopic effect and coupling between the planes, so only for a rotor
-        that has neither.
-
-    Raises
-    ------
-    ValueError
-        A plane that does not exist or is coupled to the other, a speed that is not finite, negative, or
-        outside the table of a support, forces that are not linear.
-
-    Examples
-    --------
-    >>> from fem import Rotor, Support
-    >>> shaft = Rotor(length=[0.5, 0.5], outer_diameter=0.05, supports=[Support(1, 1e7), Support(3, 1e7)])
-    >>> motion = equations_of_motion(shaft, plane="x")
-    >>> motion.coordinates
-    ('x1', 'tilt_x1', 'x2', 'tilt_x2', 'x3', 'tilt_x3')
-
-    Notes
-    -----
-    The signs are those of `fem.assembly`: rotation from x to y; M y'' … − Ω G x'.
-    """
-    if plane not in ("both", "x"):
-        raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
-    if not (np.isfinite(speed) and speed >= 0):
-        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
-    P = both_planes(rotor, complex_coordinate=False)
-    equations = project(P, np.eye(P.A.size))
-    damping, stiffness = (matrix[0] for matrix in equations.at(np.array([float(speed)])))
-    kinds = ("", "tilt_", "left_", "right_")
-    shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
-    feet = [("foot_", int(i) + 1) for i in P.pedestals]
-    names = [f"{kind}{axis}{number}" for part in (shaft, feet) for axis in "xy" for kind, number in part]
-    in_x = np.array([name.split("_")[-1].startswith("x") for name in names])
-    across = np.ix_(in_x, ~in_x)
-    if plane == "both":
-        in_x[:] = True
-    elif damping[across].any() or stiffness[across].any():
-        raise ValueError("the planes x and y of this rotor are coupled: take both")
-    pick = np.ix_(in_x, in_x)
-    kept = tuple(name for name, inside in zip(names, in_x, strict=True) if inside)
-    return Motion(equations.M[pick], damping[pick], stiffness[pick], kept, float(speed))

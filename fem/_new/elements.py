@@ -27,9 +27,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from fem._new.rotor import Rotor
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import AnyArray, FloatArray
 
-__all__ = ["Layout", "bending_terms", "gyroscopic_terms", "mass_terms", "strains"]
+__all__ = [
+    "Layout",
+    "bending_terms",
+    "gyroscopic_terms",
+    "mass_terms",
+    "multiply",
+    "strains",
+]
 
 _LENGTHS = np.array([0, 1, 1, 1, 0, 1])  # powers of L in the scaling
 # End values (w₁, slope₁, w₂, slope₂) of the polynomial from the element's unknowns, and the polynomial
@@ -123,3 +130,14 @@ def strains(rotor: Rotor, X: FloatArray) -> FloatArray:
             shear * (right - left) / np.sqrt(12.0),
         )
     )
+
+
+def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
+    """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
+    width = band.shape[0] - 1
+    Y = band[width, :, None] * X
+    for above in range(1, width + 1):
+        entries = band[width - above, above:, None]
+        Y[:-above] += entries * X[above:]
+        Y[above:] += entries.conj() * X[:-above]
+    return np.asarray(Y)

@@ -1,0 +1,269 @@
+"""The equations of motion of a rotor as plain matrices, and as a linear state space.
+
+In M q'' + C q' + K q = f let q₁ be the coordinates that move mass, q₂ those without mass that are damped, and
+q₃ the others, with zero rows and columns of M and C: nodes of a massless shaft, feet of massless pedestals.
+With v = q₁' and the signs of `fem.assembly` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …)
+
+    K₃₃ q₃  = f₃ − K₃₁ q₁ − K₃₂ q₂
+    C₂₂ q₂' = f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂ − K₂₃ q₃
+    M₁₁ v'  = f₁ − C₁₁ v − C₁₂ q₂' − K₁₁ q₁ − K₁₂ q₂ − K₁₃ q₃:
+
+q₁, v and q₂ are the states. The three matrices on the left must be regular: else there is no state space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fem._new.assembly import both_planes, project
+from fem._new.rotor import Rotor
+from rotorid.base.arrays import ComplexArray, FloatArray
+
+__all__ = ["Motion", "StateSpace", "equations_of_motion", "state_space"]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """M q'' + C q' + K q = f of a rotor at one speed; real, in SI.
+
+    Attributes
+    ----------
+    M, C, K
+        Mass, damping (with the gyroscopic effect) and stiffness, shape (n, n).
+    coordinates
+        Name of each unknown: `x3` and `y3` are the deflections of node 3, m; `tilt_x3` and `tilt_y3` the tilt
+        of the cross-section there (the slope dx/dz without shear); with shear `left_x3` and `right_x3` the
+        shear angles at the ends of element 3; `foot_x1` and `foot_y1` the pedestal of the first support, m.
+    speed
+        rad/s.
+    """
+
+    M: FloatArray
+    C: FloatArray
+    K: FloatArray
+    coordinates: tuple[str, ...]
+    speed: float
+
+    def index(self, name: str) -> int:
+        """Where an unknown stands, from 0.
+
+        Raises
+        ------
+        ValueError
+            For an unknown that does not exist.
+        """
+        if name not in self.coordinates:
+            raise ValueError(f"no unknown {name!r}: they are {self.coordinates[0]} … {self.coordinates[-1]}")
+        return self.coordinates.index(name)
+
+
+def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both") -> Motion:
+    """Mass, damping and stiffness matrices of a rotor.
+
+    Parameters
+    ----------
+    rotor
+        With all that its model holds; tables of supports are read at `speed`.
+    speed
+        rad/s.
+    plane
+        "both", or "x" alone: without gyroscopic effect and coupling between the planes, so only for a rotor
+        that has neither.
+
+    Raises
+    ------
+    ValueError
+        A plane that does not exist or is coupled to the other, a speed that is not finite, negative, or
+        outside the table of a support, forces that are not linear.
+
+    Examples
+    --------
+    >>> from fem import Rotor, Support
+    >>> shaft = Rotor(length=[0.5, 0.5], outer_diameter=0.05, supports=[Support(1, 1e7), Support(3, 1e7)])
+    >>> motion = equations_of_motion(shaft, plane="x")
+    >>> motion.coordinates
+    ('x1', 'tilt_x1', 'x2', 'tilt_x2', 'x3', 'tilt_x3')
+
+    Notes
+    -----
+    The signs are those of `fem.assembly`: rotation from x to y; M y'' … − Ω G x'.
+    """
+    if plane not in ("both", "x"):
+        raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
+    if not (np.isfinite(speed) and speed >= 0):
+        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
+    P = both_planes(rotor, complex_coordinate=False)
+    equations = project(P, np.eye(P.A.size))
+    damping, stiffness = (matrix[0] for matrix in equations.at(np.array([float(speed)])))
+    kinds = ("", "tilt_", "left_", "right_")
+    shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
+    feet = [("foot_", int(i) + 1) for i in P.pedestals]
+    names = [f"{kind}{axis}{number}" for part in (shaft, feet) for axis in "xy" for kind, number in part]
+    in_x = np.array([name.split("_")[-1].startswith("x") for name in names])
+    across = np.ix_(in_x, ~in_x)
+    if plane == "both":
+        in_x[:] = True
+    elif damping[across].any() or stiffness[across].any():
+        raise ValueError("the planes x and y of this rotor are coupled: take both")
+    pick = np.ix_(in_x, in_x)
+    kept = tuple(name for name, inside in zip(names, in_x, strict=True) if inside)
+    return Motion(equations.M[pick], damping[pick], stiffness[pick], kept, float(speed))
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """s' = A s + B u, y = C s + D u.
+
+    It unpacks into A, B, C, D: `scipy.signal.StateSpace(*model)` and `control.ss(*model)` take it.
+
+    Attributes
+    ----------
+    A, B, C, D
+        Shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs); SI.
+    states
+        Names: `x7` a deflection, `v_x7` its velocity.
+    inputs
+        `f_x7` is a force on coordinate `x7`, N (on a tilt: N·m).
+    outputs
+        `x7` or `v_x7`.
+    speed
+        Of rotation, for which A holds, rad/s.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    speed: float = 0.0
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """A, B, C, D."""
+        return iter((self.A, self.B, self.C, self.D))
+
+    @property
+    def eigenvalues(self) -> ComplexArray:
+        """Of A, 1/s, by rising frequency |Im|, then real part, shape (n,)."""
+        # From the last state: what is fast stands first, and the slow keep their digits.
+        values = np.linalg.eigvals(self.A[::-1, ::-1]).astype(complex)
+        return values[np.lexsort((values.imag, values.real, np.abs(values.imag)))]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "speed_rad_s": self.speed,
+            "states": list(self.states),
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            **{name: matrix.tolist() for name, matrix in zip("ABCD", self, strict=True)},
+        }
+
+
+def state_space(
+    motion: Motion, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+) -> StateSpace:
+    """Write equations of motion as a state space.
+
+    Parameters
+    ----------
+    motion
+        Coordinates with zero row and column of M are massless: they become states of first order where they
+        are damped, and are eliminated where not.
+    inputs
+        Forces, `f_x7` on the coordinate `x7`; by default on every coordinate.
+    outputs
+        `x7` for a deflection, `v_x7` for a velocity; by default every deflection.
+
+    Raises
+    ------
+    ValueError
+        For names that do not exist or repeat, numbers that are not finite, a singular mass matrix without a
+        zero row, massless coordinates that nothing holds or that a damper joins, or as output the velocity of
+        a coordinate with neither mass nor damping.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fem import Motion
+    >>> one = Motion(np.array([[2.0]]), np.array([[4.0]]), np.array([[26.0]]), ("x1",), 0.0)
+    >>> model = state_space(one)
+    >>> model.states, model.inputs, model.outputs
+    (('x1', 'v_x1'), ('f_x1',), ('x1',))
+    >>> model.eigenvalues
+    array([-1.-3.46410162j, -1.+3.46410162j])
+    """
+    names, n = motion.coordinates, len(motion.coordinates)
+    M, C, K = (np.asarray(X, dtype=float) for X in (motion.M, motion.C, motion.K))
+    if not (len(set(names)) == n > 0 and all(X.shape == (n, n) and np.isfinite(X).all() for X in (M, C, K))):
+        raise ValueError(
+            "a state space needs coordinates with different names, and M, C and K of finite numbers, "
+            f"{n} × {n} for {n} coordinates"
+        )
+    inputs = tuple(f"f_{name}" for name in names) if inputs is None else tuple(inputs)
+    outputs = names if outputs is None else tuple(outputs)
+    forces = _places(inputs, [f"f_{name}" for name in names], "input")
+    shown = _places(outputs, [*names, *(f"v_{name}" for name in names)], "output")
+    massive, damped = (X.any(axis=0) | X.any(axis=1) for X in (M, C))
+    one, two, three = (np.flatnonzero(w) for w in (massive, damped & ~massive, ~massive & ~damped))
+    for name, place in zip(outputs, shown, strict=True):
+        if place - n in three:
+            raise ValueError(
+                f"output {name!r}: {name[2:]!r} has neither mass nor damping and follows forces at once: its "
+                "velocity holds their derivatives; ask for its deflection, or give it mass or damping"
+            )
+
+    # Rows over the states q₁, v, q₂ and the inputs.
+    states = (*(names[i] for i in one), *(f"v_{names[i]}" for i in one), *(names[i] for i in two))
+    order = len(states)
+    width = order + len(forces)
+    q, velocity, load = np.zeros((3, n, width))
+    q[one], velocity[one], q[two], load[forces] = np.split(
+        np.eye(width), np.cumsum([one.size, one.size, two.size])
+    )
+    q[three] = _solved(
+        K[np.ix_(three, three)],
+        load[three] - K[three] @ q,
+        "some massless coordinates are held neither by stiffness nor by damping, or move only with "
+        "derivatives of the forces (an index above 1): there is no state space; give them mass, damping "
+        "or stiffness",
+    )
+    velocity[two] = _solved(
+        C[np.ix_(two, two)],
+        load[two] - C[two] @ velocity - K[two] @ q,
+        "coordinates without mass are damped only together, by a damper between them, or by what is not "
+        "damped itself: there is no state space of them; give one of them mass, or damping to the ground",
+    )
+    rate = _solved(
+        M[np.ix_(one, one)],
+        load[one] - C[one] @ velocity - K[one] @ q,
+        "the mass matrix is singular without a zero row (as with shear but without rotary inertia): "
+        "there is no state space of it; give every combination of its coordinates mass",
+    )
+    rates, readings = np.vstack((velocity[one], rate, velocity[two])), np.vstack((q, velocity))[shown]
+    A, B, Y, D = (part for rows in (rates, readings) for part in np.split(rows, [order], axis=1))
+    return StateSpace(A, B, Y, D, states, inputs, outputs, motion.speed)
+
+
+def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]:
+    """Where names of inputs or outputs stand."""
+    for i, name in enumerate(chosen):
+        if name not in names:
+            raise ValueError(f"no {what} {name!r}: they are {names[0]} … {names[-1]}")
+        if name in chosen[:i]:
+            raise ValueError(f"{what} {name!r} is named more than once")
+    return [names.index(name) for name in chosen]
+
+
+def _solved(matrix: FloatArray, right: FloatArray, reason: str) -> FloatArray:
+    """The solution with a matrix that is regular in the scale of its rows; else the reason is raised."""
+    size = np.abs(matrix).max(axis=1, initial=0.0)
+    scale = 1 / np.sqrt(np.where(size > 0, size, 1.0))
+    if matrix.size and np.linalg.cond(scale[:, None] * matrix * scale, 1) > 1e12:
+        raise ValueError(reason)
+    return np.asarray(np.linalg.solve(matrix, right))
