@@ -53,7 +53,6 @@ __all__ = [
     "both_planes",
     "dense",
     "free_motions",
-    "general",
     "held",
     "ignored_inertia",
     "multiply",
@@ -163,18 +162,13 @@ def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
 
 def dense(band: AnyArray) -> AnyArray:
     """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
-    widest = min(len(band), band.shape[1])
-    upper = sum(np.diag(band[-1 - above, above:], above) for above in range(widest))
-    return np.asarray(upper + np.triu(upper, 1).conj().T)
-
-
-def general(band: FloatArray) -> FloatArray:
-    """The same matrix in LAPACK's general band form with room for pivoting, shape (3 width + 1, size)."""
-    width = len(band) - 1
-    A = np.zeros((3 * width + 1, band.shape[1]))
-    A[width : 2 * width + 1] = band
-    for below in range(1, width + 1):
-        A[2 * width + below, :-below] = band[width - below, below:]
+    size = band.shape[1]
+    A = np.zeros((size, size), band.dtype)
+    flat = A.reshape(-1)
+    for above in range(min(len(band), size)):
+        entries = band[-1 - above, above:]
+        flat[above * size :: size + 1] = entries.conj()
+        flat[above : (size - above) * size : size + 1] = entries
     return A
 
 
@@ -384,12 +378,13 @@ class Reduced:
 
     def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """D and K at each speed, shape (S, R, R)."""
-        k, c = (
-            (matrix.reshape(speeds.size, len(self.ties)) @ self.ties).reshape(-1, *self.M.shape)
-            for matrix in self.P.supports(speeds)
-        )
-        omega = speeds[:, None, None]
-        return self.D0 + omega * self.D1 + c, self.K0 + omega * self.K1 + k
+        omega, (k, c) = speeds[:, None, None], self.P.supports(speeds)
+
+        def matrix(constant: FloatArray, turning: AnyArray, supports: AnyArray) -> AnyArray:
+            entries = supports.reshape(speeds.size, len(self.ties))
+            return constant + omega * turning + (entries @ self.ties).reshape(-1, *constant.shape)
+
+        return matrix(self.D0, self.D1, c), matrix(self.K0, self.K1, k)
 
     def mirror(self, vectors: AnyArray) -> AnyArray:
         """Reduced vectors (…, R) with y reversed; a complex coordinate stays as it is."""
@@ -414,12 +409,10 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
 
     Stiffness and material damping are summed from strains: so they keep their digits on any mesh.
     """
-    from scipy.linalg import block_diag
-
-    p, f = P.planes, len(P.pedestals)
+    d, p, f = basis.shape[1], P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
     beta = np.tile(P.rotor.material_damping, len(strain))[:, None]
-    strain = strain.reshape(-1, basis.shape[1])
+    strain = strain.reshape(-1, d)
     K, B = strain.T @ strain, strain.T @ (beta * strain)
     for support in P.rotor.supports:
         tilt = basis[P.A.deflection(support.node) + 1]
@@ -432,12 +425,17 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
 
     def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
         """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        return block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(pedestals.T.ravel()))
+        matrix = np.zeros((p * (d + f), p * (d + f)), sides.dtype)
+        both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]
+        matrix[: p * d, : p * d] = both.reshape(p * d, p * d)
+        np.fill_diagonal(matrix[p * d :, p * d :], pedestals.T.ravel())
+        return matrix
 
     # What a support feels: motion of its node against the ground or the foot, in each plane.
-    feet = np.zeros((len(P.rows), f))
-    feet[P.pedestals, np.arange(f)] = -1.0
-    felt = [np.hstack((np.kron(np.eye(p)[i], basis[P.rows]), np.kron(np.eye(p)[i], feet))) for i in range(p)]
+    felt = np.zeros((len(P.rows), p, p * (d + f)))
+    for plane in range(p):
+        felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
+        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
     return Reduced(
         P=P,
         basis=basis,
@@ -446,7 +444,7 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
         D1=whole(across, G, none),
         K0=whole(along, K, P.pedestal_stiffness),
         K1=whole(across, B, none),
-        ties=np.einsum("isa,jsb->sijab", felt, felt).reshape(-1, felt[0].shape[1] ** 2),
+        ties=np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2),
     )
 
 
@@ -458,26 +456,30 @@ class WholeBand:
     """
 
     def __init__(self, P: Planes) -> None:
-        self.P, self.size, self.reach = P, P.planes * P.A.size, P.planes * P.A.width
-        bands = (P.A.mass, P.A.gyroscopic, P.A.material, P.A.shaft)
-        self._bands = np.array([general(band)[P.A.width :] for band in bands], complex)
+        A, p = P.A, P.planes
+        self.P, self.size, self.reach = P, p * A.size, p * A.width
+        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex).reshape(4, -1)
+        self._from, self._to = (FROM_XY, TO_XY) if p == 2 else (np.eye(1), np.eye(1))
 
     def factor(self, value: complex, speed: float) -> Factored:
         """LU factors of λ² M + λ D + K at one λ and speed."""
         from scipy.linalg.lapack import zgbtrf
 
-        P, p, reach = self.P, self.P.planes, self.reach
+        P, p, reach, width = self.P, self.P.planes, self.reach, self.P.A.width
         band = np.zeros((3 * reach + 1, self.size), complex, order="F")
         for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
             powers = np.array([value * value, -value * turning, value - turning, 1.0])
-            band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
+            upper = (powers @ self._bands).reshape(width + 1, -1)
+            for off in range(width + 1):
+                entries = upper[width - off, off:]
+                band[2 * reach - p * off, p * off + plane :: p] = entries
+                band[2 * reach + p * off, plane : self.size - p * off : p] = entries
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
         for j, i in enumerate(P.pedestals):
             stand = P.pedestal_stiffness[j] + value * P.pedestal_damping[j] + value**2 * P.pedestal_mass[j]
             D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(stand), D[i])
-        D = D if p == 1 else _turned(D)
-        for row, matrix in zip(P.rows, D, strict=True):
+        for row, matrix in zip(P.rows, self._from @ D @ self._to, strict=True):
             for a, b in np.ndindex(p, p):
                 band[2 * reach + a - b, p * row + b] += matrix[a, b]
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
@@ -487,13 +489,12 @@ class WholeBand:
 
     def interleaved(self, X: AnyArray) -> ComplexArray:
         """From (…, planes, size) to the order of the band, (…, planes · size)."""
-        X = np.swapaxes(X, -1, -2).astype(complex)
-        return np.asarray(X if self.P.planes == 1 else X @ FROM_XY.T).reshape(*X.shape[:-2], self.size)
+        return np.swapaxes(self._from @ X, -1, -2).reshape(*X.shape[:-2], self.size).astype(complex)
 
     def planes(self, X: AnyArray) -> AnyArray:
         """Back to (…, planes, size)."""
-        X = X.reshape(*X.shape[:-1], -1, self.P.planes)
-        return np.swapaxes(X if self.P.planes == 1 else X @ TO_XY.T, -1, -2)
+        alternating = X.reshape(*X.shape[:-1], -1, self.P.planes)
+        return np.asarray(self._to @ np.swapaxes(alternating, -1, -2))
 
 
 @dataclass(frozen=True, eq=False)

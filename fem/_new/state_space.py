@@ -22,6 +22,7 @@ import numpy as np
 from fem._new.assembly import both_planes, project
 from fem._new.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import number
 
 __all__ = ["Motion", "StateSpace", "equations_of_motion", "state_space"]
 
@@ -94,24 +95,20 @@ def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both"
     """
     if plane not in ("both", "x"):
         raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
-    if not (np.isfinite(speed) and speed >= 0):
-        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
+    speed = number(speed, "speed")
     P = both_planes(rotor, complex_coordinate=False)
     equations = project(P, np.eye(P.A.size))
-    damping, stiffness = (matrix[0] for matrix in equations.at(np.array([float(speed)])))
+    matrices = [equations.M, *(X[0] for X in equations.at(np.array([speed])))]
     kinds = ("", "tilt_", "left_", "right_")
     shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
     feet = [("foot_", int(i) + 1) for i in P.pedestals]
-    names = [f"{kind}{axis}{number}" for part in (shaft, feet) for axis in "xy" for kind, number in part]
-    in_x = np.array([name.split("_")[-1].startswith("x") for name in names])
-    across = np.ix_(in_x, ~in_x)
-    if plane == "both":
-        in_x[:] = True
-    elif damping[across].any() or stiffness[across].any():
-        raise ValueError("the planes x and y of this rotor are coupled: take both")
-    pick = np.ix_(in_x, in_x)
-    kept = tuple(name for name, inside in zip(names, in_x, strict=True) if inside)
-    return Motion(equations.M[pick], damping[pick], stiffness[pick], kept, float(speed))
+    names = np.array([f"{kind}{axis}{i}" for part in (shaft, feet) for axis in "xy" for kind, i in part])
+    if plane == "x":
+        in_x = equations.mirror(np.ones(names.size)) > 0
+        if any(X[np.ix_(in_x, ~in_x)].any() for X in matrices):
+            raise ValueError("the planes x and y of this rotor are coupled: take both")
+        matrices, names = [X[np.ix_(in_x, in_x)] for X in matrices], names[in_x]
+    return Motion(*matrices, tuple(names.tolist()), speed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +155,7 @@ class StateSpace:
         """Plain data for JSON."""
         return {
             "speed_rad_s": self.speed,
-            "states": list(self.states),
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
+            **{name: list(getattr(self, name)) for name in ("states", "inputs", "outputs")},
             **{name: matrix.tolist() for name, matrix in zip("ABCD", self, strict=True)},
         }
 
@@ -199,12 +194,13 @@ def state_space(
     array([-1.-3.46410162j, -1.+3.46410162j])
     """
     names, n = motion.coordinates, len(motion.coordinates)
-    M, C, K = (np.asarray(X, dtype=float) for X in (motion.M, motion.C, motion.K))
-    if not (len(set(names)) == n > 0 and all(X.shape == (n, n) and np.isfinite(X).all() for X in (M, C, K))):
+    matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
+    if matrices.shape != (3, n, n) or not np.isfinite(matrices).all() or len(set(names)) < n:
         raise ValueError(
             "a state space needs coordinates with different names, and M, C and K of finite numbers, "
             f"{n} × {n} for {n} coordinates"
         )
+    M, C, K = matrices
     inputs = tuple(f"f_{name}" for name in names) if inputs is None else tuple(inputs)
     outputs = names if outputs is None else tuple(outputs)
     forces = _places(inputs, [f"f_{name}" for name in names], "input")

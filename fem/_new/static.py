@@ -139,14 +139,12 @@ def static_deflection(
     A = P.A
     ones = np.zeros((A.size, 1))
     ones[A.deflections] = 1.0
-    along = np.array([np.cos(angle), np.sin(angle)])
-    along[np.abs(along) < 1e-15] = 0.0  # straight down is straight down
+    along = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
     weight = gravity * multiply(A.mass, ones)[:, 0]
     X = _solved(P, np.outer(along, weight)[None], speed)[0]
-    reactions = np.zeros((2, len(rotor.supports)))
-    for k, support in enumerate(rotor.supports):
-        D = support.dynamic_stiffness(0.0, speed).real
-        reactions[:, k] = -D @ X[:, A.deflection(support.node)]
+    springs = [support.dynamic_stiffness(0.0, speed).real for support in rotor.supports]
+    moved = [X[:, A.deflection(support.node)] for support in rotor.supports]
+    reactions = -np.einsum("sij,sj->is", springs, moved)
     x, y = X[:, A.deflections]
     read_only(x, y, reactions)
     return StaticDeflection(x, y, *reactions, gravity * rotor.total_mass, rotor, speed)

@@ -16,6 +16,7 @@ from scipy.linalg import eigh
 import fem
 from fem._new.assembly import TO_XY, WholeBand, assemble, both_planes, dense, multiply, project, supported
 from fem._new.forces import law, tables
+from fem._new.state_space import state_space
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 
@@ -153,7 +154,7 @@ def test_internal_damping_drives_forward_whirl_beyond_its_threshold():
     for speed in (0.5 * threshold, threshold, 2.0 * threshold):
         roots = np.roots([12.0, inner + outer, k - 1j * speed * inner])
         expected = np.concatenate((roots, roots.conj()))
-        values = fem.state_space(fem.equations_of_motion(rotor, speed=speed)).eigenvalues
+        values = state_space(fem.equations_of_motion(rotor, speed=speed)).eigenvalues
         for value in expected:
             assert np.abs(values - value).min() < 1e-9 * abs(value)
         assert np.sign(round(values.real.max(), 6)) == np.sign(round(speed - threshold, 6))
