@@ -31,6 +31,7 @@ import numpy as np
 from fem._new.elements import (
     Layout,
     bending_terms,
+    dense,
     gyroscopic_terms,
     mass_terms,
     multiply,
@@ -126,10 +127,10 @@ def assemble(rotor: Rotor) -> Matrices:
                 "A:B --output linear.toml`, or take rotor.linear, which leaves them out"
             )
     layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
-    bending = bending_terms(rotor)
-    K, M = layout.band(bending), layout.band(mass_terms(rotor))
-    G = layout.band(gyroscopic_terms(rotor)) if model.gyroscopic else np.zeros_like(M)
-    B = layout.band([(beta * factor, form) for factor, form in bending]) if beta.any() else np.zeros_like(M)
+    stiffness = bending_terms(rotor)
+    damping = [(beta * factor, form) for factor, form in stiffness] if beta.any() else []
+    terms = (stiffness, mass_terms(rotor), gyroscopic_terms(rotor), damping)
+    K, M, G, B = (layout.band(each) for each in terms)
     A = Matrices(K, M, G, B, layout.stride, layout.width)
     for disc in rotor.discs:
         w = A.deflection(disc.node)
@@ -158,18 +159,6 @@ def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
         K[-1 - above, above:] *= free[:-above]
     K[-1, unknowns] = 1.0
     return K
-
-
-def dense(band: AnyArray) -> AnyArray:
-    """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
-    size = band.shape[1]
-    A = np.zeros((size, size), band.dtype)
-    flat = A.reshape(-1)
-    for above in range(min(len(band), size)):
-        entries = band[-1 - above, above:]
-        flat[above * size :: size + 1] = entries.conj()
-        flat[above : (size - above) * size : size + 1] = entries
-    return A
 
 
 def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
@@ -294,8 +283,8 @@ class Planes:
         Unknown of the deflection at each support, from 0, shape (s,).
     pedestals
         Which supports stand on a pedestal, shape (f,).
-    pedestal_mass, pedestal_stiffness, pedestal_damping
-        Of the pedestals, shapes (f, planes).
+    feet
+        Mass, stiffness and damping of the pedestals, shape (3, f, planes).
     """
 
     rotor: Rotor
@@ -303,9 +292,12 @@ class Planes:
     planes: int
     rows: IndexArray
     pedestals: IndexArray
-    pedestal_mass: FloatArray
-    pedestal_stiffness: FloatArray
-    pedestal_damping: FloatArray
+    feet: FloatArray
+
+    @property
+    def pedestal_stiffness(self) -> FloatArray:
+        """Of the pedestals, N/m, shape (f, planes)."""
+        return np.asarray(self.feet[1])
 
     def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """Stiffness and damping of all supports, each of shape (S, s, planes, planes).
@@ -336,11 +328,15 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
     one = rotor.symmetric if complex_coordinate is None else complex_coordinate
     A, p = assemble(rotor), 1 if one else 2
     rows = [A.deflection(support.node) for support in rotor.supports]
-    stands = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
-    feet = [(2 * (stand.mass,), stand.xy("stiffness"), stand.xy("damping")) for stand in stands.values()]
-    mass, stiffness, damping = np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p]
+    pedestals = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
+    feet = [(2 * (foot.mass,), foot.xy("stiffness"), foot.xy("damping")) for foot in pedestals.values()]
     return Planes(
-        rotor, A, p, np.array(rows, np.intp), np.array(list(stands), np.intp), mass, stiffness, damping
+        rotor,
+        A,
+        p,
+        np.array(rows, np.intp),
+        np.array(list(pedestals), np.intp),
+        np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p],
     )
 
 
@@ -421,7 +417,8 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
         w = basis[P.A.deflection(damper.node)]
         B += damper.damping * np.outer(w, w)
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
-    along, across, none = np.eye(p), _ACROSS if p == 2 else np.array([[-1j]]), np.zeros((f, p))
+    along, across = np.eye(p), _ACROSS if p == 2 else np.array([[-1j]])
+    mass, stiffness, damping = P.feet
 
     def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
         """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
@@ -436,16 +433,16 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     for plane in range(p):
         felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
         felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
-    return Reduced(
-        P=P,
-        basis=basis,
-        M=whole(along, M, P.pedestal_mass),
-        D0=whole(along, B, P.pedestal_damping),
-        D1=whole(across, G, none),
-        K0=whole(along, K, P.pedestal_stiffness),
-        K1=whole(across, B, none),
-        ties=np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2),
+    none = np.zeros_like(mass)
+    terms = (
+        (along, M, mass),
+        (along, B, damping),
+        (across, G, none),
+        (along, K, stiffness),
+        (across, B, none),
     )
+    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
+    return Reduced(P, basis, *(whole(*term) for term in terms), ties)
 
 
 class WholeBand:
@@ -476,15 +473,15 @@ class WholeBand:
                 band[2 * reach + p * off, plane : self.size - p * off : p] = entries
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
-        for j, i in enumerate(P.pedestals):
-            stand = P.pedestal_stiffness[j] + value * P.pedestal_damping[j] + value**2 * P.pedestal_mass[j]
+        for i, (m, stiffness, damping) in zip(P.pedestals, np.moveaxis(P.feet, 1, 0), strict=True):
+            stand = stiffness + value * damping + value**2 * m
             D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(stand), D[i])
         for row, matrix in zip(P.rows, self._from @ D @ self._to, strict=True):
             for a, b in np.ndindex(p, p):
                 band[2 * reach + a - b, p * row + b] += matrix[a, b]
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
         if info > 0:  # singular to the last bit: an eigenvalue
-            lu[2 * reach, info - 1] = 1e-16 * np.abs(self._bands[3]).max()
+            lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
         return Factored(p, reach, lu, pivots)
 
     def interleaved(self, X: AnyArray) -> ComplexArray:

@@ -32,6 +32,7 @@ from rotorid.base.arrays import AnyArray, FloatArray
 __all__ = [
     "Layout",
     "bending_terms",
+    "dense",
     "gyroscopic_terms",
     "mass_terms",
     "multiply",
@@ -100,7 +101,9 @@ def mass_terms(rotor: Rotor) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def gyroscopic_terms(rotor: Rotor) -> list[tuple[FloatArray, FloatArray]]:
-    """Terms of the gyroscopic matrix."""
+    """Terms of the gyroscopic matrix; none unless the model has it."""
+    if not rotor.model.gyroscopic:
+        return []
     return [(2 * rotor.density * rotor.second_moment / rotor.length, _TILT)]
 
 
@@ -141,3 +144,15 @@ def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
         Y[:-above] += entries * X[above:]
         Y[above:] += entries.conj() * X[:-above]
     return np.asarray(Y)
+
+
+def dense(band: AnyArray) -> AnyArray:
+    """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
+    size = band.shape[1]
+    A = np.zeros((size, size), band.dtype)
+    flat = A.reshape(-1)
+    for above in range(min(len(band), size)):
+        entries = band[-1 - above, above:]
+        flat[above * size :: size + 1] = entries.conj()
+        flat[above : (size - above) * size : size + 1] = entries
+    return A
