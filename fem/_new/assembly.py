@@ -66,7 +66,6 @@ __all__ = [
 
 TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
 FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
-_ACROSS = np.array([[0.0, 1.0], [-1.0, 0.0]])  # force in x from y, and with the opposite sign in y from x
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,14 +117,6 @@ def assemble(rotor: Rotor) -> Matrices:
     ValueError
         For a rotor with forces that are not linear.
     """
-    for force in rotor.forces:
-        if not isinstance(force, InternalDamping):
-            kind = kind_of(force).replace("_", " ")
-            raise ValueError(
-                f"the {kind} at node {force.node} is not linear, and this asks for linear equations: "
-                "write the coefficients of all such forces at rest first, `rotorid bearings ROTOR --speeds "
-                "A:B --output linear.toml`, or take rotor.linear, which leaves them out"
-            )
     layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
     stiffness = bending_terms(rotor)
     damping = [(beta * factor, form) for factor, form in stiffness] if beta.any() else []
@@ -139,8 +130,15 @@ def assemble(rotor: Rotor) -> Matrices:
         G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
     for support in rotor.supports:
         K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
-    for damper in rotor.forces:
-        B[-1, A.deflection(damper.node)] += damper.damping
+    for force in rotor.forces:
+        if not isinstance(force, InternalDamping):
+            kind = kind_of(force).replace("_", " ")
+            raise ValueError(
+                f"the {kind} at node {force.node} is not linear, and this asks for linear equations: "
+                "write the coefficients of all such forces at rest first, `rotorid bearings ROTOR --speeds "
+                "A:B --output linear.toml`, or take rotor.linear, which leaves them out"
+            )
+        B[-1, A.deflection(force.node)] += force.damping
     return A
 
 
@@ -205,6 +203,10 @@ def static_stiffness(support: Support, speed: float) -> FloatArray:
     return np.asarray((k + k.T) / 2)
 
 
+def _internal(rotor: Rotor) -> list[InternalDamping]:
+    return [force for force in rotor.forces if isinstance(force, InternalDamping)]
+
+
 def _turned(D: AnyArray) -> ComplexArray:
     """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
     return np.asarray(FROM_XY @ D @ TO_XY)
@@ -243,20 +245,20 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     ValueError
         If a speed lies outside a bearing table.
     """
-    parts = [(support.node, _turned(support.dynamic_stiffness(speeds))) for support in rotor.supports]
-    backward = 2j * speeds[:, None, None] * np.diag([0.0, 1.0])
-    parts += [(damper.node, damper.damping * backward) for damper in rotor.forces]
-    nodes = tuple(dict.fromkeys(node for node, _ in parts))
+    attached = [support.node for support in rotor.supports] + [damper.node for damper in _internal(rotor)]
+    nodes = tuple(dict.fromkeys(attached))
     stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
-    for node, D in parts:
-        stiffness[:, nodes.index(node)] += D
+    for support in rotor.supports:
+        stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
+    for damper in _internal(rotor):
+        stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
     # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
     reference = np.maximum(np.median(stiffness[..., 0, 0].real, axis=0), 0.0)
     return Supported(nodes, stiffness, reference, 1 if rotor.symmetric else 2)
 
 
 def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArray:
-    """The differential between two neighbouring supports, as `on_whirl`, with no digits lost to the pedestal.
+    """The differential between two neighbouring supports on (F, b), no digits lost to the pedestal.
 
     Bearing B and pedestal S in series are D = B − B (B + S)⁻¹ B: dD = S G dB G S + B G dS G B, G = (B + S)⁻¹.
     """
@@ -413,11 +415,12 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     for support in P.rotor.supports:
         tilt = basis[P.A.deflection(support.node) + 1]
         K += support.tilting_stiffness * np.outer(tilt, tilt)
-    for damper in P.rotor.forces:
+    for damper in _internal(P.rotor):
         w = basis[P.A.deflection(damper.node)]
         B += damper.damping * np.outer(w, w)
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
-    along, across = np.eye(p), _ACROSS if p == 2 else np.array([[-1j]])
+    # Force in x from y, and with the opposite sign in y from x; or the same of z.
+    along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
     mass, stiffness, damping = P.feet
 
     def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
@@ -442,7 +445,8 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
         (across, B, none),
     )
     ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
-    return Reduced(P, basis, *(whole(*term) for term in terms), ties)
+    M, D0, D1, K0, K1 = (whole(*term) for term in terms)
+    return Reduced(P, basis, M, D0, D1, K0, K1, ties)
 
 
 class WholeBand:
@@ -456,7 +460,8 @@ class WholeBand:
         A, p = P.A, P.planes
         self.P, self.size, self.reach = P, p * A.size, p * A.width
         self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex).reshape(4, -1)
-        self._from, self._to = (FROM_XY, TO_XY) if p == 2 else (np.eye(1), np.eye(1))
+        self._from: AnyArray = FROM_XY if p == 2 else np.eye(1)
+        self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
 
     def factor(self, value: complex, speed: float) -> Factored:
         """LU factors of λ² M + λ D + K at one λ and speed."""
@@ -486,7 +491,7 @@ class WholeBand:
 
     def interleaved(self, X: AnyArray) -> ComplexArray:
         """From (…, planes, size) to the order of the band, (…, planes · size)."""
-        return np.swapaxes(self._from @ X, -1, -2).reshape(*X.shape[:-2], self.size).astype(complex)
+        return np.swapaxes(self._from @ X, -1, -2).reshape(*X.shape[:-2], self.size)
 
     def planes(self, X: AnyArray) -> AnyArray:
         """Back to (…, planes, size)."""

@@ -98,17 +98,17 @@ def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both"
     speed = number(speed, "speed")
     P = both_planes(rotor, complex_coordinate=False)
     equations = project(P, np.eye(P.A.size))
-    matrices = [equations.M, *(X[0] for X in equations.at(np.array([speed])))]
+    M, (C, K) = equations.M, (X[0] for X in equations.at(np.array([speed])))
     kinds = ("", "tilt_", "left_", "right_")
     shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
     feet = [("foot_", int(i) + 1) for i in P.pedestals]
     names = np.array([f"{kind}{axis}{i}" for part in (shaft, feet) for axis in "xy" for kind, i in part])
     if plane == "x":
         in_x = equations.mirror(np.ones(names.size)) > 0
-        if any(X[np.ix_(in_x, ~in_x)].any() for X in matrices):
+        if any(X[np.ix_(in_x, ~in_x)].any() for X in (C, K)):
             raise ValueError("the planes x and y of this rotor are coupled: take both")
-        matrices, names = [X[np.ix_(in_x, in_x)] for X in matrices], names[in_x]
-    return Motion(*matrices, tuple(names.tolist()), speed)
+        (M, C, K), names = (X[np.ix_(in_x, in_x)] for X in (M, C, K)), names[in_x]
+    return Motion(M, C, K, tuple(names.tolist()), speed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -147,7 +147,7 @@ def static_deflection(
     reactions = -np.einsum("sij,sj->is", springs, moved)
     x, y = X[:, A.deflections]
     read_only(x, y, reactions)
-    return StaticDeflection(x, y, *reactions, gravity * rotor.total_mass, rotor, speed)
+    return StaticDeflection(x, y, reactions[0], reactions[1], gravity * rotor.total_mass, rotor, speed)
 
 
 def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> FloatArray:
@@ -196,7 +196,7 @@ def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
     band = WholeBand(P)
     X = band.planes(band.factor(0.0, speed).solve(band.interleaved(forces).T).T).real
     work = np.abs((forces * X).sum(axis=(1, 2)))
-    lost = sum(rounding_error(P.A.shaft, X[:, plane].T, work) for plane in (0, 1))
+    lost = np.add(*(rounding_error(P.A.shaft, X[:, plane].T, work) for plane in (0, 1)))
     if not (lost[forces.any(axis=(1, 2))] < 1e-3).all():
         raise ValueError(
             f"the compliance of {P.rotor.n_elements} elements on these supports is lost in float64; "
