@@ -137,13 +137,13 @@ def strains(rotor: Rotor, X: FloatArray) -> FloatArray:
 
 def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
     """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
-    width = band.shape[0] - 1
-    Y = band[width, :, None] * X
-    for above in range(1, width + 1):
-        entries = band[width - above, above:, None]
-        Y[:-above] += entries * X[above:]
-        Y[above:] += entries.conj() * X[:-above]
-    return np.asarray(Y)
+    from scipy.linalg import blas
+
+    kind = np.result_type(band, X)
+    product = blas.dsbmv if kind.kind == "f" else blas.zhbmv
+    band = np.asarray(band, kind, order="F")
+    columns = [product(len(band) - 1, 1.0, band, column) for column in X.T.astype(kind)]
+    return np.reshape(columns, X.T.shape).T
 
 
 def dense(band: AnyArray) -> AnyArray:
