@@ -248,11 +248,9 @@ def state_space(
 
 def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]:
     """Where names of inputs or outputs stand."""
-    for i, name in enumerate(chosen):
-        if name not in names:
-            raise ValueError(f"no {what} {name!r}: they are {names[0]} … {names[-1]}")
-        if name in chosen[:i]:
-            raise ValueError(f"{what} {name!r} is named more than once")
+    for name in chosen:
+        if name not in names or chosen.count(name) > 1:
+            raise ValueError(f"no {what} {name!r}, or it is named more than once: {names[0]} … {names[-1]}")
     return [names.index(name) for name in chosen]
 
 
