@@ -14,7 +14,7 @@ Why the unknowns γ: the usual two-node element of the peers (Przemieniecki's, s
 the element. That is right at rest, where κ G A γ = Q is constant between loads; in vibration the inertia
 of the shaft makes Q vary linearly in an element to first order, γ is wrong by O(h), its energy by O(h²), and
 so are the frequencies. A linear γ leaves an error O(h²) in γ, O(h⁴) in energy and frequency: the rate of the
-bending part, which is kept. Both rates are checked in tests/fem/test_elements.py.
+bending part, which is kept and checked in tests/fem/test_elements.py.
 
 In the scaled unknowns (w₁, L θ₁, L γₐ, L γ_b, w₂, L θ₂) the forms are numbers, the same for all elements,
 all of them multiples of 1/420.

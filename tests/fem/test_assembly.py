@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 
-import dense_rotor
 import numpy as np
 import pytest
 from fem_rotors import machines
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 import fem
-from fem._new.assembly import TO_XY, WholeBand, assemble, both_planes, dense, multiply, project, supported
+from fem._new.assembly import WholeBand, assemble, both_planes, project, supported
 from fem._new.forces import law, tables
 from fem._new.state_space import state_space
 from rotorid.samples import sample_data
@@ -113,28 +112,9 @@ def test_whole_band_and_basis_are_the_equations(rotor, damped):
         np.testing.assert_allclose(small, whole @ large @ whole.T, atol=1e-9 * np.abs(large).max())
 
 
-@given(machines(elements=(2, 10)))
-@settings(max_examples=20, deadline=None)
-def test_supports_on_forward_and_backward_amplitudes(rotor):
-    """The dynamic stiffness at the nodes, added to the shaft's, gives the response of the dense rotor."""
-    rotor = dataclasses.replace(rotor, model=dataclasses.replace(rotor.model, shear=False))
-    omega = 350.0
-    A, at = assemble(rotor), supported(rotor, np.array([omega]))
-    K, M, G, B = (dense(band) for band in (A.shaft, A.mass, A.gyroscopic, A.material))
-    D = np.zeros((2, A.size, 2, A.size), dtype=complex)
-    D[0, :, 0], D[1, :, 1] = K - omega**2 * (M - G), K + 2j * omega * B - omega**2 * (M + G)
-    for node, k in zip(at.nodes, at.stiffness[0], strict=True):
-        D[:, A.deflection(node), :, A.deflection(node)] += k
-    load = np.zeros(2 * A.size)
-    load[A.deflection(2)] = omega**2
-    x, y = TO_XY @ np.linalg.solve(D.reshape(2 * A.size, -1), load).reshape(2, -1)[:, A.deflections]
-    for mine, theirs in zip((x, y), dense_rotor.response(rotor, {2: 1.0}, omega), strict=True):
-        np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-8 * np.abs(x).max())
-
-
-def jeffcott(inner, outer, stiffness=2e7):
+def jeffcott(inner, outer):
     """A disc amid a massless shaft; dampers at the disc that turn and that stand."""
-    supports = [fem.Support(1, stiffness), fem.Support(3, stiffness), fem.Support(2, 0.0, outer)]
+    supports = [fem.Support(1, 2e7), fem.Support(3, 2e7), fem.Support(2, 0.0, outer)]
     return fem.Rotor(
         [0.3, 0.3],
         0.04,
@@ -160,9 +140,8 @@ def test_internal_damping_drives_forward_whirl_beyond_its_threshold():
         assert np.sign(round(values.real.max(), 6)) == np.sign(round(speed - threshold, 6))
 
 
-@pytest.mark.parametrize("stiffness", [2e7, ((2e7, 0.0), (0.0, 1e7))])
-def test_internal_damping_is_the_law_of_the_force(stiffness):
-    rotor, speed = jeffcott(300.0, 0.0, stiffness), 170.0
+def test_internal_damping_is_the_law_of_the_force():
+    rotor, speed = jeffcott(300.0, 0.0), 170.0
     damped, plain = (fem.equations_of_motion(each, speed=speed) for each in (rotor, rotor.linear))
     codes, values = tables(rotor.forces)
     out = np.zeros((2, 6))
@@ -171,32 +150,11 @@ def test_internal_damping_is_the_law_of_the_force(stiffness):
     np.testing.assert_allclose((damped.K - plain.K)[np.ix_(at, at)], -out[:, 1:3], rtol=0, atol=1e-6)
     np.testing.assert_allclose((damped.C - plain.C)[np.ix_(at, at)], -out[:, 3:5], rtol=0, atol=1e-9)
     # Forward whirl does not strain it; what runs backward is damped twice.
-    A, at = assemble(rotor), supported(rotor, np.array([speed]))
+    at = supported(rotor, np.array([speed]))
     np.testing.assert_array_equal(at.stiffness[0, at.nodes.index(2)], [[0, 0], [0, 600j * speed]])
-    band = WholeBand(both_planes(rotor, complex_coordinate=False))
-    load = np.zeros((2, A.size), dtype=complex)
-    for turn, change in ((-1j, 0.0), (1j, 600j * speed)):
-        load[:, A.deflection(2)] = 1.0, turn
-        x, y = band.planes(band.factor(1j * speed, speed).solve(band.interleaved(load)))[:, A.deflection(2)]
-        T = 1j * speed * damped.C - speed**2 * damped.M + damped.K
-        whole = np.linalg.solve(T, load.reshape(-1))
-        np.testing.assert_allclose([x, y], whole[[damped.index("x2"), damped.index("y2")]], rtol=1e-9)
-        if stiffness == 2e7:
-            undamped = 1j * speed * plain.C - speed**2 * plain.M + plain.K
-            exact = 1 / (1 / np.linalg.solve(undamped, load.reshape(-1))[plain.index("x2")] + change)
-            assert x == pytest.approx(exact, rel=1e-9)
 
 
 def test_other_forces_are_refused():
     rotor = dataclasses.replace(jeffcott(1.0, 0.0), forces=[fem.CubicSpring(2, "", 1e6, 1e12)])
     with pytest.raises(ValueError, match=r"the cubic spring at node 2 is not linear.*rotorid bearings"):
         assemble(rotor)
-
-
-def test_products_with_bands():
-    A = assemble(fem.Rotor([0.1, 0.2, 0.3], 0.05, model=fem.Model(shear=True)))
-    X = np.random.default_rng(0).normal(size=(A.size, 3))
-    np.testing.assert_allclose(multiply(A.shaft, X), dense(A.shaft) @ X, atol=1e-12 * A.shaft.max())
-    hermitian = A.shaft + 1j * np.roll(A.shaft, 1, axis=1)
-    hermitian[-1] = hermitian[-1].real
-    np.testing.assert_allclose(multiply(hermitian, X), dense(hermitian) @ X, atol=1e-12 * A.shaft.max())

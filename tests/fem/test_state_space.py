@@ -77,18 +77,6 @@ def test_random_systems_keep_eigenvalues_and_receptance(drawn):
     ).all()
 
 
-def test_a_scaled_system_is_the_same_system():
-    """In newtons and metres: stiffness 1e8, masses from 1e-2 to 1e3."""
-    rng = np.random.default_rng(3)
-    motion, order = random_motion(5, 3, 2, 1)
-    s = 10 ** rng.uniform(-2, 2, 6)
-    time = 2e-3
-    scaled = [1e6 * s[:, None] * X * s * time**k for k, X in enumerate((motion.K, motion.C, motion.M))]
-    model = state_space(motion_of(scaled[2], scaled[1], scaled[0]))
-    assert len(model.A) == order
-    assert farthest(model.eigenvalues * time, state_space(motion).eigenvalues) < 1e-10
-
-
 def test_feedthrough_of_a_force_on_a_massless_undamped_output():
     """A mass on two springs in series; a force on the point between moves it at once by f/(k1 + k2)."""
     k1, k2 = 3.0, 5.0
@@ -110,7 +98,7 @@ def test_a_damper_and_a_spring_without_mass_creep():
     np.testing.assert_allclose(y[:, 1], np.exp(-k * t / c) / c, atol=1e-12)
 
 
-def test_scipy_takes_it_and_answers_alike():
+def test_it_unpacks_into_its_matrices():
     motion, _ = random_motion(11, 2, 1, 1)
     model = state_space(motion, inputs=["f_x2", "f_x1"], outputs=["x3", "x1"])
     A, B, C, D = model
@@ -119,10 +107,6 @@ def test_scipy_takes_it_and_answers_alike():
     dynamic = motion.K + 1j * omega[:, None, None] * motion.C - omega[:, None, None] ** 2 * motion.M
     expected = np.linalg.inv(dynamic)[:, [2, 0]][:, :, [1, 0]]
     np.testing.assert_allclose(frequency_response(model, omega), expected, rtol=1e-10)
-    system = ScipyStateSpace(*model)
-    for k, w in enumerate(omega):
-        theirs = system.C @ np.linalg.solve(1j * w * np.eye(len(A)) - system.A, system.B) + system.D
-        np.testing.assert_allclose(theirs, expected[k], rtol=1e-10)
 
 
 def test_velocities():
@@ -241,10 +225,3 @@ def test_an_undamped_system():
     document = model.to_dict()
     assert document["A"] == [[0.0, 1.0], [-4.0, 0.0]]
     assert document["states"] == ["x1", "v_x1"]
-
-
-def test_rigid_motion_keeps_its_zero_eigenvalues():
-    """A free mass: x' = v, v' = f."""
-    model = state_space(motion_of(2.0, 0.0, 0.0))
-    np.testing.assert_array_equal(model.A, [[0, 1], [0, 0]])
-    np.testing.assert_array_equal(model.B, [[0], [0.5]])
