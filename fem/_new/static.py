@@ -7,7 +7,7 @@ the whole band at the frequency 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,7 +163,7 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
     nodes
         Node numbers, from 1, or names of stations; n of them.
     speed
-        Of rotation, rad/s, as in `static_deflection`.
+        Where bearing tables are read, rad/s; damping that turns with the shaft is left out.
 
     Returns
     -------
@@ -177,6 +177,7 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
         carries fewer than about three digits.
     """
     P = both_planes(rotor, complex_coordinate=False)
+    P = replace(P, A=replace(P.A, material=np.zeros_like(P.A.material)))
     unknowns = np.array([P.A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
     forces = np.zeros((unknowns.size, 2, P.A.size))
     forces[np.arange(unknowns.size), 0, unknowns] = 1.0
