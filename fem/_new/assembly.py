@@ -296,11 +296,6 @@ class Planes:
     pedestals: IndexArray
     feet: FloatArray
 
-    @property
-    def pedestal_stiffness(self) -> FloatArray:
-        """Of the pedestals, N/m, shape (f, planes)."""
-        return np.asarray(self.feet[1])
-
     def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """Stiffness and damping of all supports, each of shape (S, s, planes, planes).
 
@@ -314,15 +309,6 @@ class Planes:
         if self.planes == 1:
             k, c = (X[..., :1, :1] - 1j * X[..., :1, 1:] for X in (k, c))
         return k, c
-
-    def mirrored(self, speeds: FloatArray) -> bool:
-        """Whether left eigenvectors are the right ones with y reversed (or, of z, are equal to them).
-
-        So it is where no support has a symmetric cross-coupling: kxy = −kyx, the same for damping.
-        """
-        if self.planes == 1:
-            return True
-        return all(np.array_equal(matrix[..., 0, 1], -matrix[..., 1, 0]) for matrix in self.supports(speeds))
 
 
 def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
@@ -384,22 +370,15 @@ class Reduced:
 
         return matrix(self.D0, self.D1, c), matrix(self.K0, self.K1, k)
 
-    def mirror(self, vectors: AnyArray) -> AnyArray:
-        """Reduced vectors (…, R) with y reversed; a complex coordinate stays as it is."""
-        if self.P.planes == 1:
-            return vectors
-        d, f = self.basis.shape[1], len(self.P.pedestals)
-        return np.asarray(vectors * np.repeat([1, -1, 1, -1], [d, d, f, f]))
-
-    def expand(self, vectors: AnyArray, every: int = 1) -> AnyArray:
-        """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size), or each so-many-th of them."""
+    def expand(self, vectors: AnyArray) -> AnyArray:
+        """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
         planes, d = self.P.planes, self.basis.shape[1]
         coefficients = vectors[..., : planes * d].reshape(*vectors.shape[:-1], planes, d)
-        return np.asarray(coefficients @ self.basis[::every].T)
+        return np.asarray(coefficients @ self.basis.T)
 
     def nodes(self, vectors: AnyArray) -> AnyArray:
         """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
-        return self.expand(vectors, self.P.A.stride)
+        return np.asarray(self.expand(vectors)[..., :: self.P.A.stride])
 
 
 def project(P: Planes, basis: FloatArray) -> Reduced:
