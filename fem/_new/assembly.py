@@ -18,9 +18,9 @@ the unknowns, with scalars k = kxx − i kxy and c = cxx − i cxy. A pedestal i
 
 Synchronous motion z = F e^{iωt} + b̄ e^{−iωt} has x = F + b, y = −i (F − b), so that a matrix D of (x, y) acts
 on (F, b) as T⁻¹ D T with T = [[1, 1], [−i, i]]. A load f that turns with the rotor is f on x and −i f on y.
-With the same F and b at any complex λ, x = (F + b) e^{λt}, the shaft does not couple them: it is λ² M − i λ Ω G
-+ (λ − i Ω) B + K on F, and with i Ω in the place of −i Ω on b; at λ = i Ω these are K − Ω² (M − G) and
-K − Ω² (M + G) + 2 i Ω B.
+With the same F and b at any complex λ, x = (F + b) e^{λt}, the shaft does not couple them: it is
+λ² M − i λ Ω G + (λ − i Ω) B + K on F, and with i Ω in the place of −i Ω on b; at λ = i Ω these are
+K − Ω² (M − G) and K − Ω² (M + G) + 2 i Ω B.
 
 Symmetric bands are kept as LAPACK does, upper form: `band[width + i - j, j]` is entry (i, j) for i ≤ j.
 """

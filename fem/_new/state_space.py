@@ -1,14 +1,16 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
-In M q'' + C q' + K q = f let q₁ be the coordinates that move mass, q₂ those without mass that are damped, and
-q₃ the others, with zero rows and columns of M and C: nodes of a massless shaft, feet of massless pedestals.
-With v = q₁' and the signs of `fem.assembly` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …)
+In M q'' + C q' + K q = f let q₁ be the coordinates that move mass and q₂ the others, with zero rows and
+columns of M: nodes of a massless shaft, feet of massless pedestals. Singular vectors of their damping,
+Uᵀ C₂₂ V = Σ, part them in q₂ = V_a a + V_b b: a is damped, b is not. With v = q₁' and the signs of
+`fem.assembly` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …)
 
-    K₃₃ q₃  = f₃ − K₃₁ q₁ − K₃₂ q₂
-    C₂₂ q₂' = f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂ − K₂₃ q₃
-    M₁₁ v'  = f₁ − C₁₁ v − C₁₂ q₂' − K₁₁ q₁ − K₁₂ q₂ − K₁₃ q₃:
+    (U_bᵀ K₂₂ V_b) b = U_bᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ V_a a)
+    Σ_a a'           = U_aᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂)
+    M₁₁ v'           = f₁ − C₁₁ v − C₁₂ V_a a' − K₁₁ q₁ − K₁₂ q₂
 
-q₁, v and q₂ are the states. The three matrices on the left must be regular: else there is no state space.
+where C₁₂ V_b = 0: what does no negative work has no force by a velocity that is not damped itself. The states
+are q₁, v and a.
 """
 
 from __future__ import annotations
@@ -122,7 +124,8 @@ class StateSpace:
     A, B, C, D
         Shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs); SI.
     states
-        Names: `x7` a deflection, `v_x7` its velocity.
+        Names: `x7` a deflection, `v_x7` its velocity; `damped1` … massless coordinates that are damped, or
+        combinations of them.
     inputs
         `f_x7` is a force on coordinate `x7`, N (on a tilt: N·m).
     outputs
@@ -179,8 +182,8 @@ def state_space(
     ------
     ValueError
         For names that do not exist or repeat, numbers that are not finite, a singular mass matrix without a
-        zero row, massless coordinates that nothing holds or that a damper joins, or as output the velocity of
-        a coordinate with neither mass nor damping.
+        zero row, massless coordinates that nothing holds or whose velocity acts without being damped, or as
+        output the velocity of a coordinate with neither mass nor damping.
 
     Examples
     --------
@@ -205,45 +208,53 @@ def state_space(
     outputs = names if outputs is None else tuple(outputs)
     forces = _places(inputs, [f"f_{name}" for name in names], "input")
     shown = _places(outputs, [*names, *(f"v_{name}" for name in names)], "output")
-    massive, damped = (X.any(axis=0) | X.any(axis=1) for X in (M, C))
-    one, two, three = (np.flatnonzero(w) for w in (massive, damped & ~massive, ~massive & ~damped))
+    massive = M.any(axis=0) | M.any(axis=1)
+    one, two = np.flatnonzero(massive), np.flatnonzero(~massive)
+    light = np.ix_(two, two)
+    size, rate = np.sqrt(np.abs(K).max(axis=1)), np.sqrt(np.abs(K).max() / (np.abs(M).max() or 1.0))
+    unit = 1 / np.where(size > 0, size, 1.0)[two]
+    W, sigma, Vt = np.linalg.svd(unit[:, None] * C[light] * unit)
+    rank = int(np.count_nonzero(rate * sigma > 1e-13))  # the rounding of stiffness damps nothing
+    (Va, Vb), (Ua, Ub) = (np.split(unit[:, None] * X, [rank], axis=1) for X in (Vt.T, W))
+    if (rate * np.abs(C[np.ix_(one, two)] @ Vb) > 1e-9 * size[one, None]).any():
+        raise ValueError(
+            "the velocity of a massless coordinate acts on others without being damped itself: there is no "
+            "state space with velocities; make the damping symmetric, or give the coordinate mass"
+        )
+    at_once = two[(np.abs(Vt[rank:]) > 1e-9).any(axis=0)]
     for name, place in zip(outputs, shown, strict=True):
-        if place - n in three:
+        if place - n in at_once:
             raise ValueError(
                 f"output {name!r}: {name[2:]!r} has neither mass nor damping and follows forces at once: its "
                 "velocity holds their derivatives; ask for its deflection, or give it mass or damping"
             )
 
-    # Rows over the states q₁, v, q₂ and the inputs.
-    states = (*(names[i] for i in one), *(f"v_{names[i]}" for i in one), *(names[i] for i in two))
+    # Rows over the states q₁, v, a and the inputs.
+    states = [*(names[i] for i in one), *(f"v_{names[i]}" for i in one)]
+    states += [f"damped{i + 1}" for i in range(rank)]
     order = len(states)
     width = order + len(forces)
     q, velocity, load = np.zeros((3, n, width))
-    q[one], velocity[one], q[two], load[forces] = np.split(
-        np.eye(width), np.cumsum([one.size, one.size, two.size])
-    )
-    q[three] = _solved(
-        K[np.ix_(three, three)],
-        load[three] - K[three] @ q,
+    q[one], velocity[one], a, load[forces] = np.split(np.eye(width), np.cumsum([one.size, one.size, rank]))
+    q[two] = Va @ a
+    q[two] += Vb @ _solved(
+        Ub.T @ K[light] @ Vb,
+        Ub.T @ (load - C @ velocity - K @ q)[two],
         "some massless coordinates are held neither by stiffness nor by damping, or move only with "
         "derivatives of the forces (an index above 1): there is no state space; give them mass, damping "
         "or stiffness",
     )
-    velocity[two] = _solved(
-        C[np.ix_(two, two)],
-        load[two] - C[two] @ velocity - K[two] @ q,
-        "coordinates without mass are damped only together, by a damper between them, or by what is not "
-        "damped itself: there is no state space of them; give one of them mass, or damping to the ground",
-    )
-    rate = _solved(
+    damped = Ua.T @ (load - C @ velocity - K @ q)[two] / sigma[:rank, None]
+    velocity[two] = Va @ damped
+    rate_v = _solved(
         M[np.ix_(one, one)],
-        load[one] - C[one] @ velocity - K[one] @ q,
+        (load - C @ velocity - K @ q)[one],
         "the mass matrix is singular without a zero row (as with shear but without rotary inertia): "
         "there is no state space of it; give every combination of its coordinates mass",
     )
-    rates, readings = np.vstack((velocity[one], rate, velocity[two])), np.vstack((q, velocity))[shown]
+    rates, readings = np.vstack((velocity[one], rate_v, damped)), np.vstack((q, velocity))[shown]
     A, B, Y, D = (part for rows in (rates, readings) for part in np.split(rows, [order], axis=1))
-    return StateSpace(A, B, Y, D, states, inputs, outputs, motion.speed)
+    return StateSpace(A, B, Y, D, tuple(states), inputs, outputs, motion.speed)
 
 
 def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]:
@@ -256,8 +267,7 @@ def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]
 
 def _solved(matrix: FloatArray, right: FloatArray, reason: str) -> FloatArray:
     """The solution with a matrix that is regular in the scale of its rows; else the reason is raised."""
-    size = np.abs(matrix).max(axis=1, initial=0.0)
-    scale = 1 / np.sqrt(np.where(size > 0, size, 1.0))
+    scale = 1 / np.sqrt(np.abs(matrix).max(axis=1, initial=1e-300))
     if matrix.size and np.linalg.cond(scale[:, None] * matrix * scale, 1) > 1e12:
         raise ValueError(reason)
     return np.asarray(np.linalg.solve(matrix, right))
