@@ -204,9 +204,10 @@ def state_space(
             f"{n} × {n} for {n} coordinates"
         )
     M, C, K = matrices
-    inputs = tuple(f"f_{name}" for name in names) if inputs is None else tuple(inputs)
+    every = tuple(f"f_{name}" for name in names)
+    inputs = every if inputs is None else tuple(inputs)
     outputs = names if outputs is None else tuple(outputs)
-    forces = _places(inputs, [f"f_{name}" for name in names], "input")
+    forces = _places(inputs, every, "input")
     shown = _places(outputs, [*names, *(f"v_{name}" for name in names)], "output")
     massive = M.any(axis=0) | M.any(axis=1)
     one, two = np.flatnonzero(massive), np.flatnonzero(~massive)
