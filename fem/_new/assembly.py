@@ -1,30 +1,54 @@
-"""Names of the old modules until this one is written."""
+"""The equations of motion of a rotor: matrices of one plane in bands, and both planes in a basis or whole.
 
-from fem.matrices.banded_matrices import (
-    Matrices,
-    assemble,
+Unknowns of one plane: `stride` per node, the deflection w (m) first, then the tilt θ (rad); with `shear` two
+shear angles of the element to the right follow, and the last node has w and θ only. Both planes have the
+same real symmetric matrices M, K of the shaft, G (polar inertia on the tilts) and B = Σ β K of the elements.
+With rotation from x to y at the speed Ω and z = x + i y
+
+    M z'' + (B − i Ω G) z' + (K − i Ω B) z + supports = f:
+
+    x:  M x'' + B x' + Ω G y' + K x + Ω B y + supports = f_x
+    y:  M y'' + B y' − Ω G x' + K y − Ω B x + supports = f_y.
+
+Supports are matrices of (x, y) at their nodes: force −k (x, y) − c (x', y'). Internal damping at a node,
+F = −c (z' − i Ω z), is the same as material damping there, c in the place of B: a support of damping c and of
+stiffness Ω c ((0, 1), (−1, 0)). On a forward orbit z = e^{iωt} it does the work of −i c (ω − Ω): it damps
+below and drives above the speed of the whirl. Where every support is rotationally symmetric, z takes half of
+the unknowns, with scalars k = kxx − i kxy and c = cxx − i cxy. A pedestal is one more unknown in each plane.
+
+Synchronous motion z = F e^{iωt} + b̄ e^{−iωt} has x = F + b, y = −i (F − b), so that a matrix D of (x, y) acts
+on (F, b) as T⁻¹ D T with T = [[1, 1], [−i, i]]. A load f that turns with the rotor is f on x and −i f on y.
+With the same F and b at any complex λ, x = (F + b) e^{λt}, the shaft does not couple them: it is
+λ² M − i λ Ω G + (λ − i Ω) B + K on F, and with i Ω in the place of −i Ω on b; at λ = i Ω these are
+K − Ω² (M − G) and K − Ω² (M + G) + 2 i Ω B.
+
+Symmetric bands are kept as LAPACK does, upper form: `band[width + i - j, j]` is entry (i, j) for i ≤ j.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem._new.elements import (
+    Layout,
+    bending_terms,
     dense,
-    free_motions,
-    general,
-    held,
-    ignored_inertia,
+    gyroscopic_terms,
+    mass_terms,
     multiply,
-    rounding_error,
-    shaft_energy,
+    strains,
 )
-from fem.matrices.equations_of_motion import Motion, equations_of_motion
-from fem.matrices.lateral_planes import Planes, both_planes, project
-from fem.matrices.lateral_planes import Quadratic as Reduced
-from fem.matrices.support_dynamic_stiffness import Supported, on_whirl, supported, whirl_change
-from fem.matrices.undamped_matrices import FROM_XY, TO_XY, static_stiffness
-from fem.solvers.full_band import Factored, WholeBand
+from fem._new.forces import InternalDamping, kind_of
+from fem._new.rotor import Rotor, Support
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 __all__ = [
     "FROM_XY",
     "TO_XY",
     "Factored",
     "Matrices",
-    "Motion",
     "Planes",
     "Reduced",
     "Supported",
@@ -32,17 +56,448 @@ __all__ = [
     "assemble",
     "both_planes",
     "dense",
-    "equations_of_motion",
     "free_motions",
-    "general",
     "held",
     "ignored_inertia",
     "multiply",
-    "on_whirl",
     "project",
     "rounding_error",
-    "shaft_energy",
     "static_stiffness",
     "supported",
     "whirl_change",
 ]
+
+TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
+FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """The assembled rotor, one plane.
+
+    Attributes
+    ----------
+    shaft
+        Stiffness of the shaft (and tilting springs) without the supports' stiffness, upper band of shape
+        (width + 1, size).
+    mass
+        Shaft and discs; tilting inertia if the model has `rotary_inertia`.
+    gyroscopic
+        G, polar inertia of shaft and discs on the slopes; zero unless the model has `gyroscopic`.
+    material
+        B, Σ β K of the elements, and internal damping at nodes.
+    stride, width
+        Unknowns per node, and entries of a band above its diagonal.
+    """
+
+    shaft: FloatArray
+    mass: FloatArray
+    gyroscopic: FloatArray
+    material: FloatArray
+    stride: int
+    width: int
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.shaft.shape[1])
+
+    def deflection(self, node: int) -> int:
+        """Unknown, from 0, of the deflection of a node, from 1; that of its slope is the next."""
+        return self.stride * (node - 1)
+
+    @property
+    def deflections(self) -> IndexArray:
+        """Unknowns of the deflections of all nodes, shape (N,)."""
+        return np.arange(0, self.size, self.stride)
+
+
+def assemble(rotor: Rotor) -> Matrices:
+    """Matrices of a rotor.
+
+    Raises
+    ------
+    ValueError
+        For a rotor with forces that are not linear.
+    """
+    layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
+    stiffness = bending_terms(rotor)
+    damping = [(beta * factor, form) for factor, form in stiffness] if beta.any() else []
+    terms = (stiffness, mass_terms(rotor), gyroscopic_terms(rotor), damping)
+    K, M, G, B = (layout.band(each) for each in terms)
+    A = Matrices(K, M, G, B, layout.stride, layout.width)
+    for disc in rotor.discs:
+        w = A.deflection(disc.node)
+        M[-1, w] += disc.mass
+        M[-1, w + 1] += disc.diametral_inertia * model.rotary_inertia
+        G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
+    for support in rotor.supports:
+        K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
+    for force in rotor.forces:
+        if not isinstance(force, InternalDamping):
+            kind = kind_of(force).replace("_", " ")
+            raise ValueError(
+                f"the {kind} at node {force.node} is not linear, and this asks for linear equations: "
+                "write the coefficients of all such forces at rest first, `rotorid bearings ROTOR --speeds "
+                "A:B --output linear.toml`, or take rotor.linear, which leaves them out"
+            )
+        B[-1, A.deflection(force.node)] += force.damping
+    return A
+
+
+def free_motions(rotor: Rotor, held: set[int]) -> int:
+    """Number of rigid-body motions, of 2, left by springs at the nodes `held` and by tilting springs."""
+    tilting = any(support.tilting_stiffness > 0 for support in rotor.supports)
+    return max(2 - len(held) - tilting, 0) if held else 2 - tilting
+
+
+def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
+    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
+    free = np.ones(band.shape[1])
+    free[unknowns] = 0.0
+    K = np.asfortranarray(band * free)
+    for above in range(1, len(K)):
+        K[-1 - above, above:] *= free[:-above]
+    K[-1, unknowns] = 1.0
+    return K
+
+
+def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
+    """Relative error of xᴴ K x that rounding the entries of K may cause, for each column of X, shape (m,).
+
+    It grows with the fourth power of the number of elements: about 1e-13 at 20, 1e-5 at 2000. Solutions
+    of K x = f are wrong by as much. The `energy` xᴴ K x is computed unless it is known.
+    """
+    if energy is None:
+        energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
+    size = np.abs(X)
+    scatter = (size * multiply(np.abs(band), size)).sum(axis=0)
+    return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
+
+
+def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
+    """One warning for each disc whose moments of inertia the model leaves out."""
+    moments = (
+        ("diametral", "no rotary inertia", rotor.model.rotary_inertia),
+        ("polar", "no gyroscopic effect", rotor.model.gyroscopic),
+    )
+    warnings = []
+    for disc in rotor.discs:
+        missing = {
+            kind: effect
+            for kind, effect, counted in moments
+            if not counted and getattr(disc, f"{kind}_inertia") > 0
+        }
+        if missing:
+            what = "moments of inertia are" if len(missing) > 1 else f"{min(missing)} moment of inertia is"
+            name = f" {disc.name!r}" if disc.name else ""
+            effects = " and ".join(missing.values())
+            warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {effects}")
+    return tuple(warnings)
+
+
+def static_stiffness(support: Support, speed: float) -> FloatArray:
+    """Symmetric part of a support's stiffness without its pedestal, N/m, shape (2, 2).
+
+    The antisymmetric part (kxy − kyx)/2 does work over an orbit, as damping does: it belongs to no
+    conservative rotor.
+    """
+    k = support.at(speed)[0]
+    return np.asarray((k + k.T) / 2)
+
+
+def _internal(rotor: Rotor) -> list[InternalDamping]:
+    return [force for force in rotor.forces if isinstance(force, InternalDamping)]
+
+
+def _turned(D: AnyArray) -> ComplexArray:
+    """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
+    return np.asarray(FROM_XY @ D @ TO_XY)
+
+
+@dataclass(frozen=True, eq=False)
+class Supported:
+    """Dynamic stiffness at the supported nodes at synchronous vibration, all that stands at a node added up.
+
+    Attributes
+    ----------
+    nodes
+        Numbers from 1, length s.
+    stiffness
+        D on forward and backward amplitudes (F, b), N/m, shape (S, s, 2, 2); on rotationally symmetric
+        supports only entry (0, 0) matters.
+    reference
+        Real spring nearest to D at each node, N/m, shape (s,): what the conservative rotor stands on.
+    planes
+        1: forward only; 2: forward and backward are coupled.
+    """
+
+    nodes: tuple[int, ...]
+    stiffness: ComplexArray
+    reference: FloatArray
+    planes: int
+
+
+def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
+    """Dynamic stiffness of all supports, and of internal damping at nodes, at speeds in rad/s.
+
+    Internal damping takes no part in forward whirl, which does not strain what turns with the shaft.
+
+    Raises
+    ------
+    ValueError
+        If a speed lies outside a bearing table.
+    """
+    attached = [support.node for support in rotor.supports] + [damper.node for damper in _internal(rotor)]
+    nodes = tuple(dict.fromkeys(attached))
+    stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
+    for support in rotor.supports:
+        stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
+    for damper in _internal(rotor):
+        stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
+    # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
+    reference = np.maximum(np.median(stiffness[..., 0, 0].real, axis=0), 0.0)
+    return Supported(nodes, stiffness, reference, 1 if rotor.symmetric else 2)
+
+
+def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArray:
+    """The differential between two neighbouring supports on (F, b), no digits lost to the pedestal.
+
+    Bearing B and pedestal S in series are D = B − B (B + S)⁻¹ B: dD = S G dB G S + B G dS G B, G = (B + S)⁻¹.
+    """
+    (B, S), (other, beneath) = (support.dynamic_parts(speeds) for support in (more, less))
+    change = B - other
+    if S is not None and beneath is not None:
+        moved, B, S = S - beneath, (B + other) / 2, (S + beneath) / 2
+        G = np.linalg.inv(B + S)
+        change = S @ G @ change @ G @ S + B @ G @ moved @ G @ B
+    return _turned(change)
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """A rotor as both planes see it.
+
+    Attributes
+    ----------
+    rotor, A
+        The rotor and its single-plane bands.
+    planes
+        2: unknowns x and y, real matrices; 1: the complex coordinate z, complex matrices.
+    rows
+        Unknown of the deflection at each support, from 0, shape (s,).
+    pedestals
+        Which supports stand on a pedestal, shape (f,).
+    feet
+        Mass, stiffness and damping of the pedestals, shape (3, f, planes).
+    """
+
+    rotor: Rotor
+    A: Matrices
+    planes: int
+    rows: IndexArray
+    pedestals: IndexArray
+    feet: FloatArray
+
+    def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
+        """Stiffness and damping of all supports, each of shape (S, s, planes, planes).
+
+        Raises
+        ------
+        ValueError
+            Outside the table of a support.
+        """
+        parts = [support.at(speeds) for support in self.rotor.supports]
+        k, c = np.array(parts).reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
+        if self.planes == 1:
+            k, c = (X[..., :1, :1] - 1j * X[..., :1, 1:] for X in (k, c))
+        return k, c
+
+
+def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
+    """Look at a rotor in both planes; by default with the complex coordinate where that is enough."""
+    one = rotor.symmetric if complex_coordinate is None else complex_coordinate
+    A, p = assemble(rotor), 1 if one else 2
+    rows = [A.deflection(support.node) for support in rotor.supports]
+    pedestals = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
+    feet = [(2 * (foot.mass,), foot.xy("stiffness"), foot.xy("damping")) for foot in pedestals.values()]
+    return Planes(
+        rotor,
+        A,
+        p,
+        np.array(rows, np.intp),
+        np.array(list(pedestals), np.intp),
+        np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """λ² M + λ (D₀ + Ω D₁ + supports) + K₀ + Ω K₁ + supports, in a basis of d shaft vectors per plane.
+
+    Unknowns: d per plane, plane after plane, then the pedestals, again plane after plane; R in all.
+
+    Attributes
+    ----------
+    P
+        The rotor.
+    basis
+        Vectors of one plane, shape (size, d).
+    M, D0, D1, K0, K1
+        Shape (R, R).
+    ties
+        What a unit entry (i, j) of each support's matrices adds, shape (s · planes², R²).
+    """
+
+    P: Planes
+    basis: FloatArray
+    M: FloatArray
+    D0: FloatArray
+    D1: AnyArray
+    K0: FloatArray
+    K1: AnyArray
+    ties: FloatArray
+
+    @property
+    def size(self) -> int:
+        """R."""
+        return len(self.M)
+
+    def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
+        """D and K at each speed, shape (S, R, R)."""
+        omega, (k, c) = speeds[:, None, None], self.P.supports(speeds)
+
+        def matrix(constant: FloatArray, turning: AnyArray, supports: AnyArray) -> AnyArray:
+            entries = supports.reshape(speeds.size, len(self.ties))
+            return constant + omega * turning + (entries @ self.ties).reshape(-1, *constant.shape)
+
+        return matrix(self.D0, self.D1, c), matrix(self.K0, self.K1, k)
+
+    def expand(self, vectors: AnyArray) -> AnyArray:
+        """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
+        planes, d = self.P.planes, self.basis.shape[1]
+        coefficients = vectors[..., : planes * d].reshape(*vectors.shape[:-1], planes, d)
+        return np.asarray(coefficients @ self.basis.T)
+
+    def nodes(self, vectors: AnyArray) -> AnyArray:
+        """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
+        return np.asarray(self.expand(vectors)[..., :: self.P.A.stride])
+
+
+def project(P: Planes, basis: FloatArray) -> Reduced:
+    """The equations in a basis of the shaft, shape (size, d), the same in both planes.
+
+    Stiffness and material damping are summed from strains: so they keep their digits on any mesh.
+    """
+    d, p, f = basis.shape[1], P.planes, len(P.pedestals)
+    strain = strains(P.rotor, basis)
+    beta = np.tile(P.rotor.material_damping, len(strain))[:, None]
+    strain = strain.reshape(-1, d)
+    K, B = strain.T @ strain, strain.T @ (beta * strain)
+    for support in P.rotor.supports:
+        tilt = basis[P.A.deflection(support.node) + 1]
+        K += support.tilting_stiffness * np.outer(tilt, tilt)
+    for damper in _internal(P.rotor):
+        w = basis[P.A.deflection(damper.node)]
+        B += damper.damping * np.outer(w, w)
+    M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
+    # Force in x from y, and with the opposite sign in y from x; or the same of z.
+    along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
+    mass, stiffness, damping = P.feet
+
+    def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
+        """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
+        matrix = np.zeros((p * (d + f), p * (d + f)), sides.dtype)
+        both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]
+        matrix[: p * d, : p * d] = both.reshape(p * d, p * d)
+        np.fill_diagonal(matrix[p * d :, p * d :], pedestals.T.ravel())
+        return matrix
+
+    # What a support feels: motion of its node against the ground or the foot, in each plane.
+    felt = np.zeros((len(P.rows), p, p * (d + f)))
+    for plane in range(p):
+        felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
+        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
+    none = np.zeros_like(mass)
+    terms = (
+        (along, M, mass),
+        (along, B, damping),
+        (across, G, none),
+        (along, K, stiffness),
+        (across, B, none),
+    )
+    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
+    M, D0, D1, K0, K1 = (whole(*term) for term in terms)
+    return Reduced(P, basis, M, D0, D1, K0, K1, ties)
+
+
+class WholeBand:
+    """The full model at complex frequencies, its bands prepared once; pedestals are condensed.
+
+    F and b alternate, or F = z stands alone; the supports alone couple them.
+    """
+
+    def __init__(self, P: Planes) -> None:
+        A, p = P.A, P.planes
+        self.P, self.size, self.reach = P, p * A.size, p * A.width
+        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex).reshape(4, -1)
+        self._from: AnyArray = FROM_XY if p == 2 else np.eye(1)
+        self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
+
+    def factor(self, value: complex, speed: float) -> Factored:
+        """LU factors of λ² M + λ D + K at one λ and speed."""
+        from scipy.linalg.lapack import zgbtrf
+
+        P, p, reach, width = self.P, self.P.planes, self.reach, self.P.A.width
+        band = np.zeros((3 * reach + 1, self.size), complex, order="F")
+        for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
+            powers = np.array([value * value, -value * turning, value - turning, 1.0])
+            upper = (powers @ self._bands).reshape(width + 1, -1)
+            for off in range(width + 1):
+                entries = upper[width - off, off:]
+                band[2 * reach - p * off, p * off + plane :: p] = entries
+                band[2 * reach + p * off, plane : self.size - p * off : p] = entries
+        k, c = P.supports(np.array([speed]))
+        D = k[0] + value * c[0]
+        for i, (m, stiffness, damping) in zip(P.pedestals, np.moveaxis(P.feet, 1, 0), strict=True):
+            stand = stiffness + value * damping + value**2 * m
+            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(stand), D[i])
+        for row, matrix in zip(P.rows, self._from @ D @ self._to, strict=True):
+            for a, b in np.ndindex(p, p):
+                band[2 * reach + a - b, p * row + b] += matrix[a, b]
+        lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
+        if info > 0:  # singular to the last bit: an eigenvalue
+            lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
+        return Factored(p, reach, lu, pivots)
+
+    def interleaved(self, X: AnyArray) -> ComplexArray:
+        """From (…, planes, size) to the order of the band, (…, planes · size)."""
+        return np.swapaxes(self._from @ X, -1, -2).reshape(*X.shape[:-2], self.size)
+
+    def planes(self, X: AnyArray) -> AnyArray:
+        """Back to (…, planes, size)."""
+        alternating = X.reshape(*X.shape[:-1], -1, self.P.planes)
+        return np.asarray(self._to @ np.swapaxes(alternating, -1, -2))
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """Solutions with one factored matrix."""
+
+    planes: int
+    reach: int
+    lu: ComplexArray
+    pivots: AnyArray
+
+    def solve(self, b: ComplexArray, *, transposed: bool = False) -> ComplexArray:
+        """P⁻¹ b, or P⁻ᵀ b, for b of shape (size,) or (size, m).
+
+        The transpose in x and y is that in (F, b) with both of them exchanged: Tᵀ T = 2 ((0, 1), (1, 0)).
+        """
+        from scipy.linalg.lapack import zgbtrs
+
+        order = np.arange(len(b))
+        if transposed and self.planes == 2:
+            order ^= 1
+        x, _ = zgbtrs(self.lu, self.reach, self.reach, b[order], self.pivots, trans=int(transposed))
+        return np.asarray(x[order])

@@ -8,8 +8,7 @@ from exact_solutions import SOLVERS
 
 import fem
 from balancing import Influence, Labels, correct
-from fem.matrices.lateral_planes import both_planes
-from fem.solvers.full_band import WholeBand
+from fem._new.assembly import WholeBand, both_planes
 from rotorid.reduction import equivalent_masses, natural_frequencies
 
 MASS, BETA, SPEED = 20.0, 2e-5, 300.0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from repetitions import FULL as WHOLE
 
 import fem
-from fem.matrices.banded_matrices import assemble, dense
+from fem._new.assembly import assemble, dense
 
 FULL = fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
 MASS, EI = 12.0, 2.1e11 * math.pi * 0.04**4 / 64

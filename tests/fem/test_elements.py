@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.matrices.banded_matrices import assemble, dense, shaft_energy
+from fem._new.assembly import assemble, dense
+from fem._new.elements import strains
 
 # E = 2.1e11 Pa, ρ = 7850 kg/m³, D = 0.1 m, L = 1 m, rad/s.
 SIMPLY = [1276.18775, 5104.75102, 11485.68979]
@@ -76,49 +77,6 @@ def test_hollow_timoshenko_shafts_of_any_material(nu, inner, rotary, k):
     assert fem.critical_speeds(rotor, 3).frequencies[k - 1] == pytest.approx(exact, rel=1.1 * (k / 48) ** 4)
 
 
-def przemieniecki(n):
-    """First frequencies of the simply supported shaft with the peers' two-node Timoshenko element."""
-    import scipy.linalg
-
-    E, rho, D, nu, L = 2.1e11, 7850.0, 0.1, 0.3, 1.0 / n
-    area, moment = math.pi / 4 * D**2, math.pi / 64 * D**4
-    kappa = 6 * (1 + nu) / (7 + 6 * nu)
-    phi = 12 * E * moment / (kappa * E / 2 / (1 + nu) * area * L * L)
-    # w = N q with the shear angle γ = −φ L² w''' / 12 constant in the element.
-    # Cubic w(ξ) = Σ a ξ^i, θ = w'/L + φ w'''/(12 L): end values (w₁, θ₁, w₂, θ₂) from a.
-    third = 6 * phi / (12 * L)
-    ends = np.array([[1, 0, 0, 0], [0, 1 / L, 0, third], [1, 1, 1, 1], [0, 1 / L, 2 / L, 3 / L + third]])
-    T = np.linalg.inv(ends)
-    g, weight = np.polynomial.legendre.leggauss(5)
-    g, weight = (g + 1) / 2, weight / 2 * L
-    zero = np.zeros_like(g)
-    w = np.stack((g**0, g, g**2, g**3))
-    tilt = np.stack((zero, g**0 / L, 2 * g / L, 3 * g**2 / L + third))
-    bend = np.stack((zero, zero, 2 + zero, 6 * g)) / L**2
-    shear = np.stack((zero, zero, zero, third + zero))
-
-    def form(factor, f):
-        return factor * T.T @ np.einsum("ig,jg,g->ij", f, f, weight) @ T
-
-    k = form(E * moment, bend) + form(kappa * E / 2 / (1 + nu) * area, shear)
-    m = form(rho * area, w) + form(rho * moment, tilt)
-    K, M = np.zeros((2, 2 * n + 2, 2 * n + 2))
-    for i in range(n):
-        s = slice(2 * i, 2 * i + 4)
-        K[s, s] += k
-        M[s, s] += m
-    keep = [i for i in range(2 * n + 2) if i not in (0, 2 * n)]
-    mu = scipy.linalg.eigh(M[np.ix_(keep, keep)], K[np.ix_(keep, keep)], eigvals_only=True)
-    return 1 / np.sqrt(mu[:-4:-1])
-
-
-def test_the_two_node_element_of_the_peers_reaches_only_the_second_power():
-    e = np.array([przemieniecki(n) for n in (16, 32, 64)]) / TIMOSHENKO - 1
-    np.testing.assert_allclose(np.log2(np.abs(e[:-1] / e[1:]))[:, 1:], 2.0, atol=0.1)
-    ours = errors(lambda n: pinned(n, model=FULL), TIMOSHENKO, (16,))
-    assert (np.abs(ours) < 0.2 * np.abs(e[0])).all()
-
-
 def test_slender_shafts_lock_not_and_tend_to_euler_bernoulli():
     for n in (2, 8):
         thin = fem.Rotor(
@@ -178,7 +136,7 @@ def test_energies_are_those_of_the_continuous_element(seed, shear, rotary):
         (A.material, 1e-4 * strain),
     ):
         assert q @ dense(band) @ q == pytest.approx(expected, rel=1e-9)
-    assert shaft_energy(rotor, q[:, None])[0] == pytest.approx(strain, rel=1e-9)
+    assert (strains(rotor, q[:, None]) ** 2).sum() == pytest.approx(strain, rel=1e-9)
     assert A.deflection(2) == A.size - 2
 
 

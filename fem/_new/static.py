@@ -1,0 +1,206 @@
+"""Static compliance, and the deflection of a resting or turning rotor under its weight.
+
+K x + Ω B y + kxx x + kxy y = f_x and K y − Ω B x + kyx x + kyy y = f_y with the matrices of `fem.assembly`:
+the whole band at the frequency 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fem._new.assembly import Planes, WholeBand, both_planes, multiply, rounding_error
+from fem._new.rotor import Rotor
+from fem._new.undamped import whole_rotor
+from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.checks import number
+from rotorid.base.json import plain
+from rotorid.base.tables import Column, Table, frame, html, terminal
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["GRAVITY", "StaticDeflection", "compliance", "static_deflection"]
+
+GRAVITY = 9.80665  # m/s²
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StaticDeflection:
+    """A rotor under its own weight.
+
+    Attributes
+    ----------
+    x, y
+        Deflection of each node, m, shape (N,).
+    reaction_x, reaction_y
+        Force of each support on the rotor, N, shape (B,).
+    weight
+        N.
+    rotor
+        The rotor.
+    speed
+        Of rotation, rad/s.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    reaction_x: FloatArray
+    reaction_y: FloatArray
+    weight: float
+    rotor: Rotor
+    speed: float
+
+    @property
+    def deflection(self) -> FloatArray:
+        """Size of the deflection of each node, m, shape (N,)."""
+        return np.hypot(self.x, self.y)
+
+    def tables(self) -> tuple[Table, ...]:
+        """The deflection, a row for each node; and the reactions."""
+        supports = self.rotor.supports
+        nodes = (
+            Column("node", range(1, self.rotor.n_nodes + 1)),
+            Column("position_m", self.rotor.positions, "{:.6g}".format, "positions_m.*"),
+            Column("x_m", self.x, "{:.4g}".format, "x_m.*"),
+            Column("y_m", self.y, "{:.4g}".format, "y_m.*"),
+        )
+        reactions = (
+            Column("support", [support.name or f"node {support.node}" for support in supports]),
+            Column("reaction x, N", self.reaction_x, "{:.6g}".format, "reactions.*.x_N"),
+            Column("y, N", self.reaction_y, "{:.6g}".format, "reactions.*.y_N"),
+        )
+        return Table("deflection", nodes), Table("reactions", reactions)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per node."""
+        return frame(self.tables()[0])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        reactions = zip(self.rotor.supports, self.reaction_x, self.reaction_y, strict=True)
+        return plain(
+            {
+                "speed_rad_s": self.speed,
+                "weight_N": self.weight,
+                "positions_m": self.rotor.positions,
+                "x_m": self.x,
+                "y_m": self.y,
+                "reactions": [{"node": support.node, "x_N": x, "y_N": y} for support, x, y in reactions],
+            }
+        )
+
+    def sentence(self) -> str:
+        """Weight and largest deflection."""
+        k = int(np.argmax(self.deflection))
+        largest = f"{1e6 * self.deflection[k]:.4g} µm at node {k + 1}"
+        return f"Weight {self.weight:.6g} N; largest deflection {largest}"
+
+    def summary(self) -> str:
+        """Weight, largest deflection and reactions, as text."""
+        return f"{self.sentence()}\n{terminal(self.tables()[1])}"
+
+    def __repr__(self) -> str:
+        return f"StaticDeflection({self.sentence()})"
+
+    def _repr_html_(self) -> str:
+        return "\n".join(map(html, self.tables()))
+
+
+def static_deflection(
+    rotor: Rotor, speed: float = 0.0, *, direction: float = -90.0, gravity: float = GRAVITY
+) -> StaticDeflection:
+    """Compute the deflection under the rotor's weight, and the reactions of its supports.
+
+    Parameters
+    ----------
+    rotor
+        The rotor, held by its supports in both directions.
+    speed
+        Of rotation, rad/s: where bearing tables are read, and where material or internal damping, if there
+        is any, bends the turning shaft sideways.
+    direction
+        Of gravity, degrees from x with the rotation; −y by default.
+    gravity
+        m/s².
+
+    Raises
+    ------
+    ValueError
+        If the supports leave the rotor free, the speed lies outside a bearing table, or float64 does not
+        carry the answer.
+    """
+    speed, gravity = number(speed, "speed"), number(gravity, "gravity")
+    angle = np.radians(number(direction, "direction", signed=True))
+    P = both_planes(rotor, complex_coordinate=False)
+    A = P.A
+    ones = np.zeros((A.size, 1))
+    ones[A.deflections] = 1.0
+    along = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
+    weight = gravity * multiply(A.mass, ones)[:, 0]
+    X = _solved(P, np.outer(along, weight)[None], speed)[0]
+    springs = [support.dynamic_stiffness(0.0, speed).real for support in rotor.supports]
+    moved = [X[:, A.deflection(support.node)] for support in rotor.supports]
+    reactions = -np.einsum("sij,sj->is", springs, moved)
+    x, y = X[:, A.deflections]
+    read_only(x, y, reactions)
+    return StaticDeflection(x, y, reactions[0], reactions[1], gravity * rotor.total_mass, rotor, speed)
+
+
+def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> FloatArray:
+    """Compute the deflections of some nodes under unit forces at these nodes, [S] (47).
+
+    Forces and deflections are those in x. On supports that couple x and y the rotor moves in y, too, and the
+    matrix is symmetric only if kxy = kyx.
+
+    Parameters
+    ----------
+    rotor
+        The rotor, held by stiffness at two nodes at least.
+    nodes
+        Node numbers, from 1, or names of stations; n of them.
+    speed
+        Where bearing tables are read, rad/s; damping that turns with the shaft is left out.
+
+    Returns
+    -------
+    numpy.ndarray
+        α, m/N, shape (n, n); entry (i, j) is the deflection of node i under a force at node j.
+
+    Raises
+    ------
+    ValueError
+        If the supports leave the rotor free, or a node does not exist, or the mesh is so fine that float64
+        carries fewer than about three digits.
+    """
+    P = both_planes(rotor, complex_coordinate=False)
+    P = replace(P, A=replace(P.A, material=np.zeros_like(P.A.material)))
+    unknowns = np.array([P.A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
+    forces = np.zeros((unknowns.size, 2, P.A.size))
+    forces[np.arange(unknowns.size), 0, unknowns] = 1.0
+    alpha = _solved(P, forces, number(speed, "speed"))[:, 0, unknowns].T
+    symmetric = all(support.plain for support in rotor.supports)
+    return np.asarray((alpha + alpha.T) / 2 if symmetric else alpha)
+
+
+def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
+    """Deflections under forces at rest, both of shape (m, 2, size)."""
+    if whole_rotor(P.rotor, P.A, speed).rigid.shape[1]:
+        raise ValueError(
+            "a rotor that is not held has no static compliance, and no rest under its weight: give stiffness "
+            "to supports at two nodes"
+        )
+    band = WholeBand(P)
+    X = band.planes(band.factor(0.0, speed).solve(band.interleaved(forces).T).T).real
+    work = np.abs((forces * X).sum(axis=(1, 2)))
+    lost = np.add(*(rounding_error(P.A.shaft, X[:, plane].T, work) for plane in (0, 1)))
+    if not (lost[forces.any(axis=(1, 2))] < 1e-3).all():
+        raise ValueError(
+            f"the compliance of {P.rotor.n_elements} elements on these supports is lost in float64; "
+            "join neighbouring elements (50 to 200 are ample for a rotor) or check the support stiffness"
+        )
+    # What rounding alone moves across does not move.
+    return np.where(np.abs(X) < 1e-9 * np.abs(X).max(axis=1, keepdims=True), 0.0, X)
