@@ -9,6 +9,7 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
+from fem._new.whirl import WhirlModes, whirl_modes
 from fem.api684_peaks import Peak, Peaks, required_margin
 from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
@@ -36,7 +37,6 @@ from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
 from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
-from fem.whirl import WhirlModes, whirl_modes
 from fem.windows import Window
 
 __all__ = [
