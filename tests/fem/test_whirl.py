@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
-from fem.matrices.lateral_planes import both_planes
-from fem.solvers.reduced_whirl import solve_whirl
+from fem._new.assembly import both_planes
+from fem._new.whirl import solve_whirl
 
 
 def relative(found, expected):
@@ -53,7 +53,7 @@ def test_the_estimated_error_is_the_true_one(times):
     speeds = np.linspace(0.0, 1000.0, 21)
     fast = solve_whirl(both_planes(rotor), speeds, 8)
     exact = [whirl_exactly(rotor, speed, 8).eigenvalues for speed in speeds[::5]]
-    error = relative(fast.found.values[::5], np.array(exact))
+    error = relative(fast.values[::5], np.array(exact))
     assert error < 3e-8
     assert error < 5 * fast.error
 
@@ -149,8 +149,8 @@ def test_complex_coordinate_equals_two_planes(shear):
     one = solve_whirl(both_planes(rotor), speeds, 8)
     two = solve_whirl(both_planes(rotor, complex_coordinate=False), speeds, 8)
     assert (one.Q.P.planes, two.Q.P.planes) == (1, 2)
-    z = one.found.values
-    np.testing.assert_allclose(np.where(z.imag < 0, z.conj(), z), two.found.values, rtol=5e-8)
+    z = one.values
+    np.testing.assert_allclose(np.where(z.imag < 0, z.conj(), z), two.values, rtol=5e-8)
 
 
 def test_directions_of_a_symmetric_rotor():

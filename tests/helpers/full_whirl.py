@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fem.matrices.lateral_planes import Planes, project
-from fem.solvers.quadratic_eigenvalues import solve
-from fem.solvers.whirl_basis import reference
+from fem._new.assembly import Planes, project
+from fem._new.whirl import reference, solve
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _DENSE = 400  # unknowns of both planes up to which all eigenvalues are computed
@@ -29,17 +28,13 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
         Number of rigid-body motions.
     """
     speeds = np.array([speed])
-    scale = reference(P, speeds, 2).scale
+    scale = reference(P, speeds, 1)[1]
     if P.planes * P.A.size <= _DENSE:
         Q = project(P, np.eye(P.A.size))
-        found = solve(Q, speeds, n, scale)
-        there = np.isfinite(found.values[0])
-        return (
-            found.values[0, there],
-            Q.expand(found.vectors[0, there]),
-            found.real[0],
-            int(found.still[0]),
-        )
+        whirl = solve(Q, speeds, n, scale)
+        there = np.isfinite(whirl.values[0])
+        shapes = Q.expand(whirl.vectors[0, there])
+        return whirl.values[0, there], shapes, whirl.real[0], int(whirl.still[0])
     return _arnoldi(P, speed, n, scale)
 
 
