@@ -227,8 +227,7 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
     A, U = P.A, spectrum.factor
     loads = np.hstack((multiply(A.mass, spectrum.vectors), np.eye(A.size)[:, P.rows]))
     Y = np.linalg.qr(dtbtrs(U, loads, trans="T")[0])[0]
-    step = 1 + speeds.size // _FEW
-    some = speeds[(speeds.size - 1) % step :: step]
+    some = speeds[:: -1 - speeds.size // _FEW][::-1]  # with the last, where gyroscopic loads are largest
     while True:
         X = dtbtrs(U, Y)[0]
         Q = project(P, X)
