@@ -8,8 +8,8 @@ from full_whirl import exact_modes
 
 import fem
 import fem.response
+from fem._new.assembly import both_planes
 from fem._new.whirl import WhirlModes, in_both_planes, missing_modes
-from fem.matrices.lateral_planes import both_planes
 
 
 def exactly(function, *arguments, **named):
