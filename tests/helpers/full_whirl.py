@@ -54,11 +54,11 @@ def _arnoldi(
         u, v = state[:R], state[R:]
         return np.concatenate((v, -lu.solve(np.asarray(M @ u + D @ v))))
 
-    operator = LinearOperator((2 * R, 2 * R), matvec=times, dtype=P.dtype)
+    operator = LinearOperator((2 * R, 2 * R), matvec=times, dtype=K.dtype)
     wanted = (3 - P.planes if P.planes == 1 else 2) * n + 8
     while True:
         wanted = min(wanted, 2 * R - 2)
-        start = np.cos(np.arange(2 * R)).astype(P.dtype)
+        start = np.cos(np.arange(2 * R)).astype(K.dtype)
         mu, states = eigs(
             operator, k=wanted, which="LM", v0=start, ncv=min(2 * R, 3 * wanted + 20), maxiter=10000
         )
