@@ -52,7 +52,7 @@ NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
 DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 _TOLERANCE = 6e-9  # of eigenvalues, relative to their size
-_FEW = 5  # speeds, about, for which the basis is made first
+_FEW = 8  # speeds, about, for which the basis is made first
 _MORE = 3  # modes of a plane beyond those asked for
 _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
