@@ -2,19 +2,18 @@
 
 λ² M + λ D(Ω) + K(Ω) of both planes (see `assembly`) is solved in one basis of the shaft for all speeds.
 
-Basis. Let K₀ be the stiffness of the rotor on the mean of its supports, σ ≥ 0, and Uᵀ U = K₀ + σ M. The
+Basis. Let K₀ be the stiffness of the rotor on springs like its supports, σ ≥ 0, and Uᵀ U = K₀ + σ M. The
 basis begins with the static answers to the inertia of the lowest modes of K₀ and to unit forces at the
-supports, so that K − K₀ never leaves its loads. For a pair (λ, x) of the reduced equations the shaft is then
-left with the loads
+supports, so that no force of a support is ever missing. For a pair (λ, x) of the reduced equations the shaft
+is left with the loads
 
     r = (λ² − σ) M x + λ B x + Ω J (λ G + B) x,      J (x, y) = (y, −x), or −i of z = x + i y,
 
-less those that the basis answers. With e the part of U⁻ᵀ r outside of the images U x of the basis, the
-relative error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x): it is of second order, as a Rayleigh quotient's.
-(x has unit strain energy xᴴ K₀ x, and the larger |e|² is the estimate.)
-The largest directions of all e (static answers to gyroscopic loads, to the inertia of the support vectors,
-to material damping that differs along the shaft) join the basis, until the errors at the first, the middle
-and the last speed are small. Images are orthonormal, in which low modes keep their digits.
+as far as the basis does not answer them: with e the part of U⁻ᵀ r outside of its images U x, the relative
+error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x), of second order as that of a Rayleigh quotient. Vectors
+have xᴴ K₀ x ≈ 1, images are orthonormal (in them low modes keep their digits), and |e|² is the estimate.
+Where it is too large the largest directions of all such e join the basis: they are static answers to
+gyroscopic loads, to the inertia of the support vectors, to material damping that differs along the shaft.
 
 Eigenvalues. With λ = σ + 1/μ the problem is μ² K_σ + μ D_σ + M with K_σ = K + σ D + σ² M and
 D_σ = D + 2 σ M: the slowest modes are the largest μ, and mass may be zero. σ > 0 leaves room for rigid-body
@@ -32,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem._new.assembly import Planes, Reduced, assemble, both_planes, multiply, project
-from fem._new.response import whirl_direction
+from fem._new.response import DIRECTION_NAMES, whirl_direction
 from fem._new.rotor import Rotor, Support
 from fem._new.undamped import Result, Spectrum, finite_modes, lowest_modes
 from rotorid.base.answer import Answer
@@ -50,7 +49,6 @@ GROWTH = 1e-14
 """Re λ / |λ| above which a mode grows: rounding of what damps and drives it."""
 NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
-DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 _TOLERANCE = 6e-9  # of eigenvalues, relative to their size
 _FEW = 8  # speeds, about, for which the basis is made first
 _SHIFT = 0.3  # σ in units of the reference frequency
@@ -106,7 +104,8 @@ def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     still = size < _STILL * scale
     oscillates = ~still & (frequency > _REAL * size)
     wanted = oscillates if Q.P.planes == 1 else oscillates & (lam.imag > 0)
-    rows, order = np.arange(len(lam))[:, None], np.argsort(np.where(wanted, frequency, np.inf), axis=1)[:, :m]
+    key = np.where(wanted, frequency, np.inf)
+    rows, order = np.arange(len(lam))[:, None], np.argsort(key, axis=1, kind="stable")[:, :m]
     missing = ~wanted[rows, order]
     values = lam[rows, order]
     values[missing] = 1j * scale
