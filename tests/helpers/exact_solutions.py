@@ -8,8 +8,8 @@ from full_whirl import exact_modes
 
 import fem
 import fem.response
-from fem.matrices.lateral_planes import both_planes
-from fem.whirl import WhirlModes, in_both_planes, missing_modes
+from fem._new.assembly import both_planes
+from fem._new.whirl import WhirlModes, in_both_planes, missing_modes
 
 
 def exactly(function, *arguments, **named):
@@ -33,7 +33,7 @@ def whirl_exactly(rotor, speed, n=6):
     values, vectors, real, still = exact_modes(P, float(speed), n)
     lam, x, y = in_both_planes(values, vectors[:, :, :: P.A.stride])
     size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
-    said = missing_modes(P.planes, real, still, lam.size, n)
+    said = missing_modes(real, still, lam.size, n)
     return WhirlModes(float(speed), lam, x.T / size, y.T / size, real, 0.0, rotor, said)
 
 

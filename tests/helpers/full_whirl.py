@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-from typing import Any
-
 import numpy as np
 
-from fem.matrices.lateral_planes import Planes, project
-from fem.solvers.quadratic_eigenvalues import solve
-from fem.solvers.whirl_basis import reference
+from fem._new.assembly import Planes, project
+from fem._new.whirl import reference, solve
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _DENSE = 400  # unknowns of both planes up to which all eigenvalues are computed
@@ -29,17 +25,13 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
         Number of rigid-body motions.
     """
     speeds = np.array([speed])
-    scale = reference(P, speeds, 2).scale
+    scale = reference(P, speeds, 1)[1]
     if P.planes * P.A.size <= _DENSE:
         Q = project(P, np.eye(P.A.size))
-        found = solve(Q, speeds, n, scale)
-        there = np.isfinite(found.values[0])
-        return (
-            found.values[0, there],
-            Q.expand(found.vectors[0, there]),
-            found.real[0],
-            int(found.still[0]),
-        )
+        whirl = solve(Q, speeds, n, scale)
+        there = np.isfinite(whirl.values[0])
+        shapes = Q.expand(whirl.vectors[0, there])
+        return whirl.values[0, there], shapes, whirl.real[0], int(whirl.still[0])
     return _arnoldi(P, speed, n, scale)
 
 
@@ -47,10 +39,12 @@ def _arnoldi(
     P: Planes, speed: float, n: int, scale: float
 ) -> tuple[ComplexArray, ComplexArray, FloatArray, int]:
     """Largest μ of the inverse form by Arnoldi's method, with sparse factors."""
-    from scipy.sparse import coo_array, csc_array
+    from scipy.sparse import csc_array
     from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-    M, D, K = (csc_array(coo_array(matrix)) for matrix in _sparse(P, speed))
+    Q = project(P, np.eye(P.A.size))
+    D, K = Q.at(np.array([speed]))
+    M, D, K = (csc_array(matrix) for matrix in (Q.M, D[0], K[0]))
     M, D = scale * scale * M, scale * D
     R = M.shape[0]
     lu = splu(csc_array(K + _SHIFT * D + _SHIFT**2 * M))
@@ -60,11 +54,11 @@ def _arnoldi(
         u, v = state[:R], state[R:]
         return np.concatenate((v, -lu.solve(np.asarray(M @ u + D @ v))))
 
-    operator = LinearOperator((2 * R, 2 * R), matvec=times, dtype=P.dtype)
+    operator = LinearOperator((2 * R, 2 * R), matvec=times, dtype=K.dtype)
     wanted = (3 - P.planes if P.planes == 1 else 2) * n + 8
     while True:
         wanted = min(wanted, 2 * R - 2)
-        start = np.cos(np.arange(2 * R)).astype(P.dtype)
+        start = np.cos(np.arange(2 * R)).astype(K.dtype)
         mu, states = eigs(
             operator, k=wanted, which="LM", v0=start, ncv=min(2 * R, 3 * wanted + 20), maxiter=10000
         )
@@ -83,50 +77,3 @@ def _arnoldi(
     vectors = states[:size, keep].T.reshape(len(keep), P.planes, P.A.size)
     real = lam.real[~still & ~oscillates]
     return lam[keep], np.asarray(vectors), np.sort(real)[::-1], int(still.sum())
-
-
-def _sparse(P: Planes, speed: float) -> tuple[Any, Any, Any]:
-    """M, D and K of the full model."""
-    from scipy.sparse import block_array, coo_array
-
-    A, p, f, n = P.A, P.planes, len(P.pedestals), P.A.size
-
-    M, G, B, K = (_full(band) for band in (A.mass, A.gyroscopic, A.material, A.shaft))
-    feet = P.pedestal_mass, P.pedestal_damping, P.pedestal_stiffness
-    across = [D * speed for D in (0 * M, G, B)]
-    out = []
-    k, c = (matrix[0] for matrix in P.supports(np.array([speed])))
-    for along, cross, foot, tie in zip((M, B, K), across, feet, (0 * k, c, k), strict=True):
-        blocks = [[along, cross], [-cross, along]] if p == 2 else [[along - 1j * cross]]
-        shaft = block_array(blocks)
-        entries: list[tuple[int, int, complex]] = []
-        standing = {int(i): j for j, i in enumerate(P.pedestals)}
-        for i, node in enumerate(P.rows):
-            # Motion of the node, and against it that of the foot.
-            ends = [(1.0, [plane * n + int(node) for plane in range(p)])]
-            if i in standing:
-                ends.append((-1.0, [p * n + plane * f + standing[i] for plane in range(p)]))
-            for (s, at), (t, other) in itertools.product(ends, ends):
-                for a, b in itertools.product(range(p), range(p)):
-                    entries.append((at[a], other[b], s * t * tie[i, a, b]))
-        for j, plane in itertools.product(range(f), range(p)):
-            own = p * n + plane * f + j
-            entries.append((own, own, foot[j, plane]))
-        size = p * (n + f)
-        row, column, entry = zip(*entries, strict=True) if entries else ((), (), ())
-        attached = coo_array((np.array(entry, dtype=P.dtype), (row, column)), shape=(size, size))
-        shaft = coo_array(shaft)
-        shaft = coo_array((shaft.data, (shaft.row, shaft.col)), shape=(size, size))
-        out.append(shaft + attached)
-    return out[0], out[1], out[2]
-
-
-def _full(band: FloatArray) -> Any:
-    """Sparse symmetric matrix of an upper band."""
-    from scipy.sparse import diags_array
-
-    width, size = len(band) - 1, band.shape[1]
-    width = min(width, size - 1)
-    rows = [band[len(band) - 1 - above, above:] for above in range(width + 1)]
-    offsets = list(range(width + 1))
-    return diags_array(rows + rows[1:], offsets=offsets + [-k for k in offsets[1:]], shape=(size, size))
