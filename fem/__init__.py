@@ -27,17 +27,28 @@ from fem.model.node_forces import (
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
 from fem.model.sensors import Sensor
 from fem.modes_result import Modes
-from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peak_refinement import resolve_peaks
 from fem.plots import draw_rotor
-from fem.response import influence, response_peaks, unbalance_response
-from fem.response_result import BearingForces, InfluenceCoefficients, Response
+from fem.response import response_peaks
 from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
 from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.whirl import WhirlModes, whirl_modes
 from fem.windows import Window
+
+# last, as modules of the same names stand beside it until the switch
+from fem._new.response import (  # isort: skip
+    BearingForces,
+    InfluenceCoefficients,
+    Orbits,
+    Response,
+    influence,
+    orbits,
+    probe,
+    unbalance_response,
+    whirl_direction,
+)
 
 __all__ = [
     "STEEL_DENSITY",

@@ -1,23 +1,889 @@
-"""Names of the old modules until this one is written."""
+"""Synchronous response of a rotor: to unbalance, as influence coefficients, and the orbits of its nodes.
 
-from fem.orbits import Orbits, orbits, probe, whirl_direction
-from fem.response import influence, response_from_rest, response_peaks, unbalance_response
-from fem.response_result import BearingForces, InfluenceCoefficients, Response, polar, speed_range
-from fem.solvers.receptance import unit_loads
+Under loads f that turn with the rotor z = x + i y = F e^{iωt} + b̄ e^{−iωt}, so that x = Re X e^{iωt} with
+X = F + b and y = Re Y e^{iωt} with Y = −i (F − b). In one plane with the bands of `fem.assembly`
 
-__all__ = [
-    "BearingForces",
-    "InfluenceCoefficients",
-    "Orbits",
-    "Response",
-    "influence",
-    "orbits",
-    "polar",
-    "probe",
-    "response_from_rest",
-    "response_peaks",
-    "speed_range",
-    "unbalance_response",
-    "unit_loads",
-    "whirl_direction",
-]
+    (K − ω² (M − G)) F + [D (F, b)]₁ = f,        (K − ω² (M + G) + 2 i ω B) b + [D (F, b)]₂ = 0:
+
+material damping takes no part in forward whirl, which does not strain the turning shaft periodically. The
+supports D couple both; where they are rotationally symmetric, b = 0.
+
+The fast way takes the receptance H of the rotor on constant springs k, without damping, from its modes up to
+four times the highest speed and adds the static contribution of all others as a power series in ω², which
+gains a factor of 16 or more with each term. What the supports do besides these springs changes it by a matrix of low
+rank: their forces g obey (1 + (D − k) H) g = −(D − k) H f. Uniform material damping, B = β K, makes the
+backward equation the conservative one at the complex ω² / (1 + 2 i ω β).
+
+The exact way factors the band of both planes at each speed. It takes over where the fast one loses digits:
+next to a resonance of the rotor on springs, where 1 + (D − k) H is almost singular, and where it does not
+apply. Both solve the same equations and lose digits with the fourth power of the number of elements, because
+the entries of K are rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem._new.assembly import (
+    FROM_XY,
+    Matrices,
+    WholeBand,
+    assemble,
+    both_planes,
+    free_motions,
+    ignored_inertia,
+    multiply,
+    rounding_error,
+    supported,
+)
+from fem._new.rotor import Rotor, SensorLike, Support, as_sensor, label
+from fem._new.undamped import (
+    DENSE,
+    Pencil,
+    Spectrum,
+    factor,
+    fine_mesh_warning,
+    finite_modes,
+    lowest_modes,
+    one_plane,
+)
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.checks import checked_speeds
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
+from rotorid.base.tables import Column, Table, frame, html, terminal
+from rotorid.base.text import counted, figures
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from fem._new.stability import Window
+
+Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
+"""`{node or station: m r e^{iφ}}`, kg·m."""
+DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
+STRAIGHT = 1e-9  # minor by major axis below which an orbit is a line: rounding, not whirl
+NEAR = (
+    1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
+)
+GROWTH = 1e4  # forces of the supports by those without whirl of the supports: beyond, four digits are lost
+TOLERANCE = 1e-12  # of the series, relative to the static contribution of the modes left out
+_CHUNK = 20_000  # amplitudes at a time, to stay in the processor's cache
+
+
+class Told(Answered):
+    """A result with tables and an answer; how notebooks show it."""
+
+    def tables(self) -> tuple[Table, ...]:
+        """Its numbers; the last table has all."""
+        raise NotImplementedError
+
+    def to_frame(self) -> pd.DataFrame:
+        """The last of the tables."""
+        return frame(self.tables()[-1])
+
+    def sentence(self) -> str:
+        """The answer in a sentence or two."""
+        return self.answer.judgement
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.sentence()}>"
+
+    def _repr_html_(self) -> str:
+        return "\n".join(map(html, self.tables()))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Told):
+    """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
+
+    On rotationally symmetric supports b = 0: orbits are circles, x = Re F e^{iωt}, y = Im F e^{iωt}. On
+    others they are ellipses: x = Re X e^{iωt} with X = F + b, y = Re Y e^{iωt} with Y = −i (F − b).
+    All amplitudes are peak values, half of peak to peak.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    amplitudes
+        Forward complex amplitudes F, m, of the K nodes kept, shape (S, K); positive phase = lead.
+    unbalance
+        What was mounted, `{node: m r e^{iφ}}`, kg·m.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    backward
+        Complex amplitudes b, m, shape (S, K).
+    largest, largest_node
+        Longest half axis of all nodes' orbits, m, and the number of that node, shape (S,).
+    nodes
+        Numbers of the nodes kept, by default all, shape (K,).
+    solve
+        The same at other speeds of the range, rad/s, ascending; not judged for stability.
+    windows
+        Ranges of speed in which no steady response exists: amplitudes there are never reached.
+    """
+
+    speeds: FloatArray
+    amplitudes: ComplexArray
+    unbalance: Mapping[int, complex]
+    rotor: Rotor
+    warnings: tuple[str, ...]
+    backward: ComplexArray
+    largest: FloatArray
+    largest_node: IndexArray
+    nodes: IndexArray
+    solve: Callable[[FloatArray], Response] = field(repr=False)
+    windows: tuple[Window, ...] = ()
+
+    @property
+    def steady(self) -> BoolArray:
+        """At which speeds a steady response exists, shape (S,)."""
+        return _steady(self.windows, self.speeds)
+
+    @property
+    def x(self) -> ComplexArray:
+        """Complex amplitudes of the deflection in x, m, shape (S, K)."""
+        return np.asarray(self.amplitudes + self.backward)
+
+    @property
+    def y(self) -> ComplexArray:
+        """Complex amplitudes of the deflection in y, m, shape (S, K)."""
+        return np.asarray(-1j * (self.amplitudes - self.backward))
+
+    @property
+    def major(self) -> FloatArray:
+        """Longer half axis of each orbit, m, shape (S, K)."""
+        return np.asarray(np.abs(self.amplitudes) + np.abs(self.backward))
+
+    @property
+    def minor(self) -> FloatArray:
+        """Shorter half axis, m, shape (S, K); negative where the orbit runs against the rotation."""
+        return np.asarray(np.abs(self.amplitudes) - np.abs(self.backward))
+
+    def column(self, node: str | int) -> int:
+        """Which column of the amplitudes belongs to a node.
+
+        Raises
+        ------
+        ValueError
+            If there is no such node, or it was not kept.
+        """
+        number = self.rotor.node(node)
+        if number not in self.nodes:
+            raise ValueError(f"node {number} was not kept: name it in nodes=…")
+        return int(np.argmax(self.nodes == number))
+
+    def at(self, sensor: SensorLike) -> ComplexArray:
+        """Complex amplitude that a sensor reads over speed, m peak, shape (S,).
+
+        A node or station means the direction x; (node, angle) or a `Sensor` any other.
+        """
+        sensor = as_sensor(sensor, self.rotor)
+        i = self.column(sensor.node)
+        return probe(self.x[:, i], self.y[:, i], sensor.radians)
+
+    def readings(self, sensors: Sequence[SensorLike]) -> ComplexArray:
+        """`at` for each sensor, shape (S, C)."""
+        return np.stack([self.at(sensor) for sensor in sensors], axis=1)
+
+    def deflected(self, speed: float) -> Response:
+        """The response of all nodes at one speed, rad/s: the shape of the shaft there, such as at a peak."""
+        return unbalance_response(self.rotor, self.unbalance, speed)
+
+    def bearing_forces(self) -> BearingForces:
+        """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
+        forces = np.empty((2, self.speeds.size, len(self.rotor.supports)), dtype=complex)
+        for k, support in enumerate(self.rotor.supports):
+            i = self.column(support.node)
+            motion = np.stack((self.x[:, i], self.y[:, i]), axis=1)
+            forces[:, :, k] = np.einsum("sij,sj->is", support.dynamic_stiffness(self.speeds), motion)
+        read_only(forces)
+        return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1], self.steady)
+
+    def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
+        sensors = self.nodes.tolist() if sensors is None else sensors
+        Z = self.readings(sensors).T if sensors else np.zeros((0, self.speeds.size))
+        return plain(
+            {
+                "speeds_rad_s": self.speeds,
+                "sensors": [label(sensor) for sensor in sensors],
+                "amplitude_m": np.abs(Z),
+                "phase_deg": phase_deg(Z),
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """One row per speed and node: the reading in x; where x and y differ, also y and the orbit."""
+        S, K = self.amplitudes.shape
+        columns = [
+            Column("speed_rad_s", np.repeat(self.speeds, K)),
+            Column("node", np.tile(self.nodes, S)),
+            *polar("amplitude_m", "phase_deg", self.x),
+        ]
+        if not self.rotor.symmetric:
+            columns += [
+                *polar("amplitude_y_m", "phase_y_deg", self.y),
+                Column("major_axis_m", self.major.ravel()),
+                Column("minor_axis_m", self.minor.ravel()),
+            ]
+        return (Table("unbalance response, peak values", tuple(columns)),)
+
+    @property
+    def answer(self) -> Answer:
+        """The highest peak of a steady response and where it is."""
+        where = f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes."
+        return Answer(f"{where}\n{self.highest}", warnings=self.warnings)
+
+    @property
+    def highest(self) -> str:
+        """The largest amplitude in a sentence."""
+        k = largest_at(self.largest, self.steady)
+        if k is None:
+            return "No steady response at any of these speeds."
+        size, node = 1e6 * self.largest[k], self.largest_node[k]
+        return f"Largest amplitude {size:.4g} µm peak at node {node}, {rpm_text(self.speeds[k])}."
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BearingForces(Told):
+    """Forces of the rotor on its supports, Re (x, y) e^{iωt}.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    supports
+        What is loaded, length B.
+    x, y
+        Complex amplitudes, N, shape (S, B).
+    steady
+        At which speeds they exist, shape (S,).
+    """
+
+    speeds: FloatArray
+    supports: Sequence[Support]
+    x: ComplexArray
+    y: ComplexArray
+    steady: BoolArray
+
+    @property
+    def largest(self) -> FloatArray:
+        """Largest force during a turn, N, shape (S, B)."""
+        return orbits(self.x, self.y).major
+
+    def tables(self) -> tuple[Table, ...]:
+        """One row per speed and support."""
+        S, B = self.x.shape
+        columns = (
+            Column("speed_rad_s", np.repeat(self.speeds, B)),
+            Column("node", [support.node for support in self.supports] * S),
+            Column("support", [support.name for support in self.supports] * S),
+            *polar("force_x_N", "phase_x_deg", self.x),
+            *polar("force_y_N", "phase_y_deg", self.y),
+            Column("largest_N", self.largest.ravel()),
+        )
+        return (Table("forces on the supports, peak values", columns),)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: one list over speed for each support."""
+        nodes = [support.node for support in self.supports]
+        forces = {
+            column.heading: np.reshape(column.values, self.x.shape).T
+            for column in self.tables()[0].columns[3:-1]
+        }
+        return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
+
+    @property
+    def answer(self) -> Answer:
+        """The largest force on each support."""
+        names = [support.name or f"node {support.node}" for support in self.supports]
+        table = largest_text("support", names, "force, N peak", self.largest, self.speeds, self.steady)
+        return Answer(f"Forces on {counted(len(names), 'support')} at {speed_range(self.speeds)}.", table)
+
+    def summary(self) -> str:
+        """The largest force on each support, as text."""
+        return self.answer.found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InfluenceCoefficients(Told):
+    """Vibration at sensors per unit of unbalance in planes.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    sensors, planes
+        Sensors and planes as they were asked for, lengths C and P.
+    W
+        Complex, m per kg·m, shape (S, C, P); Z = W U, positive phase = lead, Z in peak values.
+    warnings
+        What the reader must know.
+    windows
+        As in `Response`.
+    """
+
+    speeds: FloatArray
+    sensors: tuple[SensorLike, ...]
+    planes: tuple[str | int, ...]
+    W: ComplexArray
+    warnings: tuple[str, ...] = ()
+    windows: tuple[Window, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid influence`; the units stand once."""
+        keys = ("speed", "sensor", "plane", "influence", "phase")
+        return plain(
+            {
+                "rows": [dict(zip(keys, row, strict=True)) for row in self.tables()[-1].rows],
+                "units": {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"},
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """Where they are largest, if there is a steady response; and the influence table of INTERFACE.md."""
+        S, C, P = self.W.shape
+        sensors, planes = (
+            [label(sensor) for sensor in self.sensors for _ in self.planes],
+            list(self.planes) * C,
+        )
+        every = Table(
+            "influence coefficients",
+            (
+                Column("speed_rad_s", np.repeat(self.speeds, C * P)),
+                Column("sensor", sensors * S),
+                Column("plane", planes * S),
+                *polar("influence_m_per_kg_m", "phase_deg", self.W),
+            ),
+        )
+        steady = _steady(self.windows, self.speeds)
+        if not steady.any():
+            return (every,)
+        sizes, speeds = np.abs(self.W[steady]).reshape(-1, C * P), self.speeds[steady]
+        columns = [
+            Column("sensor", list(map(str, sensors))),
+            Column("plane", list(map(str, planes))),
+            Column("µm per g·mm", sizes.max(axis=0), "{:.4g}".format),
+        ]
+        if speeds.size == 1:
+            columns.append(Column("phase lead, deg", phase_deg(self.W[steady].ravel()), "{:.2f}".format))
+        else:
+            at = speeds[sizes.argmax(axis=0)]
+            columns.append(Column("at rpm", at * RPM, "{:.6g}".format))
+            columns.append(Column("rad/s", at, "{:.6g}".format))
+            columns.append(Column("least", sizes.min(axis=0), "{:.4g}".format))
+        return (Table("largest influence coefficients", tuple(columns)), every)
+
+    @property
+    def answer(self) -> Answer:
+        """Where the coefficients are largest, and over many speeds how small they get."""
+        _, C, P = self.W.shape
+        what = f"Influence coefficients of {counted(C, 'sensor')} and {counted(P, 'plane')} at "
+        what += f"{speed_range(self.speeds)}."
+        first, *rest = self.tables()
+        if not rest:
+            return Answer(f"{what} None has a meaning: there is no steady response.", warnings=self.warnings)
+        what += f"\nThe largest is {max(first.columns[2].values):.4g} µm per g·mm."
+        return Answer(what, terminal(first), self.warnings)
+
+
+def _steady(windows: tuple[Window, ...], speeds: FloatArray) -> BoolArray:
+    from fem._new.stability import within
+
+    return ~within(windows, speeds)
+
+
+def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
+    """Where a size is largest of all that exist, both of shape (S,); None if none does."""
+    return int(np.argmax(np.where(steady, size, -1.0))) if steady.any() else None
+
+
+def largest_text(
+    what: str, names: Sequence[str], size: str, values: FloatArray, speeds: FloatArray, steady: BoolArray
+) -> str:
+    """The largest of values, shape (S, n), of each name and its speed, as a table; `size` with its unit."""
+    at = [largest_at(column, steady) for column in values.T]
+    sizes = [None if k is None else column[k] for k, column in zip(at, values.T, strict=True)]
+    rpm = [None if k is None else speeds[k] * RPM for k in at]
+    columns = (
+        Column(what, names),
+        Column(f"largest {size}", sizes, figures),
+        Column("at rpm", rpm, "{:.1f}".format),
+    )
+    return terminal(Table("largest", columns))
+
+
+def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
+    """Two columns of a table: size, and phase as lead, 0 ≤ phase < 360 degrees."""
+    return Column(size, np.abs(Z).ravel()), Column(phase, phase_deg(Z).ravel())
+
+
+def speed_range(speeds: FloatArray) -> str:
+    """A speed, or how many from where to where, as text."""
+    if speeds.size == 1:
+        return f"{rpm_text(speeds[0])} ({speeds[0]:.6g} rad/s)"
+    return f"{speeds.size} speeds from {range_text(speeds.min(), speeds.max())}"
+
+
+def unbalance_response(
+    rotor: Rotor,
+    unbalance: Unbalance,
+    speeds: ArrayLike,
+    *,
+    nodes: Sequence[int] | None = None,
+) -> Response:
+    """Compute the synchronous vibration of all nodes, or of some.
+
+    The force is U ω² e^{iωt} on z = x + i y. The equations are those of the whole rotor as described: shaft
+    with what its `Model` takes into account and its material damping, supports of any kind at the
+    running speed, pedestals.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    unbalance
+        `{node or station: m r e^{iφ}}`, kg·m, φ with the rotation from the mark.
+    speeds
+        rad/s, one or many, not negative.
+    nodes
+        Numbers of the nodes to keep; by default all. Few of them take little memory at many speeds.
+
+    Raises
+    ------
+    ValueError
+        If the undamped rotor runs exactly at a critical speed, for impossible input, at a speed outside a
+        bearing table, or for a mesh too fine for float64.
+
+    Notes
+    -----
+    Beside the equations in more digits the error is mostly rounding of the stiffness matrix, which grows with
+    the fourth power of the number of elements: relative to the largest amplitude about 1e-10 at 23 elements,
+    2 to 4e-6 at 230. A warning says where more than 1e-6 is expected.
+    """
+    speeds = checked_speeds(speeds)
+    kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
+    masses: dict[int, complex] = {}
+    for key, value in dict(unbalance).items():
+        node, amount = rotor.node(key), complex(value)
+        if not np.isfinite(amount):
+            raise ValueError(f"the unbalance at node {node} must be finite, not {amount}")
+        masses[node] = masses.get(node, 0j) + amount
+    if not masses:
+        raise ValueError("no unbalance is given: name at least one node")
+    A = assemble(rotor)
+    at = np.array([A.deflection(node) for node in masses], dtype=np.intp)
+    # One complex load is two real ones.
+    U = np.array(list(masses.values()))
+    loads, phasor = unit_loads(A, at) @ np.column_stack((U.real, U.imag)), np.array([1.0, 1j])
+    used = np.flatnonzero(loads.any(axis=0)) if U.any() else [0]
+    receptance = Receptance(rotor, A, A.deflections, loads[:, used], speeds)
+
+    def solve(speeds: FloatArray) -> Response:
+        both = np.zeros((2, speeds.size, kept.size), dtype=complex)
+        largest, where = np.empty(speeds.size), np.empty(speeds.size, dtype=np.intp)
+        errors = []
+        for part, H, error in receptance.parts(speeds):
+            Z = [(speeds[part] ** 2)[:, None] * (plane @ phasor[used]) for plane in H]
+            size = sum(np.abs(plane) for plane in Z)
+            for plane, amplitudes in zip(both, Z, strict=False):
+                plane[part] = amplitudes[:, kept - 1]
+            largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
+            errors.append(error)
+        read_only(both, largest, where)
+        warnings = receptance.warnings(errors)
+        return Response(speeds, both[0], masses, rotor, warnings, both[1], largest, where, kept, solve)
+
+    return judged(solve(speeds))
+
+
+def response_from_rest(
+    rotor: Rotor, unbalance: Unbalance, speeds: ArrayLike, nodes: Sequence[int]
+) -> Response:
+    """`unbalance_response`, also of a free rotor at rest: without rotation there is no force.
+
+    Parameters
+    ----------
+    rotor, unbalance, nodes
+        As there.
+    speeds
+        rad/s, ascending.
+    """
+    omega = checked_speeds(speeds)
+    defined = all(not support.speeds or support.speeds[0] == 0 for support in rotor.supports)
+    if omega[0] > 0 or omega.size < 2 or not defined:
+        return unbalance_response(rotor, unbalance, omega, nodes=nodes)
+    moving = unbalance_response(rotor, unbalance, omega[1:], nodes=nodes)
+    rest = np.zeros((1, len(nodes)), dtype=complex)
+    return replace(
+        moving,
+        speeds=omega,
+        amplitudes=np.concatenate((rest, moving.amplitudes)),
+        backward=np.concatenate((rest, moving.backward)),
+        largest=np.insert(moving.largest, 0, 0.0),
+        largest_node=np.insert(moving.largest_node, 0, 1),
+    )
+
+
+def judged(response: Response) -> Response:
+    """The response with the ranges of speed in which it does not exist."""
+    from fem._new.stability import judge
+
+    windows, texts = judge(response.rotor, response.speeds)
+    before = {window.said() for window in response.windows} | {*texts}
+    kept = tuple(warning for warning in response.warnings if warning not in before)
+    return replace(response, windows=windows, warnings=(*kept, *texts))
+
+
+def influence(
+    rotor: Rotor,
+    planes: Sequence[str | int],
+    sensors: Sequence[SensorLike],
+    speeds: ArrayLike,
+) -> InfluenceCoefficients:
+    """Compute influence coefficients W: vibration at sensors per unbalance in planes, [S] (33).
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    planes
+        Node numbers, from 1, or names of stations.
+    sensors
+        The same, for sensors that read x, or pairs (node, angle) or `Sensor` objects, angle in degrees from
+        x with the rotation.
+    speeds
+        rad/s, one or many, not negative.
+
+    Raises
+    ------
+    ValueError
+        As `unbalance_response`.
+    """
+    from fem._new.stability import judge
+
+    speeds = checked_speeds(speeds)
+    planes, sensors = tuple(planes), tuple(sensors)
+    if not planes or not sensors:
+        raise ValueError("name at least one plane and one sensor")
+    A = assemble(rotor)
+    at = np.array([A.deflection(rotor.node(plane)) for plane in planes], dtype=np.intp)
+    places = [as_sensor(sensor, rotor) for sensor in sensors]
+    unknowns = np.array([A.deflection(rotor.node(sensor.node)) for sensor in places], dtype=np.intp)
+    turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
+    receptance = Receptance(rotor, A, unknowns, unit_loads(A, at), speeds)
+    W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
+    errors = []
+    for part, H, error in receptance.parts(speeds):
+        reading = sum(plane * way for plane, way in zip(H, (turn.conj(), turn), strict=False))
+        W[part] = (speeds[part] ** 2)[:, None, None] * reading
+        errors.append(error)
+    windows, texts = judge(rotor, speeds)
+    read_only(W)
+    return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings(errors), *texts), windows)
+
+
+def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
+    """A load 1 on each of these unknowns, (size, m)."""
+    unit = np.zeros((A.size, unknowns.size))
+    unit[unknowns, np.arange(unknowns.size)] = 1.0
+    return unit
+
+
+class Receptance:
+    """Deflections of unknowns (a,), from 0, under real loads (size, b) that turn with the rotor.
+
+    Ready for any speed up to the largest of those given, rad/s. With `exact` the banded equations are solved
+    at every speed instead of at the few where the fast way loses digits.
+    """
+
+    def __init__(
+        self,
+        rotor: Rotor,
+        A: Matrices,
+        unknowns: IndexArray,
+        loads: FloatArray,
+        speeds: FloatArray,
+        exact: bool = False,
+    ) -> None:
+        self.rotor, self.A, self.unknowns, self.loads = rotor, A, unknowns, loads
+        at, beta, top = supported(rotor, speeds), rotor.material_damping, float(speeds.max())
+        self.planes, self.springs, self.beta = at.planes, at.reference, float(beta[0])
+        springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
+        pencil = one_plane(rotor, A, 1, springs)
+        tilting = any(support.tilting_stiffness for support in rotor.supports)
+        exact |= at.planes == 2 and bool((beta != beta[0]).any() or (beta[0] and tilting))
+        if rotor.model.gyroscopic:
+            try:
+                factor(pencil)
+            except ValueError:  # free, and M − G is negative in a rigid motion
+                exact, pencil = True, one_plane(rotor, A, 0, springs)
+        spectrum = modes_up_to(pencil, top)
+        self.rounding, self.series = spectrum.rounding, list[Series]()
+        if exact:
+            return
+        held = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
+        places, columns = np.concatenate((unknowns, held)), np.hstack((unit_loads(A, held), loads))
+        self.series.append(receptance_series(pencil, spectrum, places, columns, top))
+        if at.planes == 2 and rotor.model.gyroscopic:
+            pencil = one_plane(rotor, A, -1, springs)
+            spectrum = modes_up_to(pencil, top)
+            self.series.append(receptance_series(pencil, spectrum, places, columns[:, : held.size], top))
+
+    def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray, tuple[float, float]]]:
+        """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b).
+
+        Also the largest relative error that rounding of the banded equations may cause, and its speed.
+        """
+        step = max(32, _CHUNK // self.unknowns.size)
+        for start in range(0, speeds.size, step):
+            part, error = slice(start, start + step), (0.0, 0.0)
+            omega = speeds[part]
+            shape = (self.planes, omega.size, self.unknowns.size, self.loads.shape[1])
+            H, lost = np.empty(shape, dtype=complex), np.ones(omega.size, dtype=bool)
+            if self.series:
+                H, lost = self._fast(omega)
+            if lost.any():
+                H[:, lost], error = self._exact(omega[lost])
+            yield part, H, error
+
+    def warnings(self, errors: Sequence[tuple[float, float]]) -> tuple[str, ...]:
+        """What of the rotor is left out, and where rounding may change more than 1e-6 of a response."""
+        error, speed = max(errors)
+        doubt = (
+            f"near {speed:.6g} rad/s rounding may change the response by {error:.0e} of "
+            "itself: hardly any damping limits it, or the mesh is too fine, or the speed is very low"
+        )
+        texts = (*ignored_inertia(self.rotor), *fine_mesh_warning(self.rotor, self.rounding))
+        return (*texts, doubt) if error > 1e-6 else texts
+
+    def _fast(self, omega: FloatArray) -> tuple[ComplexArray, BoolArray]:
+        """Receptances from the series, (planes, S, a, b), and at which speeds they lose digits."""
+        a, s, planes = self.unknowns.size, self.springs.size, self.planes
+        S, n, b = omega.size, planes * s, self.loads.shape[1]
+        change = supported(self.rotor, omega).stiffness[:, :, :planes, :planes].copy()
+        whole, near = self.series[0].at(omega * omega)
+        F = np.zeros((planes, a, b, S), dtype=complex)
+        F[0], pulled, G = whole[:a, s:], whole[a:, s:], [whole[:, :s]] * planes
+        for p in range(planes):
+            stiffer = 1.0 + (2j * self.beta * omega if p and self.beta else np.zeros(S))
+            change[:, :, p, p] -= np.multiply.outer(stiffer, self.springs)
+            if p and (self.beta or len(self.series) == planes):
+                whole, lost = self.series[-1].at(omega * omega / stiffer)
+                G[p], near = whole[:, :s] / stiffer, near | lost
+        E = np.einsum("kipq,qijk->kpiqj", change, [H[a:] for H in G]).reshape(S, n, n) + np.eye(n)
+        pull = np.einsum("kip,ibk->kpib", -change[..., 0], pulled).reshape(S, n, b)
+        forces = np.linalg.solve(E, pull)
+        size, before = (np.abs(each).max(axis=(1, 2), initial=0.0) for each in (forces, pull))
+        forces = np.moveaxis(forces.reshape(S, planes, s, b), 0, -1)
+        for p, k in np.ndindex(planes, s):
+            F[p] += G[p][:a, k, None] * forces[p, k]
+        return np.moveaxis(F, -1, 1), near | ~(size <= GROWTH * before)
+
+    @cached_property
+    def _band(self) -> WholeBand:
+        return WholeBand(both_planes(self.rotor))
+
+    def _exact(self, omega: FloatArray) -> tuple[ComplexArray, tuple[float, float]]:
+        """The same by LU factors of the whole band, and the largest error by rounding with its speed.
+
+        With one mode φ alone F = φ (φᵀ f) / (λ − ω²): then |Fᴴ f| / (Fᴴ M F) is the distance of λ from ω², or
+        what damping makes of it.
+        """
+        A, band, loads = self.A, self._band, self.loads
+        planes = band.P.planes
+        rhs = band.interleaved(loads.T[:, None] * np.array([1.0, -1j])[:planes, None]).T
+        X = np.array([band.planes(band.factor(1j * speed, speed).solve(rhs).T) for speed in omega.tolist()])
+        X = np.moveaxis(FROM_XY @ X if planes == 2 else X, (2, 3), (0, 1))  # (planes, size, S, b)
+        inertia = sum(np.einsum("isb,isb->sb", each.conj(), _times(A.mass, each)).real for each in X)
+        work = np.abs(np.einsum("ib,isb->sb", loads, X[0]))
+        free = free_motions(self.rotor, {s.node for s in self.rotor.supports}) > 0
+        wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1) | (free & (omega == 0))
+        if wrong.any():
+            at = f"{omega[np.argmax(wrong)]:.10g} rad/s"
+            raise ValueError(
+                f"at {at} the undamped rotor stands exactly at its critical speed {at}, where the amplitude "
+                "has no limit; give a support damping or choose another speed"
+            )
+        # The load may meet an antiresonance.
+        floor = 1e-6 * np.abs(X[0]).max(axis=0) * np.abs(loads).max(axis=0)
+        error = rounding_error(A.shaft, X[0].reshape(A.size, -1), np.maximum(work, floor).ravel())
+        worst = int(np.argmax(error))
+        speed = float(omega[worst // loads.shape[1]])
+        return np.moveaxis(X[:, self.unknowns], 1, 2), (float(error[worst]), speed)
+
+
+def _times(band: FloatArray, X: ComplexArray) -> AnyArray:
+    """A band times vectors (size, …)."""
+    product: AnyArray = multiply(band, X.reshape(len(X), -1))  # type: ignore[arg-type]
+    return product.reshape(X.shape)
+
+
+def modes_up_to(pencil: Pencil, top: float) -> Spectrum:
+    """All modes of a small model, else those up to four times the highest speed, rad/s."""
+    available = finite_modes(pencil)
+    m = available if pencil.size <= DENSE else min(available, 8)
+    while True:
+        spectrum = lowest_modes(pencil.rotor, pencil.matrices, m, pencil)
+        squares, shift = abs(spectrum.squares[-1]), spectrum.shift
+        if m == available or squares + shift > 16 * (top * top + shift):
+            return spectrum
+        m = min(available, 2 * m)
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Σ over modes and powers of the conservative receptance between rows and columns."""
+
+    factors: FloatArray  # (rows, columns, m + p): modes with the sign of their mass, then powers
+    spectrum: Spectrum
+
+    def at(self, squared: AnyArray) -> tuple[AnyArray, BoolArray]:
+        """Receptance where ω² is given, shape (rows, columns, S); nonsense where the second is true."""
+        squares, shift = self.spectrum.squares, self.spectrum.shift
+        m, n = squares.size, self.factors.shape[2]
+        # Rigid motions have λ = 0 without rounding.
+        margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
+        terms = np.ones((n, squared.size), dtype=squared.dtype)
+        gap = np.subtract(squares[:, None], squared, out=terms[:m])
+        near = (np.abs(gap) <= margin[:, None]).any(axis=0)
+        gap[:, near] = 1.0
+        np.divide(1.0, gap, out=gap)
+        for j in range(m + 1, n):
+            terms[j] = terms[j - 1] * (squared + shift)
+        return (self.factors.reshape(-1, n) @ terms).reshape(*self.factors.shape[:2], -1), near
+
+
+def receptance_series(
+    pencil: Pencil, spectrum: Spectrum, unknowns: IndexArray, columns: FloatArray, top: float
+) -> Series:
+    """Modes, and static corrections for speeds up to the highest, rad/s, where there are more modes."""
+    from scipy.linalg.lapack import dpbtrs
+
+    V, signs, shift = spectrum.vectors, spectrum.signs, spectrum.shift
+    MV = multiply(pencil.mass, V) * signs
+    factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
+    m, R = signs.size, columns
+    powers = int(m < pencil.size)
+    if m < finite_modes(pencil):
+        powers += int(np.log(TOLERANCE) / np.log((top * top + shift) / abs(spectrum.squares[-1] + shift)))
+    for _ in range(powers):
+        R = dpbtrs(spectrum.factor, R)[0]
+        for _ in range(2):
+            R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
+        factors.append(R[unknowns][..., None])
+        R = multiply(pencil.mass, R)
+    return Series(np.concatenate(factors, axis=2), spectrum)
+
+
+@dataclass(frozen=True, eq=False)
+class Orbits:
+    """Ellipses, all arrays of one shape.
+
+    Attributes
+    ----------
+    major, minor
+        Semi-axes, not negative, in the unit of the amplitudes.
+    inclination
+        Of the major axis from x, with the rotation, rad, above −π/2 up to π/2.
+    phase
+        Lead of the motion along the major axis (its positive end at `inclination`), rad, −π to π: the shaft
+        is farthest out there when ωt = −phase.
+    direction
+        1 forward (with the rotation), −1 backward, 0 a straight line.
+    """
+
+    major: FloatArray
+    minor: FloatArray
+    inclination: FloatArray
+    phase: FloatArray
+    direction: FloatArray
+
+
+def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
+    """Compute the ellipses of complex amplitudes x and y (peak values).
+
+    Parameters
+    ----------
+    x, y
+        Complex amplitudes of the same unit, shapes that broadcast.
+
+    Examples
+    --------
+    >>> ellipse = orbits(3.0, -2.0j)
+    >>> float(ellipse.major), float(ellipse.minor), float(ellipse.direction)
+    (3.0, 2.0, 1.0)
+    """
+    X, Y = np.broadcast_arrays(np.asarray(x, dtype=complex), np.asarray(y, dtype=complex))
+    forward, backward = (X + 1j * Y) / 2, (X - 1j * Y) / 2
+    f, b = np.abs(forward), np.abs(backward)
+    a, c = np.angle(forward), np.angle(backward)
+    # A circle has no major axis: measure from x.
+    circle = np.minimum(f, b) <= 1e-15 * np.maximum(f, b)
+    inclination = np.where(circle, 0.0, (a - c) / 2)
+    phase = np.where(circle, np.where(f >= b, a, c), (a + c) / 2)
+    turned = (inclination > np.pi / 2) | (inclination <= -np.pi / 2)
+    line = np.abs(f - b) <= STRAIGHT * (f + b)
+    return Orbits(
+        major=f + b,
+        minor=np.where(line, 0.0, np.abs(f - b)),
+        inclination=inclination - np.where(turned, np.copysign(np.pi, inclination), 0.0),
+        phase=np.angle(np.exp(1j * (phase + np.pi * turned))),
+        direction=np.where(line, 0.0, np.sign(f - b)),
+    )
+
+
+def probe(x: ArrayLike, y: ArrayLike, angle: ArrayLike) -> ComplexArray:
+    """Complex amplitude that a probe reads.
+
+    Parameters
+    ----------
+    x, y
+        Complex amplitudes of the node in both directions.
+    angle
+        Where the probe points, rad from x with the rotation.
+
+    Returns
+    -------
+    x cos(angle) + y sin(angle), the shapes broadcast.
+    """
+    angle = np.asarray(angle, dtype=float)
+    return np.asarray(
+        np.asarray(x, dtype=complex) * np.cos(angle) + np.asarray(y, dtype=complex) * np.sin(angle)
+    )
+
+
+def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
+    """Direction of whole modes: 1 forward or −1 backward at every node, 0 where nodes differ, or lines.
+
+    Orbits of less than 1 % of the largest area do not count.
+
+    Parameters
+    ----------
+    x, y
+        Complex amplitudes, nodes along the last axis, shape (…, N).
+
+    Returns
+    -------
+    1, −1 or 0, shape (…).
+    """
+    X, Y = np.asarray(x, dtype=complex), np.asarray(y, dtype=complex)
+    area = (np.conj(X) * -Y).imag  # π times this is the area
+    line = STRAIGHT * (np.abs(X) ** 2 + np.abs(Y) ** 2).max(axis=-1)
+    largest = np.abs(area).max(axis=-1)
+    counts = np.where(np.abs(area) > 1e-2 * np.maximum(largest, line)[..., None], np.sign(area), 0.0)
+    return np.asarray(np.where(largest <= line, 0.0, counts.max(axis=-1) + counts.min(axis=-1)).clip(-1, 1))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from repetitions import FULL
 
 import fem
-from fem.solvers import receptance
+from fem._new import response as module
 
 K, C, MASS = 2e7, 4e3, 12.0
 
@@ -92,7 +92,7 @@ def test_few_modes_with_static_corrections_are_as_good_as_all(rotor):
     planes, sensors = [1, rotor.n_nodes // 2], [2, 8, rotor.n_nodes]
     few = fem.influence(rotor, planes, sensors, speeds).W
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(receptance, "DENSE", 10**6)
+        patch.setattr(module, "DENSE", 10**6)
         every = fem.influence(rotor, planes, sensors, speeds).W
     assert worst(few, every) < 1e-6  # the accuracy that `influence` promises
 
