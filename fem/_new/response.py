@@ -75,7 +75,6 @@ NEAR = (
 )
 GROWTH = 1e4  # forces of the supports by those without whirl of the supports: beyond, four digits are lost
 TOLERANCE = 1e-12  # of the series, relative to the static contribution of the modes left out
-_CHUNK = 20_000  # amplitudes at a time, to stay in the processor's cache
 
 
 class Told(Answered):
@@ -649,7 +648,7 @@ class Receptance:
 
         Also the largest relative error that rounding of the banded equations may cause, and its speed.
         """
-        step = max(32, _CHUNK // self.unknowns.size)
+        step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
         for start in range(0, speeds.size, step):
             part, error = slice(start, start + step), (0.0, 0.0)
             omega = speeds[part]

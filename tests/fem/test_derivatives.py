@@ -10,8 +10,8 @@ from fem_rotors import uniform
 import fem
 from fem.matrices.banded_matrices import assemble
 from fem.model.rotor_parameters import parameter_value, typical_size, with_changes, with_parameters
-from fem.solvers.receptance import unit_loads
-from fem.solvers.receptance_derivatives import matrix_change, receptance_with_derivatives
+from fem._new.response import unit_loads
+from fem._new.derivatives import matrix_change, receptance_with_derivatives
 
 ALPHA = np.array([0.0, 90.0, 37.0])
 
