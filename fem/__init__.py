@@ -9,7 +9,6 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem.api684_peaks import Peak, Peaks, required_margin
 from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
@@ -27,9 +26,7 @@ from fem.model.node_forces import (
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
 from fem.model.sensors import Sensor
 from fem.modes_result import Modes
-from fem.peak_refinement import resolve_peaks
 from fem.plots import draw_rotor
-from fem.response import response_peaks
 from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
 from fem.state_space import StateSpace, state_space
@@ -37,6 +34,7 @@ from fem.static import StaticDeflection, compliance, static_deflection
 from fem.whirl import WhirlModes, whirl_modes
 from fem.windows import Window
 
+from fem._new.peaks import Peak, Peaks, required_margin, resolve_peaks, response_peaks  # isort: skip
 # last, as modules of the same names stand beside it until the switch
 from fem._new.response import (  # isort: skip
     BearingForces,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.api684_peaks import find_peaks
+from fem._new.peaks import find_peaks
 
 
 def jeffcott(speeds, zeta, critical=100.0):

@@ -10,8 +10,8 @@ from documents import check_hygiene
 from fem_rotors import rotor23, uniform
 
 import fem
-from fem.api684_peaks import Peak, Peaks
-from fem.peak_refinement import smooth_curves
+from fem._new.peaks import Peak, Peaks
+from fem._new.peaks import smooth_curves
 from fem.plots import (
     campbell_figure,
     draw_bode,
