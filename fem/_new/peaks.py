@@ -9,8 +9,9 @@ separation margin, in percent of the nearest operating speed, must be at least
     above the highest                   10 + 17 (1 − 1 / (AF − 1.5)), at most 26.
 
 A summit of a reading at the speeds that were asked for is the start; the model is evaluated between them: for
-the maximum, for the half-power points, and wherever a reading bends as a curve in the complex plane, so that the
-steps asked for do not matter. A sharp peak may hide between two steps; the undamped critical speeds say where.
+the maximum, for the half-power points, and wherever a reading bends as a curve in the complex plane, so that
+the steps asked for do not matter. A sharp peak may hide between two steps; the undamped critical speeds say
+where.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,25 +27,21 @@ from fem._new.response import Response, Told, judged
 from fem._new.rotor import SensorLike
 from fem._new.undamped import critical_speeds_below
 from rotorid.base.answer import Answer
-from rotorid.base.arrays import AnyArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import listing
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
-UNLIMITED = 1e300  # amplitude of what nothing limits; infinities have no differences
 LARGEST = (16.0, 26.0)  # percent: margins that are enough whatever the amplification, below and above
-_CRITICALLY_DAMPED = 2.5  # AF below which no margin is required
+CRITICALLY_DAMPED = 2.5  # AF below which no margin is required
+_SHARP = 50.0  # AF of a peak whose own is not known, beside others
 _NO_DAMPING = 1e5  # AF beyond which damping is none
 _FINEST = 1e-7  # relative step; finer ones would show rounding
 _BEND, _SHORT = np.radians(10), 0.05  # of a curve in the plane, and of its distance from the origin
 _ROUNDS, _MOST = 14, 30_000  # of halving steps, and speeds
 _AROUND = np.array([-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2])  # of a critical speed, relative
-_OVER_SPEED = ("speeds", "amplitudes", "backward", "largest", "largest_node")
 
 
 def api617_limit(speed: float) -> float:
@@ -58,7 +55,7 @@ def api617_limit(speed: float) -> float:
     Returns
     -------
     Displacement, m peak to peak: twice the amplitudes of a `Response`. In the shop test the standard allows no
-    more than 25.4 µm at lower speeds either; this is not part of the number.
+    more than 25.4 µm at low speeds either; this is not part of the number.
 
     Examples
     --------
@@ -133,11 +130,6 @@ class Peak:
             return None
         return self.required == 0 or self.margin >= self.required
 
-    @property
-    def open(self) -> bool:
-        """Whether the margin may be too small although its amplification factor is not known."""
-        return self.enough is None and (self.margin is None or self.margin < LARGEST[1])
-
 
 @dataclass(frozen=True, repr=False)
 class Peaks(Told):
@@ -156,46 +148,38 @@ class Peaks(Told):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return plain({"operating_rad_s": self.operating, "peaks": list(map(_document, self.peaks))})
+        peaks = [
+            {
+                "speed_rad_s": peak.speed,
+                "speed_rpm": peak.speed * RPM,
+                "amplitude": None if peak.undamped else peak.amplitude,
+                "half_power_rad_s": (peak.below, peak.above),
+                "amplification_factor": peak.amplification,
+                "separation_margin_percent": peak.margin,
+                "required_margin_percent": peak.required,
+                "enough": peak.enough,
+                "note": peak.note,
+            }
+            for peak in self.peaks
+        ]
+        return plain({"operating_rad_s": self.operating, "peaks": peaks})
 
-    def tables(self) -> tuple[Table, ...]:
-        """One row per peak."""
-        return (Table("peaks", peak_columns(self.peaks)),)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per peak, columns as in the JSON document."""
-        import pandas as pd
-
-        return pd.DataFrame(self.to_dict()["peaks"])
+    def tables(self, unit: str = "", scale: float = 1.0) -> tuple[Table, ...]:
+        """One row per peak, amplitudes times `scale` with the name of their unit."""
+        return (Table("peaks", peak_columns(self.peaks, unit, scale)),)
 
     @property
     def answer(self) -> Answer:
         """Where they are."""
-        if not self.peaks:
-            return Answer("no peak in this range of speeds")
-        notes = tuple(f"{rpm_text(peak.speed)}: {peak.note}" for peak in self.peaks if peak.note)
         where = listing([rpm_text(peak.speed) for peak in self.peaks], "and")
-        return Answer(f"peaks at {where}", terminal(self.tables()[0]), notes=notes)
+        return Answer(f"peaks at {where}" if where else "no peak in this range of speeds")
 
     def summary(self, unit: str = "", scale: float = 1.0) -> str:
         """The peaks as text, amplitudes times `scale` with the name of their unit."""
-        table = Table("peaks", peak_columns(self.peaks, unit, scale))
-        text = terminal(table) if self.peaks else self.sentence()
-        return "\n".join([text, *(f"    {note}" for note in self.answer.notes)])
-
-
-def _document(peak: Peak) -> dict[str, Any]:
-    return {
-        "speed_rad_s": peak.speed,
-        "speed_rpm": peak.speed * RPM,
-        "amplitude": None if peak.undamped else peak.amplitude,
-        "half_power_rad_s": (peak.below, peak.above),
-        "amplification_factor": peak.amplification,
-        "separation_margin_percent": peak.margin,
-        "required_margin_percent": peak.required,
-        "enough": peak.enough,
-        "note": peak.note,
-    }
+        if not self.peaks:
+            return self.sentence()
+        notes = [f"    {rpm_text(peak.speed)}: {peak.note}" for peak in self.peaks if peak.note]
+        return "\n".join([*map(terminal, self.tables(unit, scale)), *notes])
 
 
 def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
@@ -220,28 +204,21 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
     Peaks of different readings belong to one critical speed where each lies in the half-power band of the
     other. Shown is one that is not far enough, if any, else the largest with an amplification factor.
     """
-    groups: list[list[tuple[str, Peak]]] = []
+    groups: list[dict[str, Peak]] = []
+    last = None
     every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
     for name, peak in sorted(every, key=lambda one: one[1].speed):
-        last = groups[-1] if groups else []
-        if last and name not in dict(last) and _one_critical(last[-1][1], peak):
-            last.append((name, peak))
-        else:
-            groups.append([(name, peak)])
-
-    def rank(one: tuple[str, Peak]) -> tuple[bool, bool, float]:
-        peak = one[1]
-        return peak.enough is not False, peak.amplification is None, -peak.amplitude
-
-    return [min(group, key=rank) for group in groups]
-
-
-def _one_critical(one: Peak, other: Peak) -> bool:
-    widths = (
-        max([1e-3 * peak.speed, *(abs(end - peak.speed) for end in (peak.below, peak.above) if end)])
-        for peak in (one, other)
-    )
-    return abs(one.speed - other.speed) <= min(widths)
+        sharper = max(one.amplification or _SHARP for one in (peak, last or peak))
+        if last is None or name in groups[-1] or peak.speed - last.speed > last.speed / (2 * sharper):
+            groups.append({})
+        groups[-1][name] = last = peak
+    return [
+        min(
+            group.items(),
+            key=lambda one: (one[1].enough is not False, not one[1].amplification, -one[1].amplitude),
+        )
+        for group in groups
+    ]
 
 
 def open_question(peaks: Iterable[Peak], first: float, last: float, operating: tuple[float, float]) -> str:
@@ -249,26 +226,22 @@ def open_question(peaks: Iterable[Peak], first: float, last: float, operating: t
 
     Empty where one can. Speeds were searched from `first` to `last`; all in rad/s.
     """
-    uncertain = [peak for peak in peaks if peak.open]
+    low, high = (
+        end * (1 + share / 100) for end, share in zip(operating, (-LARGEST[0], LARGEST[1]), strict=True)
+    )
     reasons = [unsearched(first, last, operating)]
-    if uncertain:
-        where = listing([rpm_text(peak.speed) for peak in uncertain], "and")
-        reasons.insert(0, f"no amplification factor at {where}")
-    # A half-power band that is wider than this is critically damped.
-    share = 1 / _CRITICALLY_DAMPED
-    low = min(
-        [operating[0] * (1 - LARGEST[0] / 100), *((1 - share) * p.speed for p in uncertain if not p.below)]
-    )
-    high = max(
-        [operating[1] * (1 + LARGEST[1] / 100), *((1 + share) * p.speed for p in uncertain if not p.above)]
-    )
+    for peak in peaks:
+        if peak.enough is None and (peak.margin is None or peak.margin < LARGEST[1]):
+            reasons.append(f"no amplification factor at {rpm_text(peak.speed)}")
+            # What has not fallen to 0.707 over this distance is critically damped.
+            low = low if peak.below else min(low, peak.speed * (1 - 1 / CRITICALLY_DAMPED))
+            high = high if peak.above else max(high, peak.speed * (1 + 1 / CRITICALLY_DAMPED))
     if not any(reasons):
         return ""
-    if low < first or last < high:
-        what = f"give speeds from {min(low, first) * RPM:.0f} to {max(high, last) * RPM:.0f} rpm"
-    else:
-        what = "judge it by a sensor that shows the peak alone"
-    return "; ".join(filter(None, [*reasons, what]))
+    advice = f"give speeds from {min(low, first) * RPM:.0f} to {max(high, last) * RPM:.0f} rpm"
+    if first <= low and high <= last:
+        advice = "read it where it stands alone"
+    return "; ".join(filter(None, [*reasons, advice]))
 
 
 def find_peaks(
@@ -320,7 +293,7 @@ def required_margin(amplification: float, *, above: bool) -> float:
     (12.142857142857142, 26.0)
     """
     AF = float(amplification)
-    if AF < _CRITICALLY_DAMPED:
+    if AF < CRITICALLY_DAMPED:
         return 0.0
     return min(LARGEST[above], 10.0 * above + 17 * (1 - 1 / (AF - 1.5)))
 
@@ -337,37 +310,30 @@ def _peak(
 
     bounds = omega[k - 1], omega[k + 1]
     top = minimize_scalar(
-        lambda w: -curve(w), bounds=bounds, method="bounded", options={"xatol": 1e-10 * bounds[1]}
+        lambda speed: -curve(speed), bounds=bounds, method="bounded", options={"xatol": 1e-10 * bounds[1]}
     )
-    speed, amplitude = (float(top.x), -float(top.fun)) if -top.fun >= A[k] else (float(omega[k]), float(A[k]))
+    speed, amplitude = max((-float(top.fun), float(top.x)), (float(A[k]), float(omega[k])))[::-1]
     level, notes, ends = math.sqrt(0.5) * amplitude, [], []
     for side, way in (("below", -1), ("above", 1)):
-        at, size = omega[k::way], A[k::way]
-        outside = (at - speed) * way > 0
-        at, size = np.append(speed, at[outside]), np.append(amplitude, size[outside])
-        over = size > amplitude * (1 + 1e-9)
-        n = int(np.argmax(over | (size <= level)))
+        outside = (omega[k::way] - speed) * way > 0
+        at, size = (np.append(top, each[k::way][outside]) for top, each in ((speed, omega), (amplitude, A)))
+        higher = size > amplitude * (1 + 1e-9)
+        n = int(np.argmax(higher | (size <= level)))
         ends.append(None)
-        if amplitude >= UNLIMITED:
-            continue
         if not n:
-            notes.append(
-                f"the half-power point {side} lies outside the speeds, which end at {at[-1]:.6g} rad/s"
-            )
-        elif over[n]:
+            end = f"lies outside the speeds, which end at {at[-1]:.6g} rad/s"
+            notes.append(f"the half-power point {side} {end}")
+        elif higher[n]:
             notes.append(f"the curve rises to another peak before it falls to 0.707 {side}")
         else:
-            ends[-1] = float(
-                brentq(lambda w: curve(w) - level, at[n - 1], at[n], xtol=1e-13 * speed, rtol=1e-14)
-            )
+            ends[-1] = brentq(lambda speed: curve(speed) - level, at[n - 1], at[n], xtol=1e-13 * speed)
     below, above = ends
-    AF = np.inf if amplitude >= UNLIMITED else None
+    AF = margin = required = None
     if below is not None and above is not None:
         AF = speed / max(above - below, 1e-300)
     undamped = AF is not None and AF > _NO_DAMPING
     if undamped:
         notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
-    margin = required = None
     if operating is not None:
         margin = separation(speed, operating)
         # Inside the range any margin is missing; the smaller requirement is then shown.
@@ -403,16 +369,10 @@ def response_peaks(
         try:
             return float(np.abs(response.solve(np.array([speed])).at(sensor)[0]))
         except ValueError:
-            return UNLIMITED  # undamped, and critical
+            return 1e300  # undamped, and critical
 
-    size, counts = np.abs(response.at(sensor)), response.steady & (response.speeds > 0)
-    parts = np.split(np.arange(size.size), np.flatnonzero(np.diff(counts)) + 1)
-    each = [
-        find_peaks(response.speeds[part], size[part], reading, operating=operating)
-        for part in parts
-        if counts[part[0]]
-    ]
-    return Peaks(tuple(peak for part in each for peak in part.peaks), operating)
+    size = np.where(response.steady & (response.speeds > 0), np.abs(response.at(sensor)), np.nan)
+    return find_peaks(response.speeds, size, reading, operating=operating)
 
 
 def resolve_peaks(
@@ -454,14 +414,12 @@ def resolve_peaks(
     finer = judged(smooth_curves(finer, sensors))
     peaks = [response_peaks(finer, place, operating=operating) for place in sensors]
     every = [peak for each in peaks for peak in each.peaks]
-    finer = _with(finer, np.array([peak.speed for peak in every if not peak.undamped]))
     undamped = np.array([peak.speed for peak in every if peak.undamped])
-    if undamped.size:  # there the amplitude has no limit and no meaning
-        beside = np.abs(finer.speeds[:, None] - undamped) <= 1e-2 * undamped
-        keep = ~beside.any(axis=1) | np.isin(finer.speeds, asked)
-        finer = _over_speed(lambda values: values[keep], finer)
-        finer = replace(finer, warnings=(*finer.warnings, UNDAMPED))
-    return finer, peaks
+    added = np.concatenate((finer.speeds, [peak.speed for peak in every if not peak.undamped]))
+    # Beside undamped peaks the amplitude has no limit and no meaning.
+    far = (np.abs(added[:, None] - undamped) > 1e-2 * undamped).all(axis=1)
+    warnings = (*finer.warnings, UNDAMPED) if undamped.size else finer.warnings
+    return _with(replace(response, windows=finer.windows, warnings=warnings), added[far]), peaks
 
 
 def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response:
@@ -474,34 +432,27 @@ def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response
         steps, size = np.diff(Z, axis=0), np.abs(Z)
         bends = np.pad(np.abs(np.angle(steps[1:] * steps[:-1].conj())) > _BEND, ((1, 1), (0, 0)))
         long = np.abs(steps) > _SHORT * np.maximum(size[1:], size[:-1]) + 1e-9 * size.max(initial=0.0)
-        long &= bends[1:] | bends[:-1]
-        finer = _with(response, ((omega[1:] + omega[:-1]) / 2)[long.any(axis=1)])
+        wanted = (long & (bends[1:] | bends[:-1])).any(axis=1) & (np.diff(omega) > _FINEST * omega[1:])
+        finer = _with(response, ((omega[1:] + omega[:-1]) / 2)[wanted])
         if not response.speeds.size < finer.speeds.size < _MOST:
             break
         response = finer
     return response
 
 
-def _with(response: Response, extra: FloatArray) -> Response:
-    """The response at more speeds, but for those too near, and where the rotor cannot run (undamped, critical)."""
-    extra = np.unique(extra)
-    extra = extra[np.diff(extra, prepend=-np.inf) > _FINEST * extra]
-    if extra.size and response.speeds.size:
-        gaps = np.abs(response.speeds - extra[:, None]).min(axis=1)
-        extra = extra[gaps > _FINEST * extra]
-    if not extra.size:
-        return response
+def _with(response: Response, speeds: FloatArray) -> Response:
+    """The response at more speeds, unless the rotor cannot run at one of them (undamped, critical)."""
+    extra = np.setdiff1d(speeds, response.speeds)
     try:
-        more = response.solve(extra)
+        more = response.solve(extra) if extra.size else response
     except ValueError:
+        more = response
+    if more is response:
         return response
     order = np.argsort(np.concatenate((response.speeds, extra)), kind="stable")
-    return _over_speed(lambda one, other: np.concatenate((one, other))[order], response, more)
-
-
-def _over_speed(function: Callable[..., AnyArray], *responses: Response) -> Response:
-    values = {name: function(*(getattr(one, name) for one in responses)) for name in _OVER_SPEED}
-    return replace(responses[0], **values)  # type: ignore[arg-type]
+    fields = ("speeds", "amplitudes", "backward", "largest", "largest_node")
+    both = {name: np.concatenate((getattr(response, name), getattr(more, name)))[order] for name in fields}
+    return replace(response, **both)  # type: ignore[arg-type]
 
 
 def separation(speed: float, operating: tuple[float, float]) -> float:
@@ -520,48 +471,44 @@ class Separation(Told):
     operating: tuple[float, float]
     doubt: str = ""
 
+    @property
+    def nearest(self) -> list[float]:
+        """The speeds, the nearest to the range first."""
+        return sorted(self.speeds, key=lambda speed: separation(speed, self.operating))
+
     def to_dict(self) -> dict[str, Any]:
         """Which speeds lie in the range, and how far off the others are, in percent of its nearest end."""
-        low, high = self.operating
         rows = [
-            {
-                "speed_rad_s": speed,
-                "inside": low <= speed <= high,
-                "separation_percent": separation(speed, self.operating),
-            }
+            {"speed_rad_s": speed, "inside": away == 0, "separation_percent": away}
             for speed in self.speeds
+            for away in (separation(speed, self.operating),)
         ]
-        return {"range_rad_s": [low, high], "critical_speeds": rows}
+        return {"range_rad_s": list(self.operating), "critical_speeds": rows}
 
     def tables(self) -> tuple[Table, ...]:
-        """How far each is from the range, the nearest first; none without any."""
-        rows = sorted(self.to_dict()["critical_speeds"], key=lambda row: float(row["separation_percent"]))
+        """How far each is from the range, the nearest first."""
         columns = (
-            Column("rpm", [row["speed_rad_s"] * RPM for row in rows], "{:.2f}".format),
-            Column("away, %", [row["separation_percent"] for row in rows], "{:.1f}".format),
-            Column("", ["INSIDE" if row["inside"] else "outside" for row in rows]),
+            Column("rpm", [speed * RPM for speed in self.nearest], "{:.6g}".format),
+            Column("away, %", [separation(speed, self.operating) for speed in self.nearest], "{:.1f}".format),
         )
-        return (Table("how far each is from the operating range", columns),) if rows else ()
+        return (Table("how far each is from the operating range", columns),)
 
     @property
     def answer(self) -> Answer:
         """For an engineer."""
         low, high = self.operating
-        within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
-        tables = self.tables()
-        rows = tables[0].rows if tables else []
-        inside = [f"{rpm:.6g} rpm" for rpm, _, where in rows if where == "INSIDE"]
-        shown, more = tuple(map(terminal, tables)), "how far each is from the operating range"
+        within, nearest = f"the operating range {low * RPM:.6g} to {rpm_text(high)}", self.nearest
+        inside = [rpm_text(speed) for speed in nearest if separation(speed, self.operating) == 0]
+        text = f"No critical speed was found beside {within}."
         if inside:
             return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
+        if nearest:
+            away = f"{rpm_text(nearest[0])}, is {separation(nearest[0], self.operating):.1f} % away"
+            text = f"None lies in {within}; the nearest, {away}."
         if self.doubt:
-            answer = f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
-            return Answer(answer, tables=shown, more=more)
-        if not rows:
-            return Answer(f"No critical speed was found beside {within}.")
-        rpm, away, _ = rows[0]
-        nearest = f"{rpm:.6g} rpm, is {away:.1f} % away"
-        return Answer(f"None lies in {within}; the nearest, {nearest}.", tables=shown, more=more)
+            text = f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
+        shown = tuple(map(terminal, self.tables())) if nearest else ()
+        return Answer(text, tables=shown, more="how far each is from the operating range")
 
 
 def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:

@@ -10,9 +10,9 @@ supports D couple both; where they are rotationally symmetric, b = 0.
 
 The fast way takes the receptance H of the rotor on constant springs k, without damping, from its modes up to
 four times the highest speed and adds the static contribution of all others as a power series in ω², which
-gains a factor of 16 or more with each term. What the supports do besides these springs changes it by a matrix of low
-rank: their forces g obey (1 + (D − k) H) g = −(D − k) H f. Uniform material damping, B = β K, makes the
-backward equation the conservative one at the complex ω² / (1 + 2 i ω β).
+gains a factor of 16 or more with each term. What the supports do besides these springs changes it by a
+matrix of low rank: their forces g obey (1 + (D − k) H) g = −(D − k) H f. Uniform material damping, B = β K,
+makes the backward equation the conservative one at the complex ω² / (1 + 2 i ω β).
 
 The exact way factors the band of both planes at each speed. It takes over where the fast one loses digits:
 next to a resonance of the rotor on springs, where 1 + (D − k) H is almost singular, and where it does not
@@ -39,14 +39,12 @@ from fem._new.assembly import (
     free_motions,
     ignored_inertia,
     multiply,
-    rounding_error,
     supported,
 )
 from fem._new.rotor import Rotor, SensorLike, Support, as_sensor, label
 from fem._new.undamped import (
     DENSE,
     Pencil,
-    Spectrum,
     factor,
     fine_mesh_warning,
     finite_modes,
@@ -383,7 +381,6 @@ class InfluenceCoefficients(Told):
         else:
             at = speeds[sizes.argmax(axis=0)]
             columns.append(Column("at rpm", at * RPM, "{:.6g}".format))
-            columns.append(Column("rad/s", at, "{:.6g}".format))
             columns.append(Column("least", sizes.min(axis=0), "{:.4g}".format))
         return (Table("largest influence coefficients", tuple(columns)), every)
 
@@ -472,7 +469,7 @@ def unbalance_response(
     -----
     Beside the equations in more digits the error is mostly rounding of the stiffness matrix, which grows with
     the fourth power of the number of elements: relative to the largest amplitude about 1e-10 at 23 elements,
-    2 to 4e-6 at 230. A warning says where more than 1e-6 is expected.
+    2 to 4e-6 at 230. A warning says where more than 1e-6 is expected. At rest there is no force.
     """
     speeds = checked_speeds(speeds)
     kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
@@ -486,56 +483,26 @@ def unbalance_response(
         raise ValueError("no unbalance is given: name at least one node")
     A = assemble(rotor)
     at = np.array([A.deflection(node) for node in masses], dtype=np.intp)
-    # One complex load is two real ones.
-    U = np.array(list(masses.values()))
-    loads, phasor = unit_loads(A, at) @ np.column_stack((U.real, U.imag)), np.array([1.0, 1j])
-    used = np.flatnonzero(loads.any(axis=0)) if U.any() else [0]
-    receptance = Receptance(rotor, A, A.deflections, loads[:, used], speeds)
+    U = unit_loads(A, at) @ np.array(list(masses.values()))
+    loads, phasors = np.column_stack((U.real, U.imag)), np.array([1.0, 1j])
+    if not U.imag.any():  # one complex load is two real ones
+        loads, phasors = loads[:, :1], phasors[:1]
+    receptance = Receptance(rotor, A, A.deflections, loads, speeds)
 
     def solve(speeds: FloatArray) -> Response:
         both = np.zeros((2, speeds.size, kept.size), dtype=complex)
         largest, where = np.empty(speeds.size), np.empty(speeds.size, dtype=np.intp)
-        errors = []
-        for part, H, error in receptance.parts(speeds):
-            Z = [(speeds[part] ** 2)[:, None] * (plane @ phasor[used]) for plane in H]
-            size = sum(np.abs(plane) for plane in Z)
-            for plane, amplitudes in zip(both, Z, strict=False):
-                plane[part] = amplitudes[:, kept - 1]
+        running = np.where(speeds > 0, speeds, speeds.max())  # at rest there is no force
+        for part, H in receptance.parts(running):
+            Z = (speeds[part] ** 2)[:, None] * (H @ phasors)
+            both[: len(Z), part] = Z[..., kept - 1]
+            size = np.abs(Z).sum(axis=0)
             largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
-            errors.append(error)
         read_only(both, largest, where)
-        warnings = receptance.warnings(errors)
+        warnings = receptance.warnings
         return Response(speeds, both[0], masses, rotor, warnings, both[1], largest, where, kept, solve)
 
     return judged(solve(speeds))
-
-
-def response_from_rest(
-    rotor: Rotor, unbalance: Unbalance, speeds: ArrayLike, nodes: Sequence[int]
-) -> Response:
-    """`unbalance_response`, also of a free rotor at rest: without rotation there is no force.
-
-    Parameters
-    ----------
-    rotor, unbalance, nodes
-        As there.
-    speeds
-        rad/s, ascending.
-    """
-    omega = checked_speeds(speeds)
-    defined = all(not support.speeds or support.speeds[0] == 0 for support in rotor.supports)
-    if omega[0] > 0 or omega.size < 2 or not defined:
-        return unbalance_response(rotor, unbalance, omega, nodes=nodes)
-    moving = unbalance_response(rotor, unbalance, omega[1:], nodes=nodes)
-    rest = np.zeros((1, len(nodes)), dtype=complex)
-    return replace(
-        moving,
-        speeds=omega,
-        amplitudes=np.concatenate((rest, moving.amplitudes)),
-        backward=np.concatenate((rest, moving.backward)),
-        largest=np.insert(moving.largest, 0, 0.0),
-        largest_node=np.insert(moving.largest_node, 0, 1),
-    )
 
 
 def judged(response: Response) -> Response:
@@ -543,8 +510,8 @@ def judged(response: Response) -> Response:
     from fem._new.stability import judge
 
     windows, texts = judge(response.rotor, response.speeds)
-    before = {window.said() for window in response.windows} | {*texts}
-    kept = tuple(warning for warning in response.warnings if warning not in before)
+    before = [window.said() for window in response.windows]
+    kept = [warning for warning in response.warnings if warning not in (*before, *texts)]
     return replace(response, windows=windows, warnings=(*kept, *texts))
 
 
@@ -586,14 +553,12 @@ def influence(
     turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
     receptance = Receptance(rotor, A, unknowns, unit_loads(A, at), speeds)
     W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
-    errors = []
-    for part, H, error in receptance.parts(speeds):
+    for part, H in receptance.parts(speeds):
         reading = sum(plane * way for plane, way in zip(H, (turn.conj(), turn), strict=False))
         W[part] = (speeds[part] ** 2)[:, None, None] * reading
-        errors.append(error)
     windows, texts = judge(rotor, speeds)
     read_only(W)
-    return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings(errors), *texts), windows)
+    return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings, *texts), windows)
 
 
 def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
@@ -620,55 +585,37 @@ class Receptance:
         exact: bool = False,
     ) -> None:
         self.rotor, self.A, self.unknowns, self.loads = rotor, A, unknowns, loads
-        at, beta, top = supported(rotor, speeds), rotor.material_damping, float(speeds.max())
+        at, beta, gyroscopic = supported(rotor, speeds), rotor.material_damping, rotor.model.gyroscopic
         self.planes, self.springs, self.beta = at.planes, at.reference, float(beta[0])
         springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
-        pencil = one_plane(rotor, A, 1, springs)
+        whole = one_plane(rotor, A, 1, springs)
         tilting = any(support.tilting_stiffness for support in rotor.supports)
-        exact |= at.planes == 2 and bool((beta != beta[0]).any() or (beta[0] and tilting))
-        if rotor.model.gyroscopic:
+        self.exact = exact or bool(at.planes == 2 and ((beta != beta[0]).any() or (beta[0] and tilting)))
+        if gyroscopic:
             try:
-                factor(pencil)
+                factor(whole)
             except ValueError:  # free, and M − G is negative in a rigid motion
-                exact, pencil = True, one_plane(rotor, A, 0, springs)
-        spectrum = modes_up_to(pencil, top)
-        self.rounding, self.series = spectrum.rounding, list[Series]()
-        if exact:
-            return
+                self.exact, whole = True, one_plane(rotor, A, 0, springs)
         held = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
-        places, columns = np.concatenate((unknowns, held)), np.hstack((unit_loads(A, held), loads))
-        self.series.append(receptance_series(pencil, spectrum, places, columns, top))
-        if at.planes == 2 and rotor.model.gyroscopic:
-            pencil = one_plane(rotor, A, -1, springs)
-            spectrum = modes_up_to(pencil, top)
-            self.series.append(receptance_series(pencil, spectrum, places, columns[:, : held.size], top))
+        places, units, top = np.concatenate((unknowns, held)), unit_loads(A, held), float(speeds.max())
+        self.series = [Series(whole, places, np.hstack((units, loads)), top)]
+        self.warnings = (*ignored_inertia(rotor), *fine_mesh_warning(rotor, self.series[0].modes.rounding))
+        if at.planes == 2 and gyroscopic and not self.exact:
+            self.series.append(Series(one_plane(rotor, A, -1, springs), places, units, top))
 
-    def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray, tuple[float, float]]]:
-        """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b).
-
-        Also the largest relative error that rounding of the banded equations may cause, and its speed.
-        """
+    def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray]]:
+        """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b)."""
         step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
         for start in range(0, speeds.size, step):
-            part, error = slice(start, start + step), (0.0, 0.0)
+            part = slice(start, start + step)
             omega = speeds[part]
-            shape = (self.planes, omega.size, self.unknowns.size, self.loads.shape[1])
-            H, lost = np.empty(shape, dtype=complex), np.ones(omega.size, dtype=bool)
-            if self.series:
-                H, lost = self._fast(omega)
+            if self.exact:
+                yield part, self._exact(omega)
+                continue
+            H, lost = self._fast(omega)
             if lost.any():
-                H[:, lost], error = self._exact(omega[lost])
-            yield part, H, error
-
-    def warnings(self, errors: Sequence[tuple[float, float]]) -> tuple[str, ...]:
-        """What of the rotor is left out, and where rounding may change more than 1e-6 of a response."""
-        error, speed = max(errors)
-        doubt = (
-            f"near {speed:.6g} rad/s rounding may change the response by {error:.0e} of "
-            "itself: hardly any damping limits it, or the mesh is too fine, or the speed is very low"
-        )
-        texts = (*ignored_inertia(self.rotor), *fine_mesh_warning(self.rotor, self.rounding))
-        return (*texts, doubt) if error > 1e-6 else texts
+                H[:, lost] = self._exact(omega[lost])
+            yield part, H
 
     def _fast(self, omega: FloatArray) -> tuple[ComplexArray, BoolArray]:
         """Receptances from the series, (planes, S, a, b), and at which speeds they lose digits."""
@@ -697,8 +644,8 @@ class Receptance:
     def _band(self) -> WholeBand:
         return WholeBand(both_planes(self.rotor))
 
-    def _exact(self, omega: FloatArray) -> tuple[ComplexArray, tuple[float, float]]:
-        """The same by LU factors of the whole band, and the largest error by rounding with its speed.
+    def _exact(self, omega: FloatArray) -> ComplexArray:
+        """The same by LU factors of the whole band.
 
         With one mode φ alone F = φ (φᵀ f) / (λ − ω²): then |Fᴴ f| / (Fᴴ M F) is the distance of λ from ω², or
         what damping makes of it.
@@ -707,53 +654,56 @@ class Receptance:
         planes = band.P.planes
         rhs = band.interleaved(loads.T[:, None] * np.array([1.0, -1j])[:planes, None]).T
         X = np.array([band.planes(band.factor(1j * speed, speed).solve(rhs).T) for speed in omega.tolist()])
-        X = np.moveaxis(FROM_XY @ X if planes == 2 else X, (2, 3), (0, 1))  # (planes, size, S, b)
-        inertia = sum(np.einsum("isb,isb->sb", each.conj(), _times(A.mass, each)).real for each in X)
-        work = np.abs(np.einsum("ib,isb->sb", loads, X[0]))
-        free = free_motions(self.rotor, {s.node for s in self.rotor.supports}) > 0
-        wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1) | (free & (omega == 0))
+        X = FROM_XY @ X if planes == 2 else X  # (S, b, planes, size)
+        moving = multiply(A.mass, X.reshape(-1, A.size).T).T.reshape(X.shape)  # type: ignore[arg-type]
+        inertia = np.einsum("sbpi,sbpi->sb", X.conj(), moving).real
+        work = np.abs(np.einsum("ib,sbi->sb", loads, X[:, :, 0]))
+        wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1)
+        if free_motions(self.rotor, {support.node for support in self.rotor.supports}):
+            wrong |= omega == 0
         if wrong.any():
             at = f"{omega[np.argmax(wrong)]:.10g} rad/s"
             raise ValueError(
                 f"at {at} the undamped rotor stands exactly at its critical speed {at}, where the amplitude "
                 "has no limit; give a support damping or choose another speed"
             )
-        # The load may meet an antiresonance.
-        floor = 1e-6 * np.abs(X[0]).max(axis=0) * np.abs(loads).max(axis=0)
-        error = rounding_error(A.shaft, X[0].reshape(A.size, -1), np.maximum(work, floor).ravel())
-        worst = int(np.argmax(error))
-        speed = float(omega[worst // loads.shape[1]])
-        return np.moveaxis(X[:, self.unknowns], 1, 2), (float(error[worst]), speed)
+        return np.moveaxis(X[..., self.unknowns], (2, 3), (0, 2))
 
 
-def _times(band: FloatArray, X: ComplexArray) -> AnyArray:
-    """A band times vectors (size, …)."""
-    product: AnyArray = multiply(band, X.reshape(len(X), -1))  # type: ignore[arg-type]
-    return product.reshape(X.shape)
-
-
-def modes_up_to(pencil: Pencil, top: float) -> Spectrum:
-    """All modes of a small model, else those up to four times the highest speed, rad/s."""
-    available = finite_modes(pencil)
-    m = available if pencil.size <= DENSE else min(available, 8)
-    while True:
-        spectrum = lowest_modes(pencil.rotor, pencil.matrices, m, pencil)
-        squares, shift = abs(spectrum.squares[-1]), spectrum.shift
-        if m == available or squares + shift > 16 * (top * top + shift):
-            return spectrum
-        m = min(available, 2 * m)
-
-
-@dataclass(frozen=True, eq=False)
 class Series:
-    """Σ over modes and powers of the conservative receptance between rows and columns."""
+    """Receptance of the conservative rotor between unknowns and columns of loads, for speeds up to `top`.
 
-    factors: FloatArray  # (rows, columns, m + p): modes with the sign of their mass, then powers
-    spectrum: Spectrum
+    Its modes up to four times this speed, at least, and powers of ω² for the static contribution of the others.
+    """
+
+    def __init__(self, whole: Pencil, unknowns: IndexArray, columns: FloatArray, top: float) -> None:
+        from scipy.linalg.lapack import dpbtrs
+
+        available = finite_modes(whole)
+        m = available if whole.size <= DENSE else min(available, 8)
+        while True:
+            self.modes = modes = lowest_modes(whole.rotor, whole.matrices, m, whole)
+            ratio = (top * top + modes.shift) / abs(modes.squares[-1] + modes.shift)
+            if m == available or ratio < 1 / 16:
+                break
+            m = min(available, 2 * m)
+        V, signs, R = modes.vectors, modes.signs, columns
+        MV = multiply(whole.mass, V) * signs
+        factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
+        powers = int(m < whole.size)
+        if m < available:
+            powers += int(np.log(TOLERANCE) / np.log(ratio))
+        for _ in range(powers):
+            R = dpbtrs(modes.factor, R)[0]
+            for _ in range(2):
+                R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
+            factors.append(R[unknowns][..., None])
+            R = multiply(whole.mass, R)
+        self.factors = np.concatenate(factors, axis=2)  # (rows, columns, modes and powers)
 
     def at(self, squared: AnyArray) -> tuple[AnyArray, BoolArray]:
         """Receptance where ω² is given, shape (rows, columns, S); nonsense where the second is true."""
-        squares, shift = self.spectrum.squares, self.spectrum.shift
+        squares, shift = self.modes.squares, self.modes.shift
         m, n = squares.size, self.factors.shape[2]
         # Rigid motions have λ = 0 without rounding.
         margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
@@ -765,28 +715,6 @@ class Series:
         for j in range(m + 1, n):
             terms[j] = terms[j - 1] * (squared + shift)
         return (self.factors.reshape(-1, n) @ terms).reshape(*self.factors.shape[:2], -1), near
-
-
-def receptance_series(
-    pencil: Pencil, spectrum: Spectrum, unknowns: IndexArray, columns: FloatArray, top: float
-) -> Series:
-    """Modes, and static corrections for speeds up to the highest, rad/s, where there are more modes."""
-    from scipy.linalg.lapack import dpbtrs
-
-    V, signs, shift = spectrum.vectors, spectrum.signs, spectrum.shift
-    MV = multiply(pencil.mass, V) * signs
-    factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
-    m, R = signs.size, columns
-    powers = int(m < pencil.size)
-    if m < finite_modes(pencil):
-        powers += int(np.log(TOLERANCE) / np.log((top * top + shift) / abs(spectrum.squares[-1] + shift)))
-    for _ in range(powers):
-        R = dpbtrs(spectrum.factor, R)[0]
-        for _ in range(2):
-            R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
-        factors.append(R[unknowns][..., None])
-        R = multiply(pencil.mass, R)
-    return Series(np.concatenate(factors, axis=2), spectrum)
 
 
 @dataclass(frozen=True, eq=False)
