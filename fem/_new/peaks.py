@@ -54,8 +54,8 @@ def api617_limit(speed: float) -> float:
 
     Returns
     -------
-    Displacement, m peak to peak: twice the amplitudes of a `Response`. In the shop test the standard allows no
-    more than 25.4 µm at low speeds either; this is not part of the number.
+    Displacement, m peak to peak: twice the amplitudes of a `Response`. In the shop test the standard allows
+    no more than 25.4 µm at low speeds either; this is not part of the number.
 
     Examples
     --------
@@ -186,7 +186,6 @@ def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> t
     """The table of peaks, amplitudes times `scale` with the name of their unit."""
     one = "{:.1f}".format
     sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
-    words = {True: "enough", False: "NOT ENOUGH", None: None}
     return (
         Column("rpm", [p.speed * RPM for p in peaks], "{:.2f}".format),
         Column("rad/s", [p.speed for p in peaks], "{:.4f}".format),
@@ -194,7 +193,7 @@ def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> t
         Column("AF", [p.amplification for p in peaks], "{:.2f}".format),
         Column("margin, %", [p.margin for p in peaks], one),
         Column("required, %", [p.required for p in peaks], one),
-        Column("", [words[p.enough] for p in peaks]),
+        Column("", [p.enough for p in peaks], lambda enough: "enough" if enough else "NOT ENOUGH"),
     )
 
 
@@ -295,7 +294,7 @@ def required_margin(amplification: float, *, above: bool) -> float:
     AF = float(amplification)
     if AF < CRITICALLY_DAMPED:
         return 0.0
-    return min(LARGEST[above], 10.0 * above + 17 * (1 - 1 / (AF - 1.5)))
+    return min(LARGEST[int(above)], 10.0 * above + 17 * (1 - 1 / (AF - 1.5)))
 
 
 def _peak(
@@ -308,29 +307,28 @@ def _peak(
     """The peak near speed k."""
     from scipy.optimize import brentq, minimize_scalar
 
-    bounds = omega[k - 1], omega[k + 1]
+    middle, options = float(omega[k]), {"xatol": 1e-12 * omega[k]}
+    bounds = omega[k - 1] - middle, omega[k + 1] - middle  # of what is added: a sharp peak needs all digits
     top = minimize_scalar(
-        lambda speed: -curve(speed), bounds=bounds, method="bounded", options={"xatol": 1e-10 * bounds[1]}
+        lambda more: -curve(middle + more), bounds=bounds, method="bounded", options=options
     )
-    speed, amplitude = max((-float(top.fun), float(top.x)), (float(A[k]), float(omega[k])))[::-1]
+    amplitude, speed = max((-float(top.fun), middle + float(top.x)), (float(A[k]), middle))
     level, notes, ends = math.sqrt(0.5) * amplitude, [], []
     for side, way in (("below", -1), ("above", 1)):
-        outside = (omega[k::way] - speed) * way > 0
-        at, size = (np.append(top, each[k::way][outside]) for top, each in ((speed, omega), (amplitude, A)))
-        higher = size > amplitude * (1 + 1e-9)
-        n = int(np.argmax(higher | (size <= level)))
+        beyond = (omega - speed) * way > 0
+        at, size = omega[beyond][::way], A[beyond][::way]
+        n = int(np.argmax(np.append(size <= level, True)))
         ends.append(None)
-        if not n:
+        if (size[:n] > amplitude * (1 + 1e-9)).any():
+            notes.append(f"the curve rises to another peak before it falls to 0.707 {side}")
+        elif n == size.size:
             end = f"lies outside the speeds, which end at {at[-1]:.6g} rad/s"
             notes.append(f"the half-power point {side} {end}")
-        elif higher[n]:
-            notes.append(f"the curve rises to another peak before it falls to 0.707 {side}")
         else:
-            ends[-1] = brentq(lambda speed: curve(speed) - level, at[n - 1], at[n], xtol=1e-13 * speed)
-    below, above = ends
+            ends[-1] = brentq(lambda speed: curve(speed) - level, speed, at[n], xtol=1e-13 * speed)
     AF = margin = required = None
-    if below is not None and above is not None:
-        AF = speed / max(above - below, 1e-300)
+    if None not in ends:
+        AF = speed / max(ends[1] - ends[0], 1e-300)
     undamped = AF is not None and AF > _NO_DAMPING
     if undamped:
         notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
@@ -339,7 +337,7 @@ def _peak(
         # Inside the range any margin is missing; the smaller requirement is then shown.
         required = None if AF is None else required_margin(AF, above=speed > operating[1])
     factor = None if undamped else AF
-    return Peak(speed, amplitude, below, above, factor, margin, required, "; ".join(notes), undamped)
+    return Peak(speed, amplitude, *ends, factor, margin, required, "; ".join(notes), undamped)
 
 
 def response_peaks(

@@ -91,7 +91,7 @@ class Told(Answered):
         return self.answer.judgement
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.sentence()}>"
+        return f"<{type(self).__name__}: {self.sentence().splitlines()[0]}>"
 
     def _repr_html_(self) -> str:
         return "\n".join(map(html, self.tables()))
