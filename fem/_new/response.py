@@ -467,9 +467,10 @@ def unbalance_response(
 
     Notes
     -----
-    Beside the equations in more digits the error is mostly rounding of the stiffness matrix, which grows with
-    the fourth power of the number of elements: relative to the largest amplitude about 1e-10 at 23 elements,
-    2 to 4e-6 at 230. A warning says where more than 1e-6 is expected. At rest there is no force.
+    Beside the same equations in 18 digits the error is rounding of the stiffness matrix, relative to the
+    largest amplitude about 1e-12 times the amplification factor at 23 elements. It grows with the fourth
+    power of their number: measured at 230 are 1e-8 between and 2e-7 to 6e-6 at resonances, where the
+    amplification is 70 to 900. A warning says where the mesh is too fine for six digits.
     """
     speeds = checked_speeds(speeds)
     kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
@@ -606,22 +607,23 @@ class Receptance:
     def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray]]:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b)."""
         step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
+        stiffness = supported(self.rotor, speeds).stiffness
         for start in range(0, speeds.size, step):
             part = slice(start, start + step)
             omega = speeds[part]
             if self.exact:
                 yield part, self._exact(omega)
                 continue
-            H, lost = self._fast(omega)
+            H, lost = self._fast(omega, stiffness[part])
             if lost.any():
                 H[:, lost] = self._exact(omega[lost])
             yield part, H
 
-    def _fast(self, omega: FloatArray) -> tuple[ComplexArray, BoolArray]:
+    def _fast(self, omega: FloatArray, D: ComplexArray) -> tuple[ComplexArray, BoolArray]:
         """Receptances from the series, (planes, S, a, b), and at which speeds they lose digits."""
         a, s, planes = self.unknowns.size, self.springs.size, self.planes
         S, n, b = omega.size, planes * s, self.loads.shape[1]
-        change = supported(self.rotor, omega).stiffness[:, :, :planes, :planes].copy()
+        change = D[:, :, :planes, :planes].copy()
         whole, near = self.series[0].at(omega * omega)
         F = np.zeros((planes, a, b, S), dtype=complex)
         F[0], pulled, G = whole[:a, s:], whole[a:, s:], [whole[:, :s]] * planes
@@ -673,7 +675,7 @@ class Receptance:
 class Series:
     """Receptance of the conservative rotor between unknowns and columns of loads, for speeds up to `top`.
 
-    Its modes up to four times this speed, at least, and powers of ω² for the static contribution of the others.
+    Its modes up to four times this speed, at least, and powers of ω² for the contribution of the others.
     """
 
     def __init__(self, whole: Pencil, unknowns: IndexArray, columns: FloatArray, top: float) -> None:
