@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -126,7 +127,7 @@ def receptance_with_derivatives(
     f = whole.interleaved(loads.T[:, None] * np.array([[1.0], [-1j]])).T
     u = np.zeros((rows.size, 2, A.size))
     u[each, :, rows] = np.column_stack((np.cos(angles), np.sin(angles)))
-    u, turn = whole.interleaved(u).T, np.exp(1j * angles)[:, None]
+    seen, turn = whole.interleaved(u).T, np.exp(1j * angles)[:, None]
     H, by_angle = np.empty((2, speeds.size, rows.size, loads.shape[1]), dtype=complex)
     by_number = np.zeros((len(changes), *H.shape), dtype=complex)
     for start in range(0, speeds.size, _CHUNK):
@@ -134,12 +135,17 @@ def receptance_with_derivatives(
         factors = [whole.factor(1j * speed, speed) for speed in speeds[part].tolist()]
         # q (S, b, 2, size) and p (S, a, 2, size), forward and backward
         q = FROM_XY @ whole.planes(np.array([one.solve(f).T for one in factors]))
-        p = TO_XY.T @ whole.planes(np.array([one.solve(u, transposed=True).T for one in factors]))
+        p = TO_XY.T @ whole.planes(np.array([one.solve(seen, transposed=True).T for one in factors]))
         F, b = np.moveaxis(q[..., rows], 2, 0).swapaxes(2, 3)
         H[part] = F / turn + b * turn
         by_angle[part] = 1j * (b * turn - F / turn)
         omega = speeds[part, None, None]
-        on_planes = ((1.0, 1.0), (-(omega**2), -(omega**2)), (omega**2, -(omega**2)), (0.0, 2j * omega))
+        on_planes: tuple[tuple[Any, Any], ...] = (
+            (1.0, 1.0),
+            (-(omega**2), -(omega**2)),
+            (omega**2, -(omega**2)),
+            (0.0, 2j * omega),
+        )
         for change, derivative in zip(changes, by_number[:, part], strict=True):
             for k, node in enumerate(change.nodes):
                 at = A.deflection(node)
@@ -147,7 +153,7 @@ def receptance_with_derivatives(
             for name, band in change.bands.items():
                 acting = slice(change.first, change.first + band.shape[1])
                 moved = np.moveaxis(q[..., acting], -1, 0)
-                forces = multiply(band, moved.reshape(len(moved), -1)).reshape(moved.shape)  # type: ignore[arg-type]
+                forces = multiply(band, moved.reshape(len(moved), -1)).reshape(moved.shape)
                 for plane, factor in enumerate(on_planes[_BANDS.index(name)]):
                     derivative -= factor * (p[:, :, plane, acting] @ forces[..., plane].swapaxes(0, 1))
     return ReceptanceWithDerivatives(H, by_number, by_angle)

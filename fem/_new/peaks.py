@@ -313,7 +313,7 @@ def _peak(
         lambda more: -curve(middle + more), bounds=bounds, method="bounded", options=options
     )
     amplitude, speed = max((-float(top.fun), middle + float(top.x)), (float(A[k]), middle))
-    level, notes, ends = math.sqrt(0.5) * amplitude, [], []
+    level, notes, ends = math.sqrt(0.5) * amplitude, list[str](), list[float | None]()
     for side, way in (("below", -1), ("above", 1)):
         beyond = (omega - speed) * way > 0
         at, size = omega[beyond][::way], A[beyond][::way]
@@ -327,8 +327,9 @@ def _peak(
         else:
             ends[-1] = brentq(lambda speed: curve(speed) - level, speed, at[n], xtol=1e-13 * speed)
     AF = margin = required = None
-    if None not in ends:
-        AF = speed / max(ends[1] - ends[0], 1e-300)
+    below, above = ends
+    if below is not None and above is not None:
+        AF = speed / max(above - below, 1e-300)
     undamped = AF is not None and AF > _NO_DAMPING
     if undamped:
         notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
@@ -337,7 +338,7 @@ def _peak(
         # Inside the range any margin is missing; the smaller requirement is then shown.
         required = None if AF is None else required_margin(AF, above=speed > operating[1])
     factor = None if undamped else AF
-    return Peak(speed, amplitude, *ends, factor, margin, required, "; ".join(notes), undamped)
+    return Peak(speed, amplitude, below, above, factor, margin, required, "; ".join(notes), undamped)
 
 
 def response_peaks(

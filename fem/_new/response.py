@@ -297,7 +297,7 @@ class BearingForces(Told):
         """Plain data for JSON: one list over speed for each support."""
         nodes = [support.node for support in self.supports]
         forces = {
-            column.heading: np.reshape(column.values, self.x.shape).T
+            column.heading: np.array(column.values).reshape(self.x.shape).T
             for column in self.tables()[0].columns[3:-1]
         }
         return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
@@ -657,7 +657,7 @@ class Receptance:
         rhs = band.interleaved(loads.T[:, None] * np.array([1.0, -1j])[:planes, None]).T
         X = np.array([band.planes(band.factor(1j * speed, speed).solve(rhs).T) for speed in omega.tolist()])
         X = FROM_XY @ X if planes == 2 else X  # (S, b, planes, size)
-        moving = multiply(A.mass, X.reshape(-1, A.size).T).T.reshape(X.shape)  # type: ignore[arg-type]
+        moving = multiply(A.mass, X.reshape(-1, A.size).T).T.reshape(X.shape)
         inertia = np.einsum("sbpi,sbpi->sb", X.conj(), moving).real
         work = np.abs(np.einsum("ib,sbi->sb", loads, X[:, :, 0]))
         wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1)
@@ -711,7 +711,7 @@ class Series:
         margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
         terms = np.ones((n, squared.size), dtype=squared.dtype)
         gap = np.subtract(squares[:, None], squared, out=terms[:m])
-        near = (np.abs(gap) <= margin[:, None]).any(axis=0)
+        near = np.asarray((np.abs(gap) <= margin[:, None]).any(axis=0))
         gap[:, near] = 1.0
         np.divide(1.0, gap, out=gap)
         for j in range(m + 1, n):
