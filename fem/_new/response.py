@@ -249,8 +249,8 @@ class Response(Told):
         k = largest_at(self.largest, self.steady)
         if k is None:
             return "No steady response at any of these speeds."
-        size, node = 1e6 * self.largest[k], self.largest_node[k]
-        return f"Largest amplitude {size:.4g} µm peak at node {node}, {rpm_text(self.speeds[k])}."
+        where = f"node {self.largest_node[k]}, {rpm_text(self.speeds[k])}"
+        return f"Largest amplitude {1e6 * self.largest[k]:.4g} µm peak at {where}."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -370,19 +370,18 @@ class InfluenceCoefficients(Told):
         steady = _steady(self.windows, self.speeds)
         if not steady.any():
             return (every,)
-        sizes, speeds = np.abs(self.W[steady]).reshape(-1, C * P), self.speeds[steady]
-        columns = [
+        W, speeds = self.W[steady].reshape(-1, C * P), self.speeds[steady]
+        sizes = np.abs(W)
+        at = sizes.argmax(axis=0)
+        columns = (
             Column("sensor", list(map(str, sensors))),
             Column("plane", list(map(str, planes))),
             Column("µm per g·mm", sizes.max(axis=0), "{:.4g}".format),
-        ]
-        if speeds.size == 1:
-            columns.append(Column("phase lead, deg", phase_deg(self.W[steady].ravel()), "{:.2f}".format))
-        else:
-            at = speeds[sizes.argmax(axis=0)]
-            columns.append(Column("at rpm", at * RPM, "{:.6g}".format))
-            columns.append(Column("least", sizes.min(axis=0), "{:.4g}".format))
-        return (Table("largest influence coefficients", tuple(columns)), every)
+            Column("phase lead, deg", phase_deg(W[at, np.arange(C * P)]), "{:.2f}".format),
+            Column("at rpm", speeds[at] * RPM, "{:.6g}".format),
+            Column("least", sizes.min(axis=0), "{:.4g}".format),
+        )
+        return (Table("largest influence coefficients", columns), every)
 
     @property
     def answer(self) -> Answer:
