@@ -8,10 +8,10 @@ import pytest
 from fem_rotors import uniform
 
 import fem
-from fem.matrices.banded_matrices import assemble
-from fem.model.rotor_parameters import parameter_value, typical_size, with_changes, with_parameters
-from fem._new.response import unit_loads
+from fem._new.assembly import assemble
 from fem._new.derivatives import matrix_change, receptance_with_derivatives
+from fem._new.parameters import as_they_stand, parameter_value, typical_size, with_changes, with_parameters
+from fem._new.response import unit_loads
 
 ALPHA = np.array([0.0, 90.0, 37.0])
 
@@ -83,7 +83,7 @@ def paths_of(rotor):
     for i, support in enumerate(bearings, start=1):
         own = [
             *("kxx", "kxy", "kyy", "cxx", "cyx"),
-            *("kxx.scale", "stiffness.scale", "cyy.slope", "kyy.curve"),
+            *("kxx.scale", "stiffness.scale", "cyy.scale"),
         ]
         own += ["pedestal_mass", "pedestal_stiffness_x", "pedestal_damping_y"] * bool(support.pedestal)
         own += ["tilting_stiffness"] * bool(support.tilting_stiffness)
@@ -192,7 +192,7 @@ def test_a_sensor_turned_by_a_quarter_reads_its_derivative_by_the_angle():
     assert abs(found.by_angle - expected).max() < 1e-9 * abs(expected).max()
 
 
-@pytest.mark.parametrize("count", [1, 127, 128, 129, 600])
+@pytest.mark.parametrize("count", [1, 31, 32, 33, 200])
 def test_any_number_of_speeds(count):
     rotor, speeds = drawn(1), np.linspace(100.0, 900.0, count)
     paths = paths_of(rotor)[:9]
@@ -253,11 +253,9 @@ def test_a_number_at_its_end_changes_to_one_side():
 
 def test_of_a_scale_and_what_is_added_to_the_same_numbers():
     """As they stand together the scale multiplies what is added: that is not its derivative."""
-    from fem.model.rotor_parameters import as_they_stand
-
     start = drawn(9)
     table = next(f"bearing[{i}]" for i, s in enumerate(start.supports, 1) if s.speeds)
-    values = {f"{table}.kxx.scale": 1.3, f"{table}.kxx.slope": 2e4, f"{table}.kxx.offset": -1e5}
+    values = {f"{table}.kxx.scale": 1.3, f"{table}.kxx.offset": -1e5}
     rotor = with_parameters(start, values)
     found = computed(rotor, [1], [2], [300.0], list(values)).by_number[:, 0, 0, 0]
     by_values = as_they_stand(start, values).T @ found
