@@ -19,24 +19,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem._new.response import Response, Told, judged
+from fem._new.response import Response, judged
 from fem._new.rotor import SensorLike
-from fem._new.undamped import critical_speeds_below
+from fem._new.undamped import Result, critical_speeds_below
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.tables import Column, Table, terminal
+from rotorid.base.tables import Column, Table, frame, terminal
 from rotorid.base.text import listing
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
 LARGEST = (16.0, 26.0)  # percent: margins that are enough whatever the amplification, below and above
 CRITICALLY_DAMPED = 2.5  # AF below which no margin is required
-_SHARP = 50.0  # AF of a peak whose own is not known, beside others
+_SHARP = 50.0  # AF of a peak that shows none, beside others
 _NO_DAMPING = 1e5  # AF beyond which damping is none
 _FINEST = 1e-7  # relative step; finer ones would show rounding
 _BEND, _SHORT = np.radians(10), 0.05  # of a curve in the plane, and of its distance from the origin
@@ -132,7 +135,7 @@ class Peak:
 
 
 @dataclass(frozen=True, repr=False)
-class Peaks(Told):
+class Peaks(Result):
     """All peaks of a response curve, by rising speed.
 
     Attributes
@@ -168,11 +171,14 @@ class Peaks(Told):
         """One row per peak, amplitudes times `scale` with the name of their unit."""
         return (Table("peaks", peak_columns(self.peaks, unit, scale)),)
 
-    @property
-    def answer(self) -> Answer:
+    def to_frame(self) -> pd.DataFrame:
+        """The table."""
+        return frame(self.tables()[0])
+
+    def sentence(self) -> str:
         """Where they are."""
         where = listing([rpm_text(peak.speed) for peak in self.peaks], "and")
-        return Answer(f"peaks at {where}" if where else "no peak in this range of speeds")
+        return f"peaks at {where}" if where else "no peak in this range of speeds"
 
     def summary(self, unit: str = "", scale: float = 1.0) -> str:
         """The peaks as text, amplitudes times `scale` with the name of their unit."""
@@ -463,7 +469,7 @@ def separation(speed: float, operating: tuple[float, float]) -> float:
 
 
 @dataclass(frozen=True, repr=False)
-class Separation(Told):
+class Separation(Result):
     """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
 
     speeds: Iterable[float]
@@ -492,22 +498,25 @@ class Separation(Told):
         )
         return (Table("how far each is from the operating range", columns),)
 
-    @property
-    def answer(self) -> Answer:
-        """For an engineer."""
+    def sentence(self) -> str:
+        """Whether one lies in the range, and which is nearest."""
         low, high = self.operating
         within, nearest = f"the operating range {low * RPM:.6g} to {rpm_text(high)}", self.nearest
         inside = [rpm_text(speed) for speed in nearest if separation(speed, self.operating) == 0]
-        text = f"No critical speed was found beside {within}."
         if inside:
-            return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
-        if nearest:
-            away = f"{rpm_text(nearest[0])}, is {separation(nearest[0], self.operating):.1f} % away"
-            text = f"None lies in {within}; the nearest, {away}."
+            return f"INSIDE {within}: {listing(inside, 'and')}."
         if self.doubt:
-            text = f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
-        shown = tuple(map(terminal, self.tables())) if nearest else ()
-        return Answer(text, tables=shown, more="how far each is from the operating range")
+            return f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
+        if not nearest:
+            return f"No critical speed was found beside {within}."
+        away = f"{rpm_text(nearest[0])}, is {separation(nearest[0], self.operating):.1f} % away"
+        return f"None lies in {within}; the nearest, {away}."
+
+    @property
+    def answer(self) -> Answer:
+        """For an engineer."""
+        shown = tuple(map(terminal, self.tables()))
+        return Answer(self.sentence(), tables=shown, more="how far each is from the operating range")
 
 
 def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:

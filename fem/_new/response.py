@@ -45,18 +45,19 @@ from fem._new.rotor import Rotor, SensorLike, Support, as_sensor, label
 from fem._new.undamped import (
     DENSE,
     Pencil,
+    Result,
     factor,
     fine_mesh_warning,
     finite_modes,
     lowest_modes,
     one_plane,
 )
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
-from rotorid.base.tables import Column, Table, frame, html, terminal
+from rotorid.base.tables import Column, Table, frame, terminal
 from rotorid.base.text import counted, figures
 
 if TYPE_CHECKING:
@@ -75,30 +76,8 @@ GROWTH = 1e4  # forces of the supports by those without whirl of the supports: b
 TOLERANCE = 1e-12  # of the series, relative to the static contribution of the modes left out
 
 
-class Told(Answered):
-    """A result with tables and an answer; how notebooks show it."""
-
-    def tables(self) -> tuple[Table, ...]:
-        """Its numbers; the last table has all."""
-        raise NotImplementedError
-
-    def to_frame(self) -> pd.DataFrame:
-        """The last of the tables."""
-        return frame(self.tables()[-1])
-
-    def sentence(self) -> str:
-        """The answer in a sentence or two."""
-        return self.answer.judgement
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.sentence().splitlines()[0]}>"
-
-    def _repr_html_(self) -> str:
-        return "\n".join(map(html, self.tables()))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Told):
+class Response(Result):
     """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
 
     On rotationally symmetric supports b = 0: orbits are circles, x = Re F e^{iωt}, y = Im F e^{iωt}. On
@@ -237,11 +216,18 @@ class Response(Told):
             ]
         return (Table("unbalance response, peak values", tuple(columns)),)
 
+    def to_frame(self) -> pd.DataFrame:
+        """The table."""
+        return frame(self.tables()[0])
+
+    def sentence(self) -> str:
+        """The highest peak of a steady response and where it is."""
+        return f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes. {self.highest}"
+
     @property
     def answer(self) -> Answer:
-        """The highest peak of a steady response and where it is."""
-        where = f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes."
-        return Answer(f"{where}\n{self.highest}", warnings=self.warnings)
+        """The sentence and the warnings."""
+        return Answer(self.sentence(), warnings=self.warnings)
 
     @property
     def highest(self) -> str:
@@ -254,7 +240,7 @@ class Response(Told):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BearingForces(Told):
+class BearingForces(Result):
     """Forces of the rotor on its supports, Re (x, y) e^{iωt}.
 
     Attributes
@@ -302,20 +288,22 @@ class BearingForces(Told):
         }
         return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
 
-    @property
-    def answer(self) -> Answer:
-        """The largest force on each support."""
-        names = [support.name or f"node {support.node}" for support in self.supports]
-        table = largest_text("support", names, "force, N peak", self.largest, self.speeds, self.steady)
-        return Answer(f"Forces on {counted(len(names), 'support')} at {speed_range(self.speeds)}.", table)
+    def to_frame(self) -> pd.DataFrame:
+        """The table."""
+        return frame(self.tables()[0])
+
+    def sentence(self) -> str:
+        """How many there are."""
+        return f"Forces on {counted(len(self.supports), 'support')} at {speed_range(self.speeds)}."
 
     def summary(self) -> str:
         """The largest force on each support, as text."""
-        return self.answer.found
+        names = [support.name or f"node {support.node}" for support in self.supports]
+        return largest_text("support", names, "force, N peak", self.largest, self.speeds, self.steady)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InfluenceCoefficients(Told):
+class InfluenceCoefficients(Result):
     """Vibration at sensors per unit of unbalance in planes.
 
     Attributes
@@ -383,17 +371,24 @@ class InfluenceCoefficients(Told):
         )
         return (Table("largest influence coefficients", columns), every)
 
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed, sensor and plane."""
+        return frame(self.tables()[-1])
+
+    def sentence(self) -> str:
+        """How many there are, and the largest."""
+        _, C, P = self.W.shape
+        first, *rest = self.tables()
+        largest = "None has a meaning: there is no steady response."
+        if rest:
+            largest = f"The largest is {max(first.columns[2].values):.4g} µm per g·mm."
+        what = f"Influence coefficients of {counted(C, 'sensor')} and {counted(P, 'plane')}"
+        return f"{what} at {speed_range(self.speeds)}. {largest}"
+
     @property
     def answer(self) -> Answer:
         """Where the coefficients are largest, and over many speeds how small they get."""
-        _, C, P = self.W.shape
-        what = f"Influence coefficients of {counted(C, 'sensor')} and {counted(P, 'plane')} at "
-        what += f"{speed_range(self.speeds)}."
-        first, *rest = self.tables()
-        if not rest:
-            return Answer(f"{what} None has a meaning: there is no steady response.", warnings=self.warnings)
-        what += f"\nThe largest is {max(first.columns[2].values):.4g} µm per g·mm."
-        return Answer(what, terminal(first), self.warnings)
+        return Answer(self.sentence(), "".join(map(terminal, self.tables()[:-1])), self.warnings)
 
 
 def _steady(windows: tuple[Window, ...], speeds: FloatArray) -> BoolArray:
@@ -510,7 +505,7 @@ def judged(response: Response) -> Response:
     from fem._new.stability import judge
 
     windows, texts = judge(response.rotor, response.speeds)
-    before = [window.said() for window in response.windows]
+    before = [window.sentence() for window in response.windows]
     kept = [warning for warning in response.warnings if warning not in (*before, *texts)]
     return replace(response, windows=windows, warnings=(*kept, *texts))
 
