@@ -63,24 +63,6 @@ def test_an_undamped_peak_has_no_amplitude():
     assert found.to_dict()["peaks"][0]["amplitude"] is None
 
 
-def test_peaks_of_a_rotor_do_not_depend_on_the_step():
-    rotor = fem.Rotor(
-        np.full(10, 0.1),
-        0.05,
-        discs=[fem.Disc(6, 20.0)],
-        supports=[fem.Support(n, 2e7, 2e4) for n in (1, 11)],
-    )
-
-    def found(steps):
-        speeds = np.linspace(20.0, 600.0, steps)
-        return fem.response_peaks(fem.unbalance_response(rotor, {6: 1e-4}, speeds), 6).peaks
-
-    coarse, fine = found(300), found(3000)
-    assert len(coarse) == len(fine) == 1
-    assert coarse[0].speed == pytest.approx(fine[0].speed, rel=1e-6)
-    assert coarse[0].amplification == pytest.approx(fine[0].amplification, rel=1e-4)
-
-
 def test_half_power_points_outside_the_range_are_said():
     speeds = np.linspace(90.0, 104.0, 200)
     (peak,) = peaks_of(speeds, damped(0.05), operating=(150.0, 200.0)).peaks

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from repetitions import FULL
 
 import fem
-from fem._new import response as module
 
 K, C, MASS = 2e7, 4e3, 12.0
 
@@ -68,7 +67,7 @@ def test_the_vibration_lags_the_unbalance_by_a_right_angle_at_resonance():
     assert abs(W[2] + 1 / MASS) < 0.01 / MASS  # far above, the disc turns about its mass centre
 
 
-@given(rotors(elements=(2, 40)), st.integers(0, 10**6))
+@given(rotors(elements=(2, 55)), st.integers(0, 10**6))
 @settings(max_examples=60, deadline=None)
 def test_the_fast_way_is_the_exact_solution(rotor, seed):
     rng = np.random.default_rng(seed)
@@ -81,19 +80,6 @@ def test_the_fast_way_is_the_exact_solution(rotor, seed):
     # rounding costs the banded equations more where hardly any damping limits a response
     assert worst(fast.W, exact.W) < 1e-6 or np.abs(fast.W).max() > 1e3 / rotor.total_mass
     assert fast.W.shape == (37, 4, 3)
-
-
-@given(rotors(elements=(33, 60)))
-@settings(max_examples=25, deadline=None)
-def test_few_modes_with_static_corrections_are_as_good_as_all(rotor):
-    top = fem.critical_speeds(rotor, n=5).frequencies[-1]
-    speeds = np.linspace(0.05, 1.0, 23) * top
-    planes, sensors = [1, rotor.n_nodes // 2], [2, 8, rotor.n_nodes]
-    few = fem.influence(rotor, planes, sensors, speeds).W
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "DENSE", 10**6)
-        every = fem.influence(rotor, planes, sensors, speeds).W
-    assert worst(few, every) < 1e-6  # the accuracy that `influence` promises
 
 
 @given(rotors())
@@ -225,14 +211,6 @@ def test_impossible_requests_are_refused(arguments, message):
 def test_an_impossible_unbalance_is_refused(unbalance, message):
     with pytest.raises(ValueError, match=message):
         fem.unbalance_response(rotor23(1e4), unbalance, [100.0])
-
-
-def test_many_speeds_are_the_same_as_each_alone():
-    rotor = rotor23(2e4)
-    speeds = np.linspace(1, 1000, 333)
-    together = fem.influence(rotor, [7], [2, 22], speeds).W
-    alone = [fem.influence(rotor, [7], [2, 22], omega).W[0] for omega in speeds[::37]]
-    np.testing.assert_allclose(together[::37], alone, rtol=1e-11)
 
 
 def test_results_as_tables_json_and_text():
