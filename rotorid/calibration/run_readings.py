@@ -33,8 +33,8 @@ from fem.model.rotor_parameters import (
 )
 from fem.model.sensors import Sensor
 from fem.solvers.eigen import finite_modes, lowest_modes
-from fem.solvers.receptance import unit_loads
-from fem.solvers.receptance_derivatives import MatrixChange, matrix_change, receptance_with_derivatives
+from fem._new.response import unit_loads
+from fem._new.derivatives import MatrixChange, matrix_change, receptance_with_derivatives
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.regression import least_squares, solution, stretch

@@ -7,7 +7,7 @@ import pytest
 from full_whirl import exact_modes
 
 import fem
-import fem.response
+from fem._new import response
 from fem._new.assembly import both_planes
 from fem._new.whirl import WhirlModes, in_both_planes, missing_modes
 
@@ -15,7 +15,7 @@ from fem._new.whirl import WhirlModes, in_both_planes, missing_modes
 def exactly(function, *arguments, **named):
     """`fem.influence` or `fem.unbalance_response` with the banded equations solved at every speed."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fem.response, "prepare", partial(fem.response.prepare, exact=True))
+        patch.setattr(response, "Receptance", partial(response.Receptance, exact=True))
         return function(*arguments, **named)
 
 

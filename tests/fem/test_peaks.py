@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 import fem
-from fem.api684_peaks import find_peaks
+from fem._new.peaks import (
+    Separation,
+    api617_limit,
+    api_unbalance,
+    critical_peaks,
+    find_peaks,
+    open_question,
+    unsearched,
+)
 
 
 def jeffcott(speeds, zeta, critical=100.0):
@@ -53,24 +61,6 @@ def test_an_undamped_peak_has_no_amplitude():
     assert peak.required == 16.0
     assert "practically undamped" in found.summary()
     assert found.to_dict()["peaks"][0]["amplitude"] is None
-
-
-def test_peaks_of_a_rotor_do_not_depend_on_the_step():
-    rotor = fem.Rotor(
-        np.full(10, 0.1),
-        0.05,
-        discs=[fem.Disc(6, 20.0)],
-        supports=[fem.Support(n, 2e7, 2e4) for n in (1, 11)],
-    )
-
-    def found(steps):
-        speeds = np.linspace(20.0, 600.0, steps)
-        return fem.response_peaks(fem.unbalance_response(rotor, {6: 1e-4}, speeds), 6).peaks
-
-    coarse, fine = found(300), found(3000)
-    assert len(coarse) == len(fine) == 1
-    assert coarse[0].speed == pytest.approx(fine[0].speed, rel=1e-6)
-    assert coarse[0].amplification == pytest.approx(fine[0].amplification, rel=1e-4)
 
 
 def test_half_power_points_outside_the_range_are_said():
@@ -157,3 +147,90 @@ def test_results_speak():
 def test_an_impossible_range_of_operating_speeds():
     with pytest.raises(ValueError, match="lowest and a highest"):
         peaks_of(np.array([1.0, 2.0, 3.0]), damped(0.1), operating=(5.0, 2.0))
+
+
+def test_one_peak_a_critical_speed():
+    """Two readings of two critical speeds, the second one sharp and near: four peaks, two rows."""
+    speeds = np.linspace(50.0, 200.0, 2000)
+    each = [
+        peaks_of(speeds, lambda s, a=a, b=b: a * jeffcott(s, 0.08) + b * jeffcott(s, 0.01, 140.0))
+        for a, b in ((1.0, 0.2), (0.5, 0.3))
+    ]
+    assert sum(len(one.peaks) for one in each) == 4
+    chief = critical_peaks(["x", "y"], each)
+    assert [name for name, _ in chief] == ["x", "y"]
+    assert [peak.speed for _, peak in chief] == pytest.approx([100, 140], rel=0.02)
+
+
+def test_what_is_not_known_and_what_to_do():
+    speeds, rpm = np.linspace(90.0, 104.0, 200), 30 / math.pi
+    found = peaks_of(speeds, damped(0.05), operating=(115.0, 120.0))
+    text = open_question(found.peaks, 90.0, 104.0, (115.0, 120.0))
+    assert "no amplification factor at 957" in text
+    assert f"only speeds from {90 * rpm:.6g} to {104 * rpm:.6g} rpm were searched" in text
+    assert f"give speeds from {90 * rpm:.0f} to {1.26 * 120 * rpm:.0f} rpm" in text
+    wide = np.linspace(3.0, 400.0, 1000)
+    known = peaks_of(wide, damped(0.05), operating=(115.0, 120.0))
+    assert open_question(known.peaks, 3.0, 400.0, (115.0, 120.0)) == ""
+    assert unsearched(3.0, 400.0, None) == ""
+
+
+def test_limits_of_the_standards():
+    assert api617_limit(400 * math.pi) == pytest.approx(25.4e-6)
+    assert api617_limit(100 * math.pi) == pytest.approx(50.8e-6)
+    ounce_inch = 28.349523e-3 * 25.4e-3
+    assert api_unbalance(0.45359237 * 100, math.pi * 100) == pytest.approx(
+        4 * 100 / 3000 * ounce_inch, rel=1e-4
+    )
+
+
+def test_critical_speeds_beside_a_range():
+    inside = Separation([100.0, 350.0], (300.0, 400.0))
+    assert inside.sentence().startswith("INSIDE the operating range 2864.79 to 3819.72 rpm: 3342.25 rpm")
+    outside = Separation([100.0, 500.0], (300.0, 400.0))
+    assert "the nearest, 4774.65 rpm, is 25.0 % away" in outside.sentence()
+    assert outside.to_dict()["critical_speeds"][0]["separation_percent"] == pytest.approx(200 / 3)
+    assert Separation([100.0], (300.0, 400.0), "few").sentence().endswith("rpm: few.")
+    assert outside.tables()[0].rows[0][1] == 25.0
+
+
+def machine(damping=2e3):
+    supports = [fem.Support(1, 2e7, damping, "front"), fem.Support(7, 2e7, damping, "rear")]
+    return fem.Rotor([0.15] * 6, 0.05, discs=[fem.Disc(4, 15.0)], supports=supports)
+
+
+@pytest.mark.parametrize("step", [40.0, 7.0])
+def test_peaks_do_not_depend_on_the_steps(step):
+    speeds = np.arange(20.0, 900.0, step)
+    response = fem.unbalance_response(machine(), {4: 1e-3, 2: 3e-4j}, speeds)
+    sensors = [4, (2, 45.0)]
+    finer, peaks = fem.resolve_peaks(response, sensors, operating=(100.0, 200.0))
+    many = fem.unbalance_response(machine(), {4: 1e-3, 2: 3e-4j}, np.arange(20.0, 900.0, 0.05))
+    for sensor, found in zip(sensors, peaks, strict=True):
+        dense = fem.response_peaks(many, sensor, operating=(100.0, 200.0)).peaks
+        assert len(found.peaks) == len(dense) > 0
+        for one, other in zip(found.peaks, dense, strict=True):
+            assert one.speed == pytest.approx(other.speed, rel=1e-6)
+            assert one.amplitude == pytest.approx(other.amplitude, rel=1e-6)
+            assert one.amplification == pytest.approx(other.amplification, rel=1e-4)
+            assert one.margin == pytest.approx(other.margin, abs=1e-3)
+            assert np.abs(finer.speeds / one.speed - 1).min() < 2e-7  # nearer ones differ by rounding
+    assert np.isin(speeds, finer.speeds).all()
+    k = np.searchsorted(finer.speeds, speeds)
+    np.testing.assert_allclose(finer.readings(sensors)[k], response.readings(sensors), rtol=1e-12)
+
+
+def test_too_few_speeds_show_no_peak():
+    response = fem.unbalance_response(machine(), {4: 1e-3}, [100.0, 200.0])
+    finer, peaks = fem.resolve_peaks(response, [4])
+    assert finer is response
+    assert peaks == []
+
+
+def test_undamped_peaks_are_said():
+    response = fem.unbalance_response(machine(0.0), {4: 1e-3}, np.arange(20.0, 900.0, 40.0))
+    finer, (found,) = fem.resolve_peaks(response, [4])
+    assert found.peaks[0].undamped
+    assert finer.warnings[-1].startswith("practically undamped peaks")
+    near = np.abs(finer.speeds - found.peaks[0].speed) < 1e-2 * found.peaks[0].speed
+    assert np.isin(finer.speeds[near], response.speeds).all()

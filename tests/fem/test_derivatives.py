@@ -8,16 +8,10 @@ import pytest
 from fem_rotors import uniform
 
 import fem
-from fem._new.parameters import (
-    as_they_stand,
-    parameter_value,
-    typical_size,
-    with_changes,
-    with_parameters,
-)
-from fem.matrices.banded_matrices import assemble
-from fem.solvers.receptance import unit_loads
-from fem.solvers.receptance_derivatives import matrix_change, receptance_with_derivatives
+from fem._new.assembly import assemble
+from fem._new.derivatives import matrix_change, receptance_with_derivatives
+from fem._new.parameters import as_they_stand, parameter_value, typical_size, with_changes, with_parameters
+from fem._new.response import unit_loads
 
 ALPHA = np.array([0.0, 90.0, 37.0])
 
@@ -89,7 +83,7 @@ def paths_of(rotor):
     for i, support in enumerate(bearings, start=1):
         own = [
             *("kxx", "kxy", "kyy", "cxx", "cyx"),
-            *("kxx.scale", "stiffness.scale", "cyy.offset", "kyy.offset"),
+            *("kxx.scale", "stiffness.scale", "cyy.scale"),
         ]
         own += ["pedestal_mass", "pedestal_stiffness_x", "pedestal_damping_y"] * bool(support.pedestal)
         own += ["tilting_stiffness"] * bool(support.tilting_stiffness)
@@ -198,7 +192,7 @@ def test_a_sensor_turned_by_a_quarter_reads_its_derivative_by_the_angle():
     assert abs(found.by_angle - expected).max() < 1e-9 * abs(expected).max()
 
 
-@pytest.mark.parametrize("count", [1, 127, 128, 129, 600])
+@pytest.mark.parametrize("count", [1, 31, 32, 33, 200])
 def test_any_number_of_speeds(count):
     rotor, speeds = drawn(1), np.linspace(100.0, 900.0, count)
     paths = paths_of(rotor)[:9]
