@@ -9,11 +9,12 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
+from fem._new.speed_map import SpeedMap, speed_map
+from fem._new.undamped import MeshCheck, Modes, critical_speeds, mesh_check
 from fem.api684_peaks import Peak, Peaks, required_margin
 from fem.campbell import Campbell, campbell
-from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
-from fem.mesh import MeshCheck, mesh_check, refined
+from fem.mesh import refined
 from fem.model.calibration import Calibration
 from fem.model.node_forces import (
     CubicSpring,
@@ -26,13 +27,11 @@ from fem.model.node_forces import (
 )
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
 from fem.model.sensors import Sensor
-from fem.modes_result import Modes
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peak_refinement import resolve_peaks
 from fem.plots import draw_rotor
 from fem.response import influence, response_peaks, unbalance_response
 from fem.response_result import BearingForces, InfluenceCoefficients, Response
-from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
 from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
@@ -50,7 +49,6 @@ __all__ = [
     "Disc",
     "InfluenceCoefficients",
     "InternalDamping",
-    "Intersection",
     "JournalBearing",
     "MeshCheck",
     "Model",

@@ -1,18 +1,21 @@
 """Undamped critical speeds: the conservative rotor on its supports at synchronous whirl, K φ = λ M φ, λ = ω².
 
-Turning at Ω = ω, a rotor whirls in orbits x + i y = F e^{iωt} + b e^{−iωt}: the gyroscopic moment is an inertia,
-M − G for the forward wave F and M + G for the backward wave b. Thin discs make M − G indefinite; a forward
-mode of negative mass has λ < 0 and no critical speed. With x = F + b and y = −i (F − b) a stiffness k of (x, y)
-acts as T⁻¹ k T on (F, b), T = [[1, 1], [−i, i]]: Hermitian for a symmetric k, real without cross-coupling, and
-diagonal where x and y are alike: then F stands alone. A pedestal is one more unknown of each wave beside its node.
+Turning at Ω = ω, a rotor whirls in orbits x + i y = F e^{iωt} + b e^{−iωt}: the gyroscopic moment is an
+inertia, M − G for the forward wave F and M + G for the backward wave b. Thin discs make M − G indefinite; a
+forward mode of negative mass has λ < 0 and no critical speed. With x = F + b and y = −i (F − b) a stiffness k
+of (x, y) acts as T⁻¹ k T on (F, b), T = [[1, 1], [−i, i]]: Hermitian for a symmetric k, real without
+cross-coupling, and diagonal where x and y are alike: then F stands alone. A pedestal is one more unknown of
+each wave beside its node.
 
 With the Cholesky factor K + σ M = Uᴴ U (σ > 0 only where supports are soft or missing), U⁻ᴴ M U⁻¹ has the
 eigenvalues 1 / (λ + σ), the wanted ones the largest: from its block Krylov space, in which equal frequencies
-are not missed, or, of few unknowns, from all of them. λ is then the quotient of energies summed from the strains
-of the elements, which keeps digits that the matrices lose.
+are not missed, or, of few unknowns, from all of them. These vectors are then the basis of a Rayleigh–Ritz step
+with energies summed from the strains of the elements: they keep digits that the matrices lose, so that an
+element of 1/1000 of its neighbour costs 1e-8 of a frequency, not 1e-4.
 
-Measured for three modes, milliseconds, this and scipy's `eigsh` on sparse matrices with σ: 0.4 and 2.1 at 23
-elements, 0.7 and 2.6 at 92, 1.4 and 8 at 460.
+Measured for three modes with all else that `critical_speeds` does, milliseconds: 0.6 at 23 elements, 0.9 at 92
+and 1.8 at 460. `scipy.sparse.linalg.eigsh` on sparse matrices alone takes five times as much, dense `eigh` of
+the 184 unknowns of 92 elements ten times.
 """
 
 from __future__ import annotations
@@ -423,62 +426,73 @@ def critical_speeds_near(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 
 
 def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Spectrum], tuple[str, ...], str]:
-    """The n lowest crossings of natural frequency and speed in the tables, warnings, and what is cut off.
-
-    λ − Ω² of a mode changes its sign between two speeds, or its smallest size does.
-    """
-    from scipy.optimize import brentq, minimize_scalar
-
+    """The n lowest crossings of natural frequency and speed in the tables, warnings, and what is cut off."""
     tables = [support.speeds for support in rotor.supports if support.speeds]
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
         raise ValueError("the tables of the supports have no speed in common: extend them")
-    knots = rotor.knots[(rotor.knots >= first) & (rotor.knots <= last)]
-    speeds = np.interp(np.arange(_PARTS * (knots.size - 1) + 1) / _PARTS, np.arange(knots.size), knots)
-    top = (1.01 * last) ** 2
+    begin, count, crossings = _crossings(
+        rotor, A, rotor.knots[(rotor.knots >= first) & (rotor.knots <= last)], n
+    )
+    band = f"between {first:.6g} and {last:.6g} rad/s, where the bearing tables hold"
+    lowest = f"the lowest natural frequency at {first:.6g} rad/s is {begin:.6g} rad/s"
+    if not count:
+        raise ValueError(f"no critical speed lies {band}; {lowest}: extend the tables")
+    warnings: tuple[str, ...] = ()
+    if count < n:
+        warnings += (f"there are only {count} of {n} critical speeds {band}; extend them to find more",)
+    if begin < first:
+        warnings += (f"{lowest}, where the bearing tables begin: {NOT_COUNTED}",)
+    cut = f"the list is cut: {counted(count - n, 'more critical speed')} in this range; -n {count} lists all"
+    modes = [_positive(whole_rotor(rotor, A, speed), k + 1).only(slice(k, k + 1)) for speed, k in crossings]
+    for mode, (speed, _) in zip(modes, crossings, strict=True):
+        mode.squares[:] = speed**2
+    return modes, warnings, cut if count > n else ""
 
-    def at(speed: float, modes: int = 1) -> Spectrum:
-        return _positive(whole_rotor(rotor, A, speed), modes, top)
+
+def _crossings(
+    rotor: Rotor, A: Matrices, knots: FloatArray, n: int
+) -> tuple[float, int, list[tuple[float, int]]]:
+    """Lowest natural frequency at the first knot, number of crossings, and the n lowest: speed, mode from 0.
+
+    λ − Ω² of a mode changes its sign between two speeds of a grid, or between one of them and a dip.
+    """
+    from scipy.optimize import brentq, minimize_scalar
+
+    speeds = np.interp(np.arange(_PARTS * (knots.size - 1) + 1) / _PARTS, np.arange(knots.size), knots)
+    top = (1.01 * knots[-1]) ** 2
 
     def gap(speed: float, k: int, sign: float = 1.0) -> float:
         squares = _positive(whole_rotor(rotor, A, speed), k + 1).squares
         return sign * float((squares[k] if k < squares.size else top) - speed**2)
 
-    lists = [at(speed).squares for speed in speeds]
+    lists = [np.zeros(1)]
+    for speed in speeds:
+        lists.append(_positive(whole_rotor(rotor, A, speed), lists[-1].size, top).squares)
+    lists = lists[1:]
+    if 0 < lists[-1][0] < 1e-12 * top:
+        raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
     brackets = []
     for k, squares in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
-        gaps = dict(zip(speeds, squares - speeds**2, strict=True))
-        values = np.array(list(gaps.values()))
-        for i in range(speeds.size):
-            near = slice(max(i - 1, 0), i + 2)
-            size, sign = np.abs(values[near]), np.sign(values[i])
-            if abs(values[i]) == size.min() < np.ptp(size) and (sign * values[near] > 0).all():
-                ends, tolerance = speeds[near][[0, -1]], {"xatol": 1e-7 * last}
-                dip = minimize_scalar(gap, bounds=ends, args=(k, sign), options=tolerance)
-                gaps[dip.x] = sign * dip.fun
-        for (a, one), (b, other) in itertools.pairwise(sorted(gaps.items())):
+        gaps = squares - speeds**2
+        points = dict(zip(speeds, gaps, strict=True))
+        for i, sign in enumerate(np.sign(gaps)):
+            beside = [j for j in (i - 1, i + 1) if 0 <= j < gaps.size and sign * gaps[j] > 0]
+            near = [i, *beside]
+            size = np.abs(gaps[near])
+            if size[0] == size.min() < np.ptp(size):
+                inside = speeds[i] + 0.01 * (speeds[beside[0]] - speeds[i])
+                if len(beside) > 1 or gap(inside, k, sign) < size[0]:
+                    ends = speeds[min(near)], speeds[max(near)]
+                    dip = minimize_scalar(gap, bounds=ends, args=(k, sign), options={"xatol": 1e-7 * ends[1]})
+                    points[dip.x] = sign * dip.fun
+        for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
             if (one > 0) != (other > 0):
                 brackets.append((b, a, k))
     brackets.sort()
-    count = len(brackets)
-    within = [one for one in brackets if one[1] < brackets[min(n, count) - 1][0]]
-    crossings = sorted((brentq(gap, a, b, (k,), 1e-11 * b, 1e-14), k) for b, a, k in within)[:n]
-    begin = math.sqrt(lists[0][0])
-    lowest = (
-        f"at {first:.6g} rad/s, where the tables begin, the lowest natural frequency is {begin:.6g} rad/s"
-    )
-    band = f"between {first:.6g} and {last:.6g} rad/s, where the bearing tables hold"
-    warnings: tuple[str, ...] = ()
-    if not count:
-        raise ValueError(f"no critical speed lies {band}; {lowest}: extend the tables")
-    if count < n:
-        warnings += (f"only {count} of {n} critical speeds lie {band}; extend them to find more",)
-    if begin < first:
-        warnings += (f"{lowest}: {NOT_COUNTED}",)
-    cut = f"the list is cut: {counted(count - n, 'more critical speed')} in this range; -n {count} lists all"
-    modes = [(speed, at(speed, k + 1).only(slice(k, k + 1))) for speed, k in crossings]
-    parts = [replace(mode, squares=np.array([speed**2])) for speed, mode in modes]
-    return parts, warnings, cut if count > n else ""
+    near = [each for each in brackets if each[1] < brackets[min(n, len(brackets)) - 1][0]]
+    roots = sorted((brentq(gap, a, b, (k,), 1e-11 * b, 1e-14), k) for b, a, k in near)
+    return math.sqrt(lists[0][0]), len(brackets), roots[:n]
 
 
 def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
@@ -594,9 +608,8 @@ def _pencil(
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
             spring(support.tilting_stiffness * np.eye(2), tilts[:, support.node - 1])
-    R = np.zeros((places.size, planes, 2))
-    R[waves, wave, 0], R[tilts, wave, 1] = 1.0, 1 / rotor.positions[-1]
-    R[waves, wave, 1] = rotor.positions / rotor.positions[-1]
+    R, s = np.zeros((places.size, planes, 2)), rotor.positions / rotor.positions[-1]
+    R[waves, wave], R[tilts, wave, 1] = np.stack((np.ones_like(s), s), axis=1), 1 / rotor.positions[-1]
     R = R.reshape(places.size, -1)
     energies = [R[u].T @ form @ R[u] for u, form in springs]
     hold = float(sum(np.trace(E).real for E in energies)) / planes
@@ -673,6 +686,8 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     from scipy.linalg import lapack
 
     free, thin = pencil.rigid.shape[1] > 0, bool((pencil.mass[-1] < 0).any())
+    if not pencil.rotor.total_mass:
+        raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
     scale = rigid_scale(pencil.rotor)
     firm = not free and pencil.hold >= 1e-3 * scale * pencil.rotor.total_mass
     pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
@@ -707,7 +722,7 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     except np.linalg.LinAlgError:
         raise ValueError(_UNSTABLE) from None
     mu, Y = np.linalg.eigh(L @ (moving.conj().T @ multiply(pencil.mass, moving)) @ L.conj().T)
-    order = np.argsort(-np.abs(mu), kind="stable")
+    order = np.argsort(-np.abs(mu), kind="stable")[: max(m - free, 0)]
     X = np.hstack((fixed, moving @ (L.conj().T @ Y[:, order] / np.sqrt(np.abs(mu[order])))))[:, :m]
     signs = np.append(np.ones(free), np.sign(mu[order]))[:m]
     energy = pencil.energy(X).diagonal().real * (np.arange(m) >= free)
@@ -718,8 +733,7 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
             f"the mesh of {rotor.n_elements} elements is too fine for float64: join neighbouring elements, "
             "50 to 200 are ample for a rotor"
         )
-    order = np.argsort(np.abs(squares + shift), kind="stable")
-    return Spectrum(squares, X, signs, shift, U, rounding, pencil).only(order)
+    return Spectrum(squares, X, signs, shift, U, rounding, pencil)
 
 
 def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:

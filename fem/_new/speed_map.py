@@ -1,0 +1,154 @@
+"""Undamped critical speed map: critical speeds over the stiffness of the supports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem._new.rotor import Rotor, Support
+from fem._new.undamped import Result, lowest_critical_speeds
+from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.checks import whole
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table, frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["SpeedMap", "speed_map"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpeedMap(Result):
+    """Critical speeds over support stiffness.
+
+    Attributes
+    ----------
+    stiffness
+        Of each support of the map, N/m, shape (K,).
+    speeds
+        Critical speeds, rad/s, shape (K, n); NaN where a mode has none (thin discs).
+    free, pinned
+        Their limits for vanishing and for infinite stiffness, rad/s, shape (n,).
+    own
+        What the supports really have: label, stiffness (N/m) and the speeds (rad/s) at which they have it
+        (none: at all speeds).
+    rotor
+        The rotor.
+    """
+
+    stiffness: FloatArray
+    speeds: FloatArray
+    free: FloatArray
+    pinned: FloatArray
+    own: tuple[tuple[str, FloatArray, FloatArray], ...]
+    rotor: Rotor
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; one list of speeds per mode."""
+        return plain(
+            {
+                "stiffness_N_per_m": self.stiffness,
+                "critical_speeds_rad_s": self.speeds.T,
+                "free_rad_s": self.free,
+                "pinned_rad_s": self.pinned,
+            }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The limits of the critical speeds; and the map, a row for each stiffness."""
+        limits = (
+            Column("mode", range(1, self.free.size + 1)),
+            Column("free supports, rpm", self.free * RPM, "{:.2f}".format, "free_rad_s.*", RPM),
+            Column("pinned, rpm", self.pinned * RPM, "{:.2f}".format, "pinned_rad_s.*", RPM),
+        )
+        chart = (
+            Column("stiffness_N_per_m", self.stiffness, "{:.4g}".format, "stiffness_N_per_m.*"),
+            *(Column(f"critical_speed_{k}_rad_s", v) for k, v in enumerate(self.speeds.T, start=1)),
+        )
+        return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per stiffness, one column per critical speed."""
+        return frame(self.tables()[1])
+
+    def sentence(self) -> str:
+        """What the map is of."""
+        low, high = self.stiffness[0], self.stiffness[-1]
+        return f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each."
+
+
+def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> SpeedMap:
+    """Compute the undamped critical speeds for supports of equal stiffness.
+
+    Forward synchronous whirl with gyroscopic effect, as `critical_speeds`. Damping and cross-coupling play no
+    part, and a support of the map stands on the ground.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    stiffness
+        N/m, ascending; by default eight decades around the shaft's own stiffness 48 E I / L³.
+    n
+        How many critical speeds.
+
+    Raises
+    ------
+    ValueError
+        For impossible stiffness, a rotor without supports, or more critical speeds than the model has.
+    """
+    if not rotor.supports:
+        raise ValueError("the rotor has no support whose stiffness could vary: add supports")
+    n = whole(n, "the number of critical speeds")
+    bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment))
+    flexural = 48 * bending / rotor.positions[-1] ** 4
+    try:
+        k = (
+            flexural * np.logspace(-4, 4, 33)
+            if stiffness is None
+            else np.atleast_1d(np.array(stiffness, float))
+        )
+    except (TypeError, ValueError):
+        raise ValueError("stiffness must be numbers in N/m") from None
+    if k.ndim != 1 or not k.size or not (np.isfinite(k) & (k > 0)).all() or (np.diff(k) <= 0).any():
+        raise ValueError("stiffness must be finite, above 0 and ascending, in N/m")
+
+    def at(value: float) -> FloatArray:
+        """The n lowest, NaN for those that thin discs take away."""
+        supports = [
+            Support(s.node, value, name=s.name, kind=s.kind, tilting_stiffness=s.tilting_stiffness)
+            for s in rotor.supports
+        ]
+        least = 1 if rotor.model.gyroscopic else n
+        lowest = lowest_critical_speeds(replace(rotor, supports=supports), n, least).frequencies[:n]
+        return np.append(lowest, np.full(n - lowest.size, np.nan))
+
+    speeds = np.array([at(float(value)) for value in k])
+    # ω∞ (1 − c/k) for stiff supports; for soft ones ω₀ + c k, or, of rigid motions, the root of k.
+    stiff, soft = max(1e5 * flexural, 10 * float(k[-1])), 1e-4 * float(k[0])
+    pinned = 2 * at(2 * stiff) - at(stiff)
+    one, softer = at(soft), at(soft / 4)
+    free = np.where(np.abs(softer / one - 0.5) < 0.05, 0.0, softer - (one - softer) / 3)
+    read_only(k, speeds, free, pinned)
+    curves = [
+        curve for i, s in enumerate(rotor.supports, 1) for curve in _curves(s, s.name or f"support {i}")
+    ]
+    return SpeedMap(k, speeds, free, pinned, tuple(curves), rotor)
+
+
+def _curves(support: Support, name: str) -> list[tuple[str, FloatArray, FloatArray]]:
+    """Label, stiffness with its pedestal, and the speeds at which the support has it."""
+    where = np.array(support.speeds)
+    own = support.at(where if where.size else np.zeros(1))[0][:, [0, 1], [0, 1]]
+    if support.pedestal is not None:
+        stand = np.array(support.pedestal.xy("stiffness"))
+        own = own * stand / (own + stand)
+    x, y = own.T
+    return (
+        [(name, x, where)] if np.array_equal(x, y) else [(f"{name}, x", x, where), (f"{name}, y", y, where)]
+    )
