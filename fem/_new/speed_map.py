@@ -107,12 +107,10 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     n = whole(n, "the number of critical speeds")
     bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment))
     flexural = 48 * bending / rotor.positions[-1] ** 4
+    if stiffness is None:
+        stiffness = flexural * np.logspace(-4, 4, 33)
     try:
-        k = (
-            flexural * np.logspace(-4, 4, 33)
-            if stiffness is None
-            else np.atleast_1d(np.array(stiffness, float))
-        )
+        k = np.atleast_1d(np.array(stiffness, float))
     except (TypeError, ValueError):
         raise ValueError("stiffness must be numbers in N/m") from None
     if k.ndim != 1 or not k.size or not (np.isfinite(k) & (k > 0)).all() or (np.diff(k) <= 0).any():
@@ -120,10 +118,7 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
 
     def at(value: float) -> FloatArray:
         """The n lowest, NaN for those that thin discs take away."""
-        supports = [
-            Support(s.node, value, name=s.name, kind=s.kind, tilting_stiffness=s.tilting_stiffness)
-            for s in rotor.supports
-        ]
+        supports = [Support(s.node, value, tilting_stiffness=s.tilting_stiffness) for s in rotor.supports]
         least = 1 if rotor.model.gyroscopic else n
         lowest = lowest_critical_speeds(replace(rotor, supports=supports), n, least).frequencies[:n]
         return np.append(lowest, np.full(n - lowest.size, np.nan))
@@ -135,20 +130,16 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     one, softer = at(soft), at(soft / 4)
     free = np.where(np.abs(softer / one - 0.5) < 0.05, 0.0, softer - (one - softer) / 3)
     read_only(k, speeds, free, pinned)
-    curves = [
-        curve for i, s in enumerate(rotor.supports, 1) for curve in _curves(s, s.name or f"support {i}")
-    ]
-    return SpeedMap(k, speeds, free, pinned, tuple(curves), rotor)
+    curves = (_curves(s, s.name or f"support {i}") for i, s in enumerate(rotor.supports, 1))
+    return SpeedMap(k, speeds, free, pinned, sum(curves, ()), rotor)
 
 
-def _curves(support: Support, name: str) -> list[tuple[str, FloatArray, FloatArray]]:
+def _curves(support: Support, name: str) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
     """Label, stiffness with its pedestal, and the speeds at which the support has it."""
     where = np.array(support.speeds)
-    own = support.at(where if where.size else np.zeros(1))[0][:, [0, 1], [0, 1]]
+    k = support.at(where if where.size else np.zeros(1))[0][:, [0, 1], [0, 1]]
     if support.pedestal is not None:
-        stand = np.array(support.pedestal.xy("stiffness"))
-        own = own * stand / (own + stand)
-    x, y = own.T
-    return (
-        [(name, x, where)] if np.array_equal(x, y) else [(f"{name}, x", x, where), (f"{name}, y", y, where)]
-    )
+        k = k * support.pedestal.xy("stiffness") / (k + support.pedestal.xy("stiffness"))
+    x, y = k.T
+    alike = np.array_equal(x, y)
+    return ((name, x, where),) if alike else ((f"{name}, x", x, where), (f"{name}, y", y, where))
