@@ -109,10 +109,7 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     flexural = 48 * bending / rotor.positions[-1] ** 4
     if stiffness is None:
         stiffness = flexural * np.logspace(-4, 4, 33)
-    try:
-        k = np.atleast_1d(np.array(stiffness, float))
-    except (TypeError, ValueError):
-        raise ValueError("stiffness must be numbers in N/m") from None
+    k = np.atleast_1d(np.array(stiffness, float))
     if k.ndim != 1 or not k.size or not (np.isfinite(k) & (k > 0)).all() or (np.diff(k) <= 0).any():
         raise ValueError("stiffness must be finite, above 0 and ascending, in N/m")
 

@@ -78,7 +78,7 @@ def test_results_speak():
         ([1e8, 1e7], {}, "ascending"),
         ([-1.0, 1e7], {}, "above 0"),
         ([math.inf], {}, "finite"),
-        (["stiff"], {}, "numbers"),
+        (["stiff"], {}, "could not convert"),
         ([1e8], {"n": 0}, "cannot be found"),
     ],
 )
