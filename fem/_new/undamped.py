@@ -9,13 +9,12 @@ each wave beside its node.
 
 With the Cholesky factor K + σ M = Uᴴ U (σ > 0 only where supports are soft or missing), U⁻ᴴ M U⁻¹ has the
 eigenvalues 1 / (λ + σ), the wanted ones the largest: from its block Krylov space, in which equal frequencies
-are not missed, or, of few unknowns, from all of them. These vectors are then the basis of a Rayleigh–Ritz step
-with energies summed from the strains of the elements: they keep digits that the matrices lose, so that an
-element of 1/1000 of its neighbour costs 1e-8 of a frequency, not 1e-4.
+are not missed, or, of few unknowns, from all of them. These vectors span a Rayleigh–Ritz step with energies
+summed from the strains of the elements: they keep digits that the matrices lose, so that an element
+of 1/1000 of its neighbour costs 1e-8 of a frequency, not 1e-4.
 
-Measured for three modes with all else that `critical_speeds` does, milliseconds: 0.6 at 23 elements, 0.9 at 92
-and 1.8 at 460. `scipy.sparse.linalg.eigsh` on sparse matrices alone takes five times as much, dense `eigh` of
-the 184 unknowns of 92 elements ten times.
+Measured for three modes with all else that `critical_speeds` does, milliseconds: 0.6 at 23 elements, 0.9 at
+92 and 1.8 at 460; `scipy.sparse.linalg.eigsh` on sparse matrices alone takes about five times as much.
 """
 
 from __future__ import annotations
@@ -286,11 +285,9 @@ def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
     coarse, middle, fine = (frequencies[:common] for frequencies in lists)
     first, second = coarse - middle, middle - fine
     extrapolated = coarse - 16 / 15 * first
-    scale = np.maximum(extrapolated, np.finfo(float).tiny)
-    errors = np.where(extrapolated > 0, (coarse - extrapolated) / scale, 0.0)
-    clear = (np.abs(second) > 1e-10 * scale) & (first * second > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        rates = np.where(clear, np.log2(np.abs(first / second)), np.nan)
+        errors = np.where(extrapolated > 0, 16 / 15 * first / extrapolated, 0.0)
+        rates = np.log2(np.where(np.abs(second) > 1e-10 * extrapolated, first / second, np.nan))
     read_only(extrapolated, errors, rates)
     return MeshCheck(coarse, extrapolated, errors, rates, rotor.n_elements)
 
@@ -490,9 +487,10 @@ def _crossings(
             if (one > 0) != (other > 0):
                 brackets.append((b, a, k))
     brackets.sort()
-    near = [each for each in brackets if each[1] < brackets[min(n, len(brackets)) - 1][0]]
-    roots = sorted((brentq(gap, a, b, (k,), 1e-11 * b, 1e-14), k) for b, a, k in near)
-    return math.sqrt(lists[0][0]), len(brackets), roots[:n]
+    count = len(brackets)
+    low = [bracket for bracket in brackets if bracket[1] < brackets[min(n, count) - 1][0]]
+    roots = sorted((brentq(gap, a, b, (k,), 1e-11 * b, 1e-14), k) for b, a, k in low)
+    return math.sqrt(lists[0][0]), count, roots[:n]
 
 
 def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
@@ -548,8 +546,8 @@ class Pencil:
     def energy(self, X: AnyArray) -> AnyArray:
         """Xᴴ K X, shape (m, m), summed from strains: few digits are lost."""
         parts = [strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1]) for unknowns in self.shaft]
-        springs = sum(X[u].conj().T @ k @ X[u] for u, k in self.springs)
-        return sum((S.conj().T @ S for S in parts), springs)
+        energies = [S.conj().T @ S for S in parts] + [X[u].conj().T @ k @ X[u] for u, k in self.springs]
+        return np.asarray(sum(energies))
 
 
 def one_plane(rotor: Rotor, A: Matrices, whirl: Whirl = 0, springs: dict[int, float] | None = None) -> Pencil:
@@ -588,7 +586,7 @@ def _pencil(
             i, j = shaft[:, : A.size - A.width + row], shaft[:, A.width - row :]
             K[width + i - j, j] += A.shaft[row, A.width - row :]
             M[width + i - j, j] += inertia[:, row, A.width - row :]
-    springs = []
+    springs: list[tuple[IndexArray, AnyArray]] = []
 
     def spring(k: FloatArray, *ends: IndexArray) -> None:
         form = (FROM_XY @ k @ TO_XY)[:planes, :planes]
@@ -608,14 +606,12 @@ def _pencil(
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
             spring(support.tilting_stiffness * np.eye(2), tilts[:, support.node - 1])
-    R, s = np.zeros((places.size, planes, 2)), rotor.positions / rotor.positions[-1]
-    R[waves, wave], R[tilts, wave, 1] = np.stack((np.ones_like(s), s), axis=1), 1 / rotor.positions[-1]
-    R = R.reshape(places.size, -1)
-    energies = [R[u].T @ form @ R[u] for u, form in springs]
-    hold = float(sum(np.trace(E).real for E in energies)) / planes
-    values, V = np.linalg.eigh(
-        sum((E / np.abs(k).max() for E, (_, k) in zip(energies, springs)), np.zeros((2 * planes, 2 * planes)))
-    )
+    motions, s = np.zeros((places.size, planes, 2)), rotor.positions / rotor.positions[-1]
+    motions[waves, wave], motions[tilts, wave, 1] = np.column_stack((s**0, s)), 1 / rotor.positions[-1]
+    R = motions.reshape(places.size, -1)
+    energies = [(R[u].T @ form @ R[u], np.abs(form).max()) for u, form in springs]
+    hold = float(sum(np.trace(E).real for E, _ in energies)) / planes
+    values, V = np.linalg.eigh(sum((E / largest for E, largest in energies), np.zeros((2 * planes,) * 2)))
     return Pencil(rotor, A, K, M, waves, tilts, shaft, springs, hold, R @ V[:, values <= 1e-13 * values[-1]])
 
 
@@ -653,8 +649,10 @@ class Spectrum:
 
     def only(self, which: slice | IndexArray) -> Spectrum:
         """Some modes."""
-        each = [array[..., which] for array in (self.squares, self.vectors, self.signs, self.rounding)]
-        return Spectrum(*each[:3], self.shift, self.factor, each[3], self.pencil)
+        squares, signs, rounding = (array[which] for array in (self.squares, self.signs, self.rounding))
+        return Spectrum(
+            squares, self.vectors[:, which], signs, self.shift, self.factor, rounding, self.pencil
+        )
 
     @property
     def motion(self) -> ComplexArray:
@@ -708,8 +706,9 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     """
     pencil = pencil or one_plane(rotor, A)
     shift, U = factor(pencil)
-    X, R = _vectors(pencil, U, m), pencil.rigid
+    R = pencil.rigid
     free = R.shape[1]
+    X = _vectors(pencil, U, max(m, free))
     if free:  # the translation first, then what turns about the centre of mass
         G = R.conj().T @ multiply(pencil.mass, R)
         if np.linalg.cond(G) > 1e13:
