@@ -59,7 +59,8 @@ NO_MASS = (
 )
 _UNSTABLE = (
     "the rotor on its supports is statically unstable, or its stiffness is lost in float64: a support has "
-    "negative stiffness; check its sign and size"
+    "negative stiffness, elements are far too short, or thin discs (polar inertia above diametral) turn a "
+    "free rotor, which soft supports at two nodes would hold"
 )
 _PARTS = 8  # of each interval of the bearing tables, between which a mode crosses the speed once or twice
 _NORMAL_95 = 1.959964
@@ -612,7 +613,18 @@ def _pencil(
     energies = [(R[u].T @ form @ R[u], np.abs(form).max()) for u, form in springs]
     hold = float(sum(np.trace(E).real for E, _ in energies)) / planes
     values, V = np.linalg.eigh(sum((E / largest for E, largest in energies), np.zeros((2 * planes,) * 2)))
-    return Pencil(rotor, A, K, M, waves, tilts, shaft, springs, hold, R @ V[:, values <= 1e-13 * values[-1]])
+    return Pencil(
+        rotor,
+        A,
+        K,
+        M,
+        waves,
+        tilts,
+        shaft,
+        springs,
+        hold,
+        R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()],
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -693,7 +705,7 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
         U, info = pbtrf(pencil.stiffness + shift * pencil.mass)
         if info == 0:
             return shift, U
-    raise ValueError(_UNSTABLE if firm or thin else NO_MASS)
+    raise ValueError(NO_MASS if free and not thin else _UNSTABLE)
 
 
 def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None) -> Spectrum:
@@ -775,8 +787,8 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int) -> AnyArray:
             V, beta = np.linalg.qr(Z)
             mu, Q = largest(basis.conj().T @ image)
             # What the operator adds outside the basis; on fine meshes rounding stops it before the tolerance.
-            outside = np.linalg.norm(beta @ Q[-block:], axis=0) / np.abs(mu)
-            last, residual = residual, outside[:m].max(initial=0.0)
+            outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / np.abs(mu[:m])
+            last, residual = residual, outside.max()
             if residual < 3e-10 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, basis @ Q)[0])
     return np.asarray(tbtrs(U, largest(operator(np.eye(size, dtype=U.dtype)))[1])[0])
