@@ -67,7 +67,7 @@ class SpeedMap(Result):
             Column("pinned, rpm", self.pinned * RPM, "{:.2f}".format, "pinned_rad_s.*", RPM),
         )
         chart = (
-            Column("stiffness_N_per_m", self.stiffness, "{:.4g}".format, "stiffness_N_per_m.*"),
+            Column("stiffness_N_per_m", self.stiffness, "{:.4g}".format),
             *(Column(f"critical_speed_{k}_rad_s", v) for k, v in enumerate(self.speeds.T, start=1)),
         )
         return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
@@ -78,8 +78,9 @@ class SpeedMap(Result):
 
     def sentence(self) -> str:
         """What the map is of."""
-        low, high = self.stiffness[0], self.stiffness[-1]
-        return f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each."
+        return (
+            f"Map of critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m."
+        )
 
 
 def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> SpeedMap:
@@ -105,8 +106,8 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     if not rotor.supports:
         raise ValueError("the rotor has no support whose stiffness could vary: add supports")
     n = whole(n, "the number of critical speeds")
-    bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment))
-    flexural = 48 * bending / rotor.positions[-1] ** 4
+    bending = rotor.length @ (rotor.youngs_modulus * rotor.second_moment)
+    flexural = float(48 * bending / rotor.positions[-1] ** 4)
     if stiffness is None:
         stiffness = flexural * np.logspace(-4, 4, 33)
     k = np.atleast_1d(np.array(stiffness, float))
@@ -117,12 +118,12 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
         """The n lowest, NaN for those that thin discs take away."""
         supports = [Support(s.node, value, tilting_stiffness=s.tilting_stiffness) for s in rotor.supports]
         least = 1 if rotor.model.gyroscopic else n
-        lowest = lowest_critical_speeds(replace(rotor, supports=supports), n, least).frequencies[:n]
-        return np.append(lowest, np.full(n - lowest.size, np.nan))
+        lowest = lowest_critical_speeds(replace(rotor, supports=supports), n, least).frequencies
+        return np.append(lowest, n * [np.nan])[:n]
 
-    speeds = np.array([at(float(value)) for value in k])
+    speeds = np.array([at(value) for value in k.tolist()])
     # ω∞ (1 − c/k) for stiff supports; for soft ones ω₀ + c k, or, of rigid motions, the root of k.
-    stiff, soft = max(1e5 * flexural, 10 * float(k[-1])), 1e-4 * float(k[0])
+    stiff, soft = max(1e5 * flexural, 10 * k[-1]), 1e-4 * k[0]
     pinned = 2 * at(2 * stiff) - at(stiff)
     one, softer = at(soft), at(soft / 4)
     free = np.where(np.abs(softer / one - 0.5) < 0.05, 0.0, softer - (one - softer) / 3)
@@ -133,10 +134,9 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
 
 def _curves(support: Support, name: str) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
     """Label, stiffness with its pedestal, and the speeds at which the support has it."""
-    where = np.array(support.speeds)
-    k = support.at(where if where.size else np.zeros(1))[0][:, [0, 1], [0, 1]]
+    k, where = support.at(support.speeds or (0.0,))[0][:, [0, 1], [0, 1]], np.array(support.speeds)
     if support.pedestal is not None:
         k = k * support.pedestal.xy("stiffness") / (k + support.pedestal.xy("stiffness"))
-    x, y = k.T
-    alike = np.array_equal(x, y)
-    return ((name, x, where),) if alike else ((f"{name}, x", x, where), (f"{name}, y", y, where))
+    if np.array_equal(*k.T):
+        return ((name, k[:, 0], where),)
+    return tuple((f"{name}, {direction}", curve, where) for direction, curve in zip("xy", k.T, strict=True))
