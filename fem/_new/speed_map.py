@@ -19,8 +19,6 @@ from rotorid.base.tables import Column, Table, frame
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["SpeedMap", "speed_map"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpeedMap(Result):
@@ -107,7 +105,7 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
         raise ValueError("the rotor has no support whose stiffness could vary: add supports")
     n = whole(n, "the number of critical speeds")
     bending = rotor.length @ (rotor.youngs_modulus * rotor.second_moment)
-    flexural = float(48 * bending / rotor.positions[-1] ** 4)
+    flexural = 48 * bending / rotor.positions[-1] ** 4
     if stiffness is None:
         stiffness = flexural * np.logspace(-4, 4, 33)
     k = np.atleast_1d(np.array(stiffness, float))
@@ -117,8 +115,8 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     def at(value: float) -> FloatArray:
         """The n lowest, NaN for those that thin discs take away."""
         supports = [Support(s.node, value, tilting_stiffness=s.tilting_stiffness) for s in rotor.supports]
-        least = 1 if rotor.model.gyroscopic else n
-        lowest = lowest_critical_speeds(replace(rotor, supports=supports), n, least).frequencies
+        other = replace(rotor, supports=supports)
+        lowest = lowest_critical_speeds(other, n, 1 if rotor.model.gyroscopic else n).frequencies
         return np.append(lowest, n * [np.nan])[:n]
 
     speeds = np.array([at(value) for value in k.tolist()])

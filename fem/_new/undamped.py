@@ -23,7 +23,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,12 +45,10 @@ from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table, frame, html, terminal
-from rotorid.base.text import counted, error_figures, listing, percent, sentence
+from rotorid.base.text import counted, error_figures, listing, percent
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Whirl = Literal[-1, 0, 1]  # backward, without gyroscopic effect, forward
 
 DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
@@ -259,7 +257,7 @@ class MeshCheck(Result):
         if size > 1e-3:
             times = math.ceil((size / 1e-3) ** 0.25)
             text += f": elements {times} times shorter would bring all errors below 0.1 %"
-        return sentence(text)
+        return f"{text}."
 
 
 def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
@@ -443,8 +441,6 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Spectrum], tupl
         warnings += (f"{lowest}, where the bearing tables begin: {NOT_COUNTED}",)
     cut = f"the list is cut: {counted(count - n, 'more critical speed')} in this range; -n {count} lists all"
     modes = [_positive(whole_rotor(rotor, A, speed), k + 1).only(slice(k, k + 1)) for speed, k in crossings]
-    for mode, (speed, _) in zip(modes, crossings, strict=True):
-        mode.squares[:] = speed**2
     return modes, warnings, cut if count > n else ""
 
 
@@ -464,10 +460,10 @@ def _crossings(
         squares = _positive(whole_rotor(rotor, A, speed), k + 1).squares
         return sign * float((squares[k] if k < squares.size else top) - speed**2)
 
-    lists = [np.zeros(1)]
+    lists: list[FloatArray] = []
     for speed in speeds:
-        lists.append(_positive(whole_rotor(rotor, A, speed), lists[-1].size, top).squares)
-    lists = lists[1:]
+        count = lists[-1].size if lists else 1
+        lists.append(_positive(whole_rotor(rotor, A, speed), count, top).squares)
     if 0 < lists[-1][0] < 1e-12 * top:
         raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
     brackets = []
@@ -551,8 +547,8 @@ class Pencil:
         return np.asarray(sum(energies))
 
 
-def one_plane(rotor: Rotor, A: Matrices, whirl: Whirl = 0, springs: dict[int, float] | None = None) -> Pencil:
-    """Pencil of one plane, on given springs {node: N/m}; by default on the stiffness of plain supports."""
+def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, float] | None = None) -> Pencil:
+    """Pencil of one plane on springs {node: N/m}, by default of plain supports; `whirl` 1 is forward."""
     held = [(s.node, s.stiffness) for s in rotor.supports if s.plain] if springs is None else springs.items()
     return _pencil(rotor, A, (whirl,), [(node, k * np.eye(2), None) for node, k in held])
 
@@ -567,7 +563,7 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
 
 
 def _pencil(
-    rotor: Rotor, A: Matrices, whirls: Sequence[Whirl], held: list[tuple[int, FloatArray, Pedestal | None]]
+    rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, FloatArray, Pedestal | None]]
 ) -> Pencil:
     """Pencil on springs: node, stiffness in (x, y), shape (2, 2), and what they stand on."""
     held = [spring for spring in held if spring[1].any()]
@@ -699,9 +695,9 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     if not pencil.rotor.total_mass:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
     scale = rigid_scale(pencil.rotor)
-    firm = not free and pencil.hold >= 1e-3 * scale * pencil.rotor.total_mass
+    firm = pencil.hold >= 1e-3 * scale * pencil.rotor.total_mass
     pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
-    for shift in (0.0,) if firm else (scale, 0.0) if thin and not free else (scale,):
+    for shift in (scale,) if free else (0.0,) if firm else (scale, 0.0):
         U, info = pbtrf(pencil.stiffness + shift * pencil.mass)
         if info == 0:
             return shift, U
