@@ -197,31 +197,9 @@ def _map(document: Document, chart: SpeedMap | None, operating: Band) -> list[Pa
         )
         for name in ("free", "pinned")
     ]
-    tables = [Table("Limits of soft and of stiff supports", (modes, *limits))]
-    if met := found["intersections"]:
-        place, mega = "map.intersections.*.", 1e-6
-        meetings = (
-            Column("support", [item["support"] for item in met]),
-            Column("direction", [item["direction"] for item in met]),
-            Column("critical speed", [item["mode"] for item in met]),
-            Column(
-                "rpm",
-                [RPM * item["speed_rad_s"] for item in met],
-                "{:.1f}".format,
-                place + "speed_rad_s",
-                RPM,
-            ),
-            Column(
-                "stiffness, MN/m",
-                [mega * item["stiffness_N_per_m"] for item in met],
-                "{:.4g}".format,
-                place + "stiffness_N_per_m",
-                mega,
-            ),
-        )
-        tables.append(Table("With the stiffness that the supports have", meetings))
+    table = Table("Limits of soft and of stiff supports", (modes, *limits))
     sentence = "Undamped, every support of the same stiffness in x and y."
-    return [Part("Critical speed map", (sentence,), tuple(tables), (map_picture(chart, operating),))]
+    return [Part("Critical speed map", (sentence,), (table,), (map_picture(chart, operating),))]
 
 
 def _shapes(modes: Modes) -> tuple[Table, ...]:

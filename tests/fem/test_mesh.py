@@ -37,7 +37,7 @@ def test_rates_and_results():
     document = json.loads(json.dumps(check.to_dict()))
     assert document["elements"] == 23
     assert document["relative_error"] == check.errors.tolist()
-    assert check.to_frame().shape == (3, 5)
+    assert check.to_frame().shape == (3, 4)
     assert check.summary().startswith("The mesh of 23 elements changes these speeds by at most ")
     worst = 100 * np.abs(check.errors).max()
     assert f"{worst:.2g} % (critical speed {np.argmax(np.abs(check.errors)) + 1})" in check.summary()

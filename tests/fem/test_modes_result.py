@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 import fem
 from fem.matrices.banded_matrices import assemble, dense, general, multiply
-from fem.matrices.undamped_matrices import one_plane
-from fem.solvers.eigen import lowest_modes
+from fem._new.undamped import lowest_modes, one_plane
 
 # Roots of cos x cosh x = 1: the free beam.
 FREE = np.array([4.730040744862704, 7.853204624095838, 10.995607838001671])
@@ -43,7 +42,7 @@ def test_a_fine_mesh_is_said_and_a_hopeless_one_refused():
     assert fem.critical_speeds(rotor23()).warnings == ()
     (text,) = fem.critical_speeds(refined(rotor23(), 20)).warnings
     assert "460 elements" in text
-    assert "11 of 16 digits" in text
+    assert "by 7e-06 of their size" in text
     with pytest.raises(ValueError, match=r"6000 elements is too fine for float64.*join"):
         fem.critical_speeds(uniform(6000))
 
@@ -54,7 +53,6 @@ def test_rigid_body_modes_of_a_free_rotor():
     np.testing.assert_allclose(modes.frequencies[2:], free_beam(), rtol=1e-4)
     np.testing.assert_allclose(modes.shapes[:, 0], 1.0, rtol=1e-12)
     np.testing.assert_allclose(modes.shapes[:, 1], 1 - 2 * modes.positions, atol=1e-12)
-    assert any("2 rigid-body motions" in text for text in modes.warnings)
     assert modes.summary().count("rigid body") == 2
 
 
@@ -64,7 +62,6 @@ def test_one_support_leaves_one_rigid_motion_about_it():
     assert modes.frequencies[1] > 100
     # Node 1 does not move: scaled to the largest value.
     np.testing.assert_allclose(modes.shapes[:, 0], modes.positions, atol=1e-12)
-    assert any("1 rigid-body motion " in text for text in modes.warnings)
 
 
 @pytest.mark.parametrize("n", [10, 60, 300])
@@ -166,7 +163,10 @@ def test_bands_are_the_matrices(rotor):
     K = dense(pencil.stiffness)
     np.testing.assert_array_equal(K, K.T)
     np.testing.assert_allclose(multiply(pencil.stiffness, X), K @ X, rtol=1e-9, atol=1e-9 * np.abs(K).max())
-    energy = pencil.energy
+
+    def energy(Y):
+        return pencil.energy(Y).diagonal()
+
     np.testing.assert_allclose(energy(X), np.einsum("ij,ik,kj->j", X, K, X), rtol=1e-9)
     band = general(pencil.stiffness)
     i, j = np.nonzero(np.abs(np.subtract.outer(np.arange(A.size), np.arange(A.size))) <= 3)
@@ -204,10 +204,10 @@ def test_ignored_inertia_is_said():
 @pytest.mark.parametrize(
     ("rotor", "n", "message"),
     [
-        (uniform(3), 0, "0 critical speeds cannot be found: the model has 1 to 6"),
+        (uniform(3), 0, "0 critical speeds cannot be found: ask for 1 or more"),
         (uniform(3), 9, "9 critical speeds cannot be found"),
         (uniform(3), 2.0, "the number of critical speeds must be a whole number"),
-        (fem.Rotor([0.1] * 3, 0.05, density=0.0, supports=[fem.Support(1, 1e6)]), 1, "the model has 1 to 0"),
+        (fem.Rotor([0.1] * 3, 0.05, density=0.0, supports=[fem.Support(1, 1e6)]), 1, "the rotor has no mass"),
         (
             fem.Rotor([0.1] * 3, 0.05, density=0.0, discs=[fem.Disc(2, 1.0)]),
             1,

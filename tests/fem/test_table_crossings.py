@@ -123,7 +123,7 @@ def test_two_crossings_within_one_interval(dip):
     found = fem.critical_speeds(rotor(low, high), 3)
     np.testing.assert_allclose(found.frequencies, expected, rtol=1e-3)
     one = fem.critical_speeds(rotor(100.0, 200.0), 1)
-    assert "the list is cut: 1 more critical speed lies in this range, at 149.79" in one.cut
+    assert "the list is cut: 1 more critical speed in this range; -n 2 lists all" in one.cut
 
 
 def test_rigid_body_motions_are_not_counted():
@@ -134,7 +134,6 @@ def test_rigid_body_motions_are_not_counted():
         assert found.frequencies.size == rigid + 2
         assert (found.frequencies[:rigid] == 0).all()
         assert (found.frequencies[rigid:] > 0).all()
-        assert "beside the critical speeds asked for" in found.warnings[-1]
 
 
 def test_inertias_of_impossible_size_are_refused_at_once():
@@ -145,12 +144,3 @@ def test_inertias_of_impossible_size_are_refused_at_once():
         fem.critical_speeds(
             dataclasses.replace(rotor, model=fem.Model(rotary_inertia=True, gyroscopic=True)), 2
         )
-
-
-def test_modes_beyond_number_over_tables_are_refused():
-    knots = tuple(np.linspace(100.0, 1000.0, 7))
-    stiff = [1e8 * (1 + 0.5 * (-1) ** i) for i in range(len(knots))]
-    supports = [fem.Support(node, stiff, speeds=knots) for node in (1, 31)]
-    rotor = fem.Rotor([0.1] * 30, 0.2, density=7.85e9, supports=supports)
-    with pytest.raises(ValueError, match="too many to tell their crossings apart"):
-        fem.critical_speeds(rotor, 2)

@@ -1,0 +1,140 @@
+"""Undamped critical speed map: critical speeds over the stiffness of the supports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem._new.rotor import Rotor, Support
+from fem._new.undamped import Result, lowest_critical_speeds
+from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.checks import whole
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table, frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpeedMap(Result):
+    """Critical speeds over support stiffness.
+
+    Attributes
+    ----------
+    stiffness
+        Of each support of the map, N/m, shape (K,).
+    speeds
+        Critical speeds, rad/s, shape (K, n); NaN where a mode has none (thin discs).
+    free, pinned
+        Their limits for vanishing and for infinite stiffness, rad/s, shape (n,).
+    own
+        What the supports really have: label, stiffness (N/m) and the speeds (rad/s) at which they have it
+        (none: at all speeds).
+    rotor
+        The rotor.
+    """
+
+    stiffness: FloatArray
+    speeds: FloatArray
+    free: FloatArray
+    pinned: FloatArray
+    own: tuple[tuple[str, FloatArray, FloatArray], ...]
+    rotor: Rotor
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; one list of speeds per mode."""
+        return plain(
+            {
+                "stiffness_N_per_m": self.stiffness,
+                "critical_speeds_rad_s": self.speeds.T,
+                "free_rad_s": self.free,
+                "pinned_rad_s": self.pinned,
+            }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The limits of the critical speeds; and the map, a row for each stiffness."""
+        limits = (
+            Column("mode", range(1, self.free.size + 1)),
+            Column("free supports, rpm", self.free * RPM, "{:.2f}".format, "free_rad_s.*", RPM),
+            Column("pinned, rpm", self.pinned * RPM, "{:.2f}".format, "pinned_rad_s.*", RPM),
+        )
+        chart = (
+            Column("stiffness_N_per_m", self.stiffness, "{:.4g}".format),
+            *(Column(f"critical_speed_{k}_rad_s", v) for k, v in enumerate(self.speeds.T, start=1)),
+        )
+        return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per stiffness, one column per critical speed."""
+        return frame(self.tables()[1])
+
+    def sentence(self) -> str:
+        """What the map is of."""
+        return (
+            f"Map of critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m."
+        )
+
+
+def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> SpeedMap:
+    """Compute the undamped critical speeds for supports of equal stiffness.
+
+    Forward synchronous whirl with gyroscopic effect, as `critical_speeds`. Damping and cross-coupling play no
+    part, and a support of the map stands on the ground.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    stiffness
+        N/m, ascending; by default eight decades around the shaft's own stiffness 48 E I / L³.
+    n
+        How many critical speeds.
+
+    Raises
+    ------
+    ValueError
+        For impossible stiffness, a rotor without supports, or more critical speeds than the model has.
+    """
+    if not rotor.supports:
+        raise ValueError("the rotor has no support whose stiffness could vary: add supports")
+    n = whole(n, "the number of critical speeds")
+    bending = rotor.length @ (rotor.youngs_modulus * rotor.second_moment)
+    flexural = 48 * bending / rotor.positions[-1] ** 4
+    if stiffness is None:
+        stiffness = flexural * np.logspace(-4, 4, 33)
+    k = np.atleast_1d(np.array(stiffness, float))
+    if k.ndim != 1 or not k.size or not (np.isfinite(k) & (k > 0)).all() or (np.diff(k) <= 0).any():
+        raise ValueError("stiffness must be finite, above 0 and ascending, in N/m")
+
+    def at(value: float) -> FloatArray:
+        """The n lowest, NaN for those that thin discs take away."""
+        supports = [Support(s.node, value, tilting_stiffness=s.tilting_stiffness) for s in rotor.supports]
+        other = replace(rotor, supports=supports)
+        lowest = lowest_critical_speeds(other, n, 1 if rotor.model.gyroscopic else n).frequencies
+        return np.append(lowest, n * [np.nan])[:n]
+
+    speeds = np.array([at(value) for value in k.tolist()])
+    # ω∞ (1 − c/k) for stiff supports; for soft ones ω₀ + c k, or, of rigid motions, the root of k.
+    stiff, soft = max(1e5 * flexural, 10 * k[-1]), 1e-4 * k[0]
+    pinned = 2 * at(2 * stiff) - at(stiff)
+    one, softer = at(soft), at(soft / 4)
+    free = np.where(np.abs(softer / one - 0.5) < 0.05, 0.0, softer - (one - softer) / 3)
+    read_only(k, speeds, free, pinned)
+    curves = (_curves(s, s.name or f"support {i}") for i, s in enumerate(rotor.supports, 1))
+    return SpeedMap(k, speeds, free, pinned, sum(curves, ()), rotor)
+
+
+def _curves(support: Support, name: str) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
+    """Label, stiffness with its pedestal, and the speeds at which the support has it."""
+    k, where = support.at(support.speeds or (0.0,))[0][:, [0, 1], [0, 1]], np.array(support.speeds)
+    if support.pedestal is not None:
+        k = k * support.pedestal.xy("stiffness") / (k + support.pedestal.xy("stiffness"))
+    if np.array_equal(*k.T):
+        return ((name, k[:, 0], where),)
+    return tuple((f"{name}, {direction}", curve, where) for direction, curve in zip("xy", k.T, strict=True))
