@@ -10,8 +10,7 @@ from repetitions import FULL
 from whirl_rotors import machine
 
 import fem
-from fem.growth_check import growth_bound, unstable_windows
-from fem.windows import within
+from fem._new.stability import growth_bound, unstable_windows, within
 
 SPEEDS = np.linspace(50.0, 1500.0, 60)
 
