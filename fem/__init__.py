@@ -10,7 +10,7 @@ array([632.11])
 """
 
 from fem.api684_peaks import Peak, Peaks, required_margin
-from fem.campbell import Campbell, campbell
+from fem._new.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
 from fem.mesh import MeshCheck, mesh_check, refined

@@ -25,6 +25,7 @@ from fem._new.forces import InternalDamping
 from fem._new.response import whirl_direction
 from fem._new.rotor import Rotor
 from fem._new.whirl import (
+    DIRECTION_NAMES,
     GROWTH,
     Whirl,
     available_modes,
@@ -33,8 +34,7 @@ from fem._new.whirl import (
     solve,
     solve_whirl,
 )
-from fem.orbits import DIRECTION_NAMES
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
@@ -280,21 +280,23 @@ def _fastest(whirl: Whirl, speed: float) -> complex:
     return complex(lam[np.argmax(rates)])
 
 
-def _scan(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
-    """Speeds between which the largest growth does not pass the level unseen, and it there.
+def near_level(values: FloatArray, level: float) -> IndexArray:
+    """Steps beside values that are the nearest to a level, where one more such step would pass it."""
+    beyond = values > level
+    near = np.where(beyond, level - values, values - level)
+    before, here, after = near[:-2], near[1:-1], near[2:]
+    close = (here >= np.maximum(before, after)) & (2 * here > np.minimum(before, after))
+    k = np.flatnonzero(close & (beyond[:-2] == beyond[1:-1]) & (beyond[1:-1] == beyond[2:]))
+    return np.union1d(k, k + 1)
 
-    Steps beside a value that is the nearest to the level are halved while one more such step would pass it.
-    """
+
+def _scan(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
+    """Speeds between which the largest growth does not pass its level unseen, and it there."""
     grid, rates = whirl.speeds, growth(whirl)
     for _ in range(_ROUNDS):
-        beyond = rates > GROWTH
-        near = np.where(beyond, -rates, rates)
-        before, here, after = near[:-2], near[1:-1], near[2:]
-        close = (here >= np.maximum(before, after)) & (2 * here - np.minimum(before, after) > GROWTH)
-        k = np.flatnonzero(close & (beyond[:-2] == beyond[1:-1]) & (beyond[1:-1] == beyond[2:]))
+        k = near_level(rates, GROWTH)
         if not k.size:
             break
-        k = np.union1d(k, k + 1)
         more = (grid[k] + grid[k + 1]) / 2
         rates = np.insert(rates, k + 1, growth(_at(whirl, *more)))
         grid = np.insert(grid, k + 1, more)
@@ -352,7 +354,7 @@ def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     return tuple(out)
 
 
-def asked_for(windows: Iterable[Window], speeds: FloatArray) -> tuple[Window, ...]:
+def holding(windows: Iterable[Window], speeds: FloatArray) -> tuple[Window, ...]:
     """Those that hold one of the speeds."""
     return tuple(window for window in windows if within((window,), speeds).any())
 
@@ -379,7 +381,7 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     if not growth_bound(rotor, grid).any():
         return ()
     whirl = solve_whirl(both_planes(rotor), grid, checked_number(rotor, None))
-    return asked_for(windows_of(covering(whirl)), asked)
+    return holding(windows_of(covering(whirl)), asked)
 
 
 def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
@@ -443,3 +445,8 @@ def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
         margin if np.isfinite(margin) else float("nan"),
         whirl.Q.P.rotor,
     )
+
+
+def runs_away(whirl: Whirl) -> list[bool]:
+    """At which speeds a motion grows without oscillating, length S."""
+    return [bool(real.max(initial=-np.inf) > AWAY * whirl.scale) for real in whirl.real]

@@ -1,4 +1,4 @@
-"""Names of the old modules until this one is written."""
+"""Names of the old modules until this one is written; and the base of results that it will have."""
 
 from fem.critical import (
     NOT_COUNTED,
@@ -19,6 +19,32 @@ from fem.solvers.eigen import (
     lowest_modes,
     rigid_scale,
 )
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.tables import Table, html, terminal
+
+
+class Result(Answered):
+    """A result with tables and one sentence."""
+
+    def tables(self) -> tuple[Table, ...]:
+        """The numbers."""
+        raise NotImplementedError
+
+    def sentence(self) -> str:
+        """The answer."""
+        raise NotImplementedError
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence and the first table."""
+        return Answer(self.sentence(), terminal(self.tables()[0]))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.sentence()})"
+
+    def _repr_html_(self) -> str:
+        return "\n".join(map(html, self.tables()))
+
 
 __all__ = [
     "DENSE",
@@ -27,6 +53,7 @@ __all__ = [
     "MeshCheck",
     "Modes",
     "Pencil",
+    "Result",
     "Spectrum",
     "critical_speeds",
     "critical_speeds_below",

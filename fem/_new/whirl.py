@@ -11,6 +11,7 @@ left with the loads
 
 less those that the basis answers. With e the part of U⁻ᵀ r outside of the images U x of the basis, the
 relative error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x): it is of second order, as a Rayleigh quotient's.
+(x has unit strain energy xᴴ K₀ x, and the larger |e|² is the estimate.)
 The largest directions of all e (static answers to gyroscopic loads, to the inertia of the support vectors,
 to material damping that differs along the shaft) join the basis, until the errors at the first, the middle
 and the last speed are small. Images are orthonormal, in which low modes keep their digits.
@@ -33,11 +34,13 @@ import numpy as np
 from fem._new.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem._new.response import whirl_direction
 from fem._new.rotor import Rotor, Support
-from fem._new.undamped import Spectrum, finite_modes, lowest_modes
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
+from fem._new.undamped import Result, Spectrum, finite_modes, lowest_modes
+from rotorid.base.answer import Answer
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
-from rotorid.base.tables import Column, Table, frame, html, terminal
+from rotorid.base.tables import Column, Table, frame
 from rotorid.base.text import counted
 
 if TYPE_CHECKING:
@@ -48,9 +51,7 @@ GROWTH = 1e-14
 NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
 DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
-_USUAL = 6  # modes, where nothing else is asked for
-_TOLERANCE = 3e-9  # of eigenvalues, relative to their size
-_ROUNDS = 8
+_TOLERANCE = 1e-8  # sum of all relative errors of eigenvalues at three speeds
 _MORE = 3  # modes of a plane beyond those asked for
 _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
@@ -99,58 +100,32 @@ class Whirl:
 
 
 def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
-    """The m modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`."""
+    """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`."""
     D, K = Q.at(speeds)
-    lam, moving, oscillates = _eigenvalues(Q.M, D, K, scale)
-    wanted = oscillates & ((lam.imag > 0) | (Q.P.planes == 1))
-    room = ((0, 0), (0, m))
-    key = np.pad(np.where(wanted, np.abs(lam.imag), np.inf), room, constant_values=np.inf)
-    order = np.argsort(key, axis=1, kind="stable")[:, :m]
-    there = np.isfinite(np.take_along_axis(key, order, axis=1))
-    values = np.where(there, np.take_along_axis(np.pad(lam, room), order, axis=1), 1j * scale)
-    values, vectors = _pairs(Q.M, D, K, values)
-    values[~there], vectors[~there] = NONE, NONE
-    at_rest = moving & ~oscillates
+    lam = _eigenvalues(Q.M, D, K, scale)
+    size, frequency = np.abs(lam), np.abs(lam.imag)
+    still = size < _STILL * scale
+    oscillates = ~still & (frequency > _REAL * size)
+    wanted = oscillates if Q.P.planes == 1 else oscillates & (lam.imag > 0)
+    rows, order = np.arange(len(lam))[:, None], np.argsort(np.where(wanted, frequency, np.inf), axis=1)[:, :m]
+    missing = ~wanted[rows, order]
+    values = lam[rows, order]
+    values[missing] = 1j * scale
+    # Something of every unknown, so that no mode is left out, and apart for modes of one frequency.
+    start = np.exp(1j * np.outer(np.arange(1, order.shape[1] + 1), np.arange(Q.size) ** 1.5))
+    vectors = _answers(Q.M, D, K, values, start)
+    vectors /= np.linalg.norm(vectors, axis=2, keepdims=True)
+    values = _by_work(Q.M, D, K, values, vectors)
+    values[missing] = vectors[missing] = NONE
+    at_rest = ~still & ~oscillates & (size < np.inf)
     real = tuple(np.sort(one.real[rest])[::-1] for one, rest in zip(lam, at_rest, strict=True))
-    still = np.sum(np.abs(lam) < _STILL * scale, axis=1)
-    return Whirl(Q, speeds, scale, values, vectors, real, still)
-
-
-def with_speeds(whirl: Whirl, more: FloatArray) -> Whirl:
-    """The same at more speeds, rad/s, in the same basis."""
-    other = solve(whirl.Q, more, whirl.values.shape[1], whirl.scale)
-    speeds, values, vectors, still = (
-        np.concatenate((getattr(whirl, name), getattr(other, name)))
-        for name in ("speeds", "values", "vectors", "still")
-    )
-    real, order = whirl.real + other.real, np.argsort(speeds, kind="stable")
-    return replace(
-        whirl,
-        speeds=speeds[order],
-        values=values[order],
-        vectors=vectors[order],
-        real=tuple(real[k] for k in order),
-        still=still[order],
-    )
-
-
-def all_values(Q: Reduced, speeds: FloatArray, scale: float) -> tuple[ComplexArray, BoolArray]:
-    """All eigenvalues at each speed, shape (S, 2 R), and which of them belong to motions that oscillate.
-
-    Motions without mass, and rigid-body motions without stiffness, count as −scale.
-    """
-    D, K = Q.at(speeds)
-    lam, moving, oscillates = _eigenvalues(Q.M, D, K, scale)
-    k, j = np.nonzero(oscillates & (np.abs(lam.real) < _QUIET * np.abs(lam)))
-    if k.size:
-        lam[k, j] = _pairs(Q.M, D[k], K[k], lam[k, j][:, None])[0][:, 0]
-    return np.where(moving, lam, -scale), oscillates
+    return Whirl(Q, speeds, scale, values, vectors, real, still.sum(axis=1))
 
 
 def polish(
     Q: Reduced, speeds: FloatArray, at: IndexArray, values: ComplexArray, vectors: ComplexArray, steps: int
-) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-    """Improve single pairs by inverse iteration: each step squares the error, or more.
+) -> tuple[ComplexArray, ComplexArray]:
+    """Improve single pairs by inverse iteration: each step squares the error.
 
     Parameters
     ----------
@@ -159,39 +134,21 @@ def polish(
     at
         Which speed each pair belongs to, shape (B,).
     values, vectors
-        Shapes (B,) and (B, R).
+        Shapes (B,) and (B, R), vectors of length 1.
     steps
-        How many, at least 1.
-
-    Returns
-    -------
-    values, vectors
-        Improved; vectors of length 1.
-    last
-        Relative change of the values by the last step, shape (B,).
+        How many.
     """
     D, K = Q.at(speeds[at])
-    mirrored = Q.P.mirrored(speeds[at])
-    lam, X, step = values[:, None], vectors[:, None], values[:, None]
+    lam, X = values[:, None], vectors[:, None]
     for _ in range(steps):
-        lam = lam * _BESIDE
-        inertia = 2 * lam[..., None] * Q.M
-        new = _solved(_dynamic(Q.M, D, K, lam), X @ np.swapaxes(D, 1, 2) + X @ inertia[:, 0])
-        left = Q.mirror(X) if mirrored else X.conj()
-        test = left @ D + left @ inertia[:, 0]
-        step = (test * X).sum(axis=2) / (test * new).sum(axis=2)
-        lam, X = lam - step, new / np.linalg.norm(new, axis=2, keepdims=True)
-    lam = _by_work(Q.M, D, K, lam, X)
-    return lam[:, 0], X[:, 0], np.abs(step / lam)[:, 0]
+        new = _answers(Q.M, D, K, lam, X @ np.swapaxes(D, 1, 2) + 2 * lam[..., None] * (X @ Q.M))
+        lam = lam - 1 / (X.conj() * new).sum(axis=2)
+        X = new / np.linalg.norm(new, axis=2, keepdims=True)
+    return _by_work(Q.M, D, K, lam, X)[:, 0], X[:, 0]
 
 
-def _eigenvalues(
-    M: FloatArray, D: AnyArray, K: AnyArray, scale: float
-) -> tuple[ComplexArray, BoolArray, BoolArray]:
-    """All λ, shape (S, 2 R); which belong to motions with mass and stiffness; which to those that oscillate.
-
-    λ without mass are σ + 1 in units of the scale.
-    """
+def _eigenvalues(M: FloatArray, D: AnyArray, K: AnyArray, scale: float) -> ComplexArray:
+    """All λ, shape (S, 2 R); −inf for motions without mass."""
     R = len(M)
     M, D = scale * scale * M, scale * D
     A = np.zeros((len(D), 2 * R, 2 * R), dtype=D.dtype)
@@ -201,48 +158,32 @@ def _eigenvalues(
     mu = np.linalg.eigvals(A).astype(complex)
     # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
     size = np.abs(mu)
-    finite = size > _INFINITE * size.max(axis=1, keepdims=True)
-    lam = scale * (_SHIFT + 1 / np.where(finite, mu, 1.0))
-    size = np.abs(lam)
-    moving = finite & (size >= _STILL * scale)
-    return lam, moving, moving & (np.abs(lam.imag) > _REAL * size)
+    massless = size <= _INFINITE * size.max(axis=1, keepdims=True)
+    mu[massless] = 1.0
+    return np.where(massless, -np.inf, scale * (_SHIFT + 1 / mu))
 
 
-def _pairs(
-    M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray
-) -> tuple[ComplexArray, ComplexArray]:
-    """Values (S, m) with real parts from work where these are small, and vectors, by inverse iteration."""
-    # Something of every unknown, so that no mode is left out, and apart for modes of one frequency.
-    start = np.exp(1j * np.outer(np.arange(1, values.shape[1] + 1), np.arange(len(M)) ** 1.5))
-    X = _solved(_dynamic(M, D, K, values * _BESIDE), start)
-    X /= np.linalg.norm(X, axis=2, keepdims=True)
-    return _by_work(M, D, K, values, X), X
-
-
-def _dynamic(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray) -> ComplexArray:
-    """λ² M + λ D + K, shape (S, m, R, R)."""
-    terms = np.stack((np.broadcast_to(M, D.shape), D, K), axis=1).reshape(len(D), 3, M.size)
-    powers = np.stack((values**2, values, np.ones_like(values)), axis=2)
-    return np.asarray((powers @ terms).reshape(*values.shape, *M.shape))
-
-
-def _solved(A: ComplexArray, b: ComplexArray) -> ComplexArray:
-    """A⁻¹ b of matrices (…, R, R) and vectors (…, R)."""
-    return np.asarray(np.linalg.solve(A, np.broadcast_to(b, A.shape[:-1])[..., None])[..., 0])
-
-
-def _by_work(
-    M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray
+def _answers(
+    M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, loads: ComplexArray
 ) -> ComplexArray:
+    """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
+    terms = np.stack((np.broadcast_to(M, D.shape), D, K), axis=1).reshape(len(D), 3, M.size)
+    lam = values * _BESIDE
+    powers = np.stack((lam * lam, lam, np.ones_like(lam)), axis=2)
+    dynamic = (powers @ terms).reshape(*lam.shape, *M.shape)
+    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads, dynamic.shape[:-1])[..., None])[..., 0])
+
+
+def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray) -> ComplexArray:
     """Values (S, m) whose small real parts have the digits of what damps and drives them."""
 
-    def form(A: AnyArray) -> ComplexArray:
-        return np.asarray((X.conj() * (X @ np.swapaxes(A, -1, -2))).sum(axis=2))
+    def form(A: AnyArray, sign: int) -> ComplexArray:
+        part = A + sign * np.swapaxes(A.conj(), -1, -2)
+        return np.asarray((X.conj() * (X @ np.swapaxes(part, -1, -2))).sum(axis=2))
 
     omega = values.imag
-    adjoint = np.swapaxes(D.conj(), 1, 2)
-    power = omega * form(D + adjoint).real + form(K - np.swapaxes(K.conj(), 1, 2)).imag
-    inertia = 4 * omega * form(M).real + form(D - adjoint).imag
+    power = omega * form(D, 1).real + form(K, -1).imag
+    inertia = 2 * omega * form(M, 1).real + form(D, -1).imag
     quiet = np.abs(values.real) < _QUIET * np.abs(values)
     return np.where(quiet, 1j * omega - power / inertia, values)
 
@@ -267,21 +208,14 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
 
 
 def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
-    """Modes of the rotor on the mean stiffness of its supports, and the lowest frequency that is not 0."""
-    K, _ = P.supports(speeds)
-    direct = np.einsum("ksii->ksi", K).real
-    floor = 1e-6 * float(np.abs(direct).max(initial=np.finfo(float).tiny))
-    mean = np.exp(np.log(np.maximum(direct, floor)).mean(axis=(0, 2)))
-    mean[mean < 2 * floor] = 0.0
-    for i, stand in zip(P.pedestals, P.pedestal_stiffness.mean(axis=1), strict=True):
-        mean[i] *= stand / (mean[i] + stand)
+    """Modes of the rotor on supports as at the middle speed, without pedestals, and its lowest frequency."""
+    K, _ = P.supports(speeds[speeds.size // 2, None])
+    springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
     supports = [
-        Support(s.node, float(k), tilting_stiffness=s.tilting_stiffness)
-        for s, k in zip(P.rotor.supports, mean, strict=True)
+        Support(s.node, float(spring), tilting_stiffness=s.tilting_stiffness)
+        for s, spring in zip(P.rotor.supports, springs, strict=True)
     ]
-    rotor: Rotor = replace(P.rotor, supports=supports)
-    A = assemble(rotor)
-    spectrum = lowest_modes(rotor, A, min(m, finite_modes(A)))
+    spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
     moving = spectrum.squares[spectrum.squares > 0]
     return spectrum, float(np.sqrt(moving[0] if moving.size else spectrum.shift))
 
@@ -292,42 +226,211 @@ def _reduced(P: Planes, speeds: FloatArray, m: int, modes: int) -> tuple[Reduced
 
     spectrum, scale = reference(P, speeds, modes)
     n, U = P.A.size, spectrum.factor
-    unit = np.zeros((n, len(P.rows)))
-    unit[P.rows, np.arange(len(P.rows))] = 1.0
-    images = dtbtrs(U, np.hstack((multiply(P.A.mass, spectrum.vectors), unit)), trans="T")[0]
-    images, Y = images / np.linalg.norm(images, axis=0), np.empty((n, 0))
+    begin = np.hstack((multiply(P.A.mass, spectrum.vectors), np.eye(n)[:, P.rows]))
+    images, Y = dtbtrs(U, begin, trans="T")[0], np.empty((n, 0))
+    images /= np.linalg.norm(images, axis=0)
     some = speeds[sorted({0, speeds.size // 2, speeds.size - 1})]
-    for _ in range(_ROUNDS):
+    while True:
         directions, sizes, _ = np.linalg.svd(images - Y @ (Y.T @ images), full_matrices=False)
-        left_out = np.cumsum(sizes[::-1] ** 2)[::-1]
-        new = directions[:, left_out > _TOLERANCE / 3][:, : n - Y.shape[1]]
+        errors = np.cumsum(sizes[::-1] ** 2)[::-1]  # if this direction and those after it do not join
+        if errors[0] <= _TOLERANCE:
+            break
+        new = directions[:, errors > _TOLERANCE][:, : n - Y.shape[1]]
         Y = np.hstack((Y, new - Y @ (Y.T @ new)))
         Q = project(P, dtbtrs(U, Y)[0])
         loads = _unanswered(solve(Q, some, m, scale), spectrum.shift)
-        columns = loads.reshape(-1, n).T
-        images = dtbtrs(U, np.hstack((columns.real, columns.imag)), trans="T")[0]
-        images -= Y @ (Y.T @ images)
-        errors = (images**2).sum(axis=0).reshape(2, *loads.shape[:3]).sum(axis=(0, 3))
-        if errors.max() <= _TOLERANCE or Y.shape[1] == n:
-            break
-    return Q, scale, float(errors.max())
+        images = dtbtrs(U, np.hstack((loads.real, loads.imag)), trans="T")[0]
+        images -= Y @ (Y.T @ images)  # twice, for rounding
+    return Q, scale, float(errors[0])
 
 
 def _unanswered(whirl: Whirl, shift: float) -> ComplexArray:
-    """The loads r of each pair for unit energy, shape (S, m, planes, size)."""
-    Q, A, p = whirl.Q, whirl.Q.P.A, whirl.Q.P.planes
+    """The loads r of each pair in each plane, shape (size, k)."""
+    A = whirl.Q.P.A
     lam = np.nan_to_num(whirl.values)[..., None, None]
-    X = np.nan_to_num(whirl.vectors)
-    shapes = Q.expand(X)
+    shapes = whirl.Q.expand(np.nan_to_num(whirl.vectors))
+    across = np.array([[-1j]]) if whirl.Q.P.planes == 1 else np.array([[0.0, 1.0], [-1.0, 0.0]])
+    inertia, turning, material = (
+        multiply(band, shapes.reshape(-1, A.size).T).T.reshape(shapes.shape)
+        for band in (A.mass, A.gyroscopic, A.material)
+    )
+    turned = across @ (lam * turning + material)
+    loads = (lam * lam - shift) * inertia + lam * material + whirl.speeds[:, None, None, None] * turned
+    return np.asarray(loads.reshape(-1, A.size).T)
 
-    def times(band: FloatArray) -> ComplexArray:
-        return multiply(band, shapes.reshape(-1, A.size).T).T.reshape(shapes.shape)
 
-    strain = np.linalg.norm(X[..., : p * Q.basis.shape[1]], axis=2) ** 2
-    motion = (X.conj() * (X @ Q.M)).sum(axis=2).real * np.abs(lam[..., 0, 0]) ** 2
-    energy = np.maximum(strain + motion, np.finfo(float).tiny)[..., None, None]
-    material = times(A.material)
-    across = np.array([[0.0, 1.0], [-1.0, 0.0]]) if p == 2 else np.array([[-1j]])
-    turning = whirl.speeds[:, None, None, None] * (across @ (lam * times(A.gyroscopic) + material))
-    return ((lam**2 - shift) * times(A.mass) + lam * material + turning) / np.sqrt(energy)
-from fem.whirl import WhirlModes, available_modes, checked_number, in_both_planes, missing_modes, whirl_modes  # noqa
+@dataclass(frozen=True, eq=False, repr=False)
+class WhirlModes(Result):
+    """Modes of the rotor at one speed, by rising frequency.
+
+    Attributes
+    ----------
+    speed
+        rad/s.
+    eigenvalues
+        λ with Im λ > 0, rad/s, shape (n,): the motion is Re(shape · e^{λt}).
+    x, y
+        Complex shapes in both planes, shape (N, n), the farthest node at amplitude 1.
+    real
+        Eigenvalues of motions that do not oscillate (overdamped, or running away), rad/s, as far as they
+        were found, slowest first.
+    error
+        Estimated relative error of the eigenvalues.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    """
+
+    speed: float
+    eigenvalues: ComplexArray
+    x: ComplexArray
+    y: ComplexArray
+    real: FloatArray
+    error: float
+    rotor: Rotor
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Whirl frequencies |Im λ|, rad/s, shape (n,)."""
+        return self.eigenvalues.imag
+
+    @property
+    def log_decrements(self) -> FloatArray:
+        """Logarithmic decrements −2π Re λ / |Im λ|, shape (n,); negative: unstable."""
+        return -2 * np.pi * self.eigenvalues.real / self.frequencies
+
+    @property
+    def direction(self) -> FloatArray:
+        """1 forward, −1 backward, 0 neither (a line, or different along the rotor), shape (n,)."""
+        return whirl_direction(self.x.T, self.y.T)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return plain(
+            {
+                "speed_rad_s": self.speed,
+                "frequencies_rad_s": self.frequencies,
+                "log_decrements": self.log_decrements,
+                "direction": self._ways,
+                "real_eigenvalues_rad_s": self.real,
+                "warnings": self.warnings,
+            }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The modes, one row each."""
+        columns = (
+            Column("mode", range(1, self.eigenvalues.size + 1)),
+            Column("whirl", self._ways),
+            Column("rpm", self.frequencies * RPM, "{:.2f}".format, "frequencies_rad_s.*", RPM),
+            Column("rad/s", self.frequencies, "{:.4f}".format, "frequencies_rad_s.*"),
+            Column("log dec", self.log_decrements, "{:z.4f}".format, "log_decrements.*"),
+        )
+        return (Table("whirl modes", columns),)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per mode: number, direction, frequency in rpm and rad/s, log decrement."""
+        return frame(self.tables()[0])
+
+    def sentence(self) -> str:
+        """How many modes there are at this speed, and which of them decays least."""
+        least = int(np.argmin(self.log_decrements))
+        return (
+            f"{counted(self.eigenvalues.size, 'whirl mode')} at {speed_text(self.speed)}; mode {least + 1} "
+            f"decays least, log decrement {self.log_decrements[least]:z.4g}."
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence, the modes and the warnings."""
+        return replace(super().answer, warnings=self.warnings)
+
+    @property
+    def _ways(self) -> list[str]:
+        return [DIRECTION_NAMES[way] for way in self.direction.tolist()]
+
+
+def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
+    """Compute the whirl modes of lowest frequency at a speed, in a reduced basis: to 1e-8 and better.
+
+    Parameters
+    ----------
+    rotor
+        The rotor with all its supports.
+    speed
+        rad/s.
+    n
+        How many modes that oscillate, by default 6 or all there are; forward and backward whirl count apart.
+
+    Raises
+    ------
+    ValueError
+        If the speed is impossible or outside the table of a support, the model has fewer modes, or the mesh
+        is too fine for float64.
+    """
+    speeds = checked_speeds([speed])
+    P = both_planes(rotor)
+    n = checked_number(rotor, n)
+    whirl = solve_whirl(P, speeds, n)
+    there = np.isfinite(whirl.values[0])
+    if not there.any():
+        raise ValueError(
+            f"the rotor has no oscillating mode at {speed:.6g} rad/s: all motions are overdamped"
+        )
+    values, x, y = in_both_planes(whirl.values[0, there], whirl.Q.nodes(whirl.vectors[0, there]))
+    size = np.hypot(np.abs(x), np.abs(y)).max(axis=1)
+    real = whirl.real[0]
+    warnings = missing_modes(P.planes, real, int(whirl.still[0]), values.size, n)
+    return WhirlModes(float(speeds[0]), values, x.T / size, y.T / size, real, whirl.error, rotor, warnings)
+
+
+def in_both_planes(
+    values: ComplexArray, shapes: ComplexArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Eigenvalues with Im λ > 0 and their x and y, from (…) and (…, planes, N)."""
+    if shapes.shape[-2] == 2:
+        return values, shapes[..., 0, :], shapes[..., 1, :]
+    z = shapes[..., 0, :]
+    back = values.imag < 0
+    # z = φ e^{λt}: x is its real part, y its imaginary part; the conjugate of λ has the positive frequency.
+    x = np.where(back[..., None], z.conj(), z)
+    return np.where(back, values.conj(), values), x, np.where(back[..., None], 1j, -1j) * x
+
+
+def missing_modes(planes: int, real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
+    """What is not among the modes, of which `count` of n oscillate."""
+    texts = [f"only {count} of {n} modes oscillate, the others are overdamped"] if count < n else []
+    if still > 1:
+        texts.append(f"rigid-body motions that nothing holds (eigenvalue 0, {still // 2} times) are left out")
+    if real.max(initial=0.0) > 0:
+        texts.append(
+            f"the rotor runs away without oscillating (eigenvalue {real.max():.4g} 1/s): "
+            "a support pushes it aside; check negative stiffness"
+        )
+    return tuple(texts)
+
+
+def checked_number(rotor: Rotor, n: int | None) -> int:
+    """How many modes to look for, by default 6 or all there are.
+
+    Raises
+    ------
+    ValueError
+        If the model has fewer.
+    """
+    available = available_modes(rotor)
+    n = min(6, available) if n is None else whole(n, "the number of modes")
+    if not 1 <= n <= available:
+        raise ValueError(
+            f"{n} modes cannot be found: the model has 1 to {available}; "
+            "choose n in this range, or divide the shaft into more elements"
+        )
+    return n
+
+
+def available_modes(rotor: Rotor) -> int:
+    """How many modes can oscillate at most: two for each unknown of a plane that moves mass."""
+    pedestals = sum(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
+    return 2 * (finite_modes(assemble(rotor)) + pedestals)

@@ -1,6 +1,5 @@
 import dataclasses
 import functools
-from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -12,7 +11,6 @@ from hypothesis import given, settings
 from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
-from fem.campbell_modes import went_above
 from rotorid.plots import plot
 
 mpl.use("Agg")
@@ -148,19 +146,6 @@ def test_a_mode_that_stops_to_oscillate_is_said():
     assert "mode 1 does not oscillate" in found.warnings[0]
     assert found.to_dict()["frequencies_rad_s"][0][-1] is None
     assert "overdamped" in found.summary()
-
-
-@pytest.mark.parametrize("way", [1, -1], ids=["forward", "backward"])
-def test_a_mode_above_all_that_were_computed_is_missed_whichever_way_it_whirls(way):
-    """On round bearings one plane is solved, where backward whirl has a negative frequency."""
-    known = way * 1j * np.array([[100.0, 200.0], [100.0, 210.0], [100.0, 220.0]])
-    whirl = SimpleNamespace(found=SimpleNamespace(values=known))
-    paths = SimpleNamespace(values=way * 1j * np.array([[100.0, 200.0], [100.0, 215.0], [100.0, np.nan]]))
-    gone = went_above(whirl, paths, np.array([0, 1]))
-    assert gone.tolist() == [[False, False], [False, False], [False, True]]
-    # far below the highest that is known, a missing mode has stopped to oscillate
-    paths.values[:, 1] = way * 1j * np.array([20.0, 10.0, np.nan])
-    assert not went_above(whirl, paths, np.array([0, 1])).any()
 
 
 def test_results_speak():

@@ -1,0 +1,612 @@
+"""Campbell diagram: whirl frequencies and decrements over speed, and the damped critical speeds.
+
+Modes of neighbouring speeds are the same where their states (u, λ u / |λ|) are alike: mass-weighted MAC, the best
+assignment of all of them (`linear_sum_assignment`). Velocities tell apart forward and backward whirl of one shape
+in a complex coordinate, where modes of different sign of Im λ never mix. A step in which the MAC leaves a doubt
+is halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
+Crossings are roots (`brentq`) on the mode itself, which inverse iteration follows from the nearer end of the
+step; where it slips to another mode the step is halved, too. So are the speeds where a mode begins to grow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem._new.assembly import both_planes
+from fem._new.parameters import nearest_modes
+from fem._new.response import whirl_direction
+from fem._new.rotor import Rotor, refined
+from fem._new.stability import Window, covering, grid_of, holding, near_level, runs_away, windows_of
+from fem._new.undamped import Result
+from fem._new.whirl import (
+    DIRECTION_NAMES,
+    GROWTH,
+    NONE,
+    Whirl,
+    available_modes,
+    checked_number,
+    in_both_planes,
+    polish,
+    solve,
+    solve_whirl,
+)
+from rotorid.base.answer import Answer
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM, range_text, speed_text
+from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.text import counted, listing
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Function = Callable[[Any, Any], AnyArray]
+HEAVY = 1.28
+"""Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
+_ALIKE, _OTHER, _NEARER = 0.8, 0.5, 0.2  # MAC of a mode with itself, with another by it, distances to 1
+_HARDLY = 0.3  # MAC below which two modes are not one
+_ROUNDS = 12  # of halving steps
+_NARROW = 1e-4  # of the highest speed: steps that are not halved
+_DENSE = 8  # times the speeds asked for: so many are computed at most
+_SWINGS = 0.4  # |Im λ| / |λ| below which a critical speed has no meaning: log decrement above 14
+_VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
+_PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
+_SPARE, _MOST = 2, 3  # modes above those asked for, which may come down; computed for one asked for, at most
+
+
+@dataclass(frozen=True)
+class Growing:
+    """A range of speeds in which a mode grows; a mode may have several.
+
+    Attributes
+    ----------
+    mode
+        Its number, from 1.
+    speed
+        Where it starts to grow, rad/s; the first speed if it grows there already.
+    from_start
+        Whether it grows at the first speed already (or at the first where it oscillates).
+    last
+        Last of the speeds computed at which it grows, rad/s.
+    end
+        Where it stops growing, rad/s; None if it grows at the last speed (or the last where it oscillates).
+    frequency, direction
+        Whirl frequency, rad/s, and 1 forward, −1 backward, 0 neither, where it starts.
+    log_decrement
+        The lowest in the range.
+    """
+
+    mode: int
+    speed: float
+    from_start: bool
+    last: float
+    end: float | None
+    frequency: float
+    direction: float
+    log_decrement: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "mode": self.mode,
+            "speed_rad_s": self.speed,
+            "speed_rpm": self.speed * RPM,
+            "from_start": self.from_start,
+            "last_speed_rad_s": self.last,
+            "end_rad_s": self.end,
+            "frequency_rad_s": self.frequency,
+            "direction": DIRECTION_NAMES[self.direction],
+            "lowest_log_decrement": self.log_decrement,
+        }
+
+    def sentence(self) -> str:
+        """What happens, as a warning."""
+        where = ("already at " if self.from_start else "above ") + speed_text(self.speed)
+        if self.end is not None:
+            where = f"from {speed_text(self.speed)} to {speed_text(self.end)}"
+        return (
+            f"unstable: mode {self.mode} ({DIRECTION_NAMES[self.direction]} whirl, {self.frequency:.6g} rad/s) "
+            f"grows {where}, log decrement down to {self.log_decrement:.3g} in this range"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Campbell(Result):
+    """Whirl over speed; each column is one mode, followed through crossings.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    frequencies
+        |Im λ|, rad/s, shape (S, n); NaN where a mode does not oscillate.
+    log_decrements
+        −2π Re λ / |Im λ|, shape (S, n); negative: unstable.
+    direction
+        1 forward, −1 backward, 0 neither (a line, or different along the rotor), shape (S, n).
+    critical_speeds
+        Damped critical speeds, where a frequency equals the speed, rad/s, ascending, shape (c,); not those of
+        motions that hardly oscillate (log decrement above 14).
+    critical_modes
+        Which column (from 1) each belongs to, shape (c,).
+    critical_log_decrements, critical_direction
+        There, shape (c,).
+    error
+        Estimated relative error of the eigenvalues.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    unstable
+        Modes that grow at some of the speeds, and from which speed on, by that speed.
+    windows
+        Ranges of speed in which any mode grows, listed or not.
+    cut
+        What the list of critical speeds leaves out because only n modes were asked for; else empty.
+    std
+        Standard deviations of `frequencies`, from the calibration of the rotor; None without.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped: such modes are listed only where there are
+        fewer others, and drawn pale.
+    """
+
+    speeds: FloatArray
+    frequencies: FloatArray
+    log_decrements: FloatArray
+    direction: FloatArray
+    critical_speeds: FloatArray
+    critical_modes: IndexArray
+    critical_log_decrements: FloatArray
+    critical_direction: FloatArray
+    error: float
+    rotor: Rotor
+    warnings: tuple[str, ...] = ()
+    unstable: tuple[Growing, ...] = ()
+    windows: tuple[Window, ...] = ()
+    cut: str = ""
+    std: FloatArray | None = None
+    heavy: float = 6.0
+
+    @property
+    def eigenvalues(self) -> ComplexArray:
+        """λ with Im λ > 0, rad/s, shape (S, n)."""
+        return np.asarray(self.frequencies * (1j - self.log_decrements / (2 * np.pi)))
+
+    @property
+    def criticals(self) -> list[tuple[float, float]]:
+        """Damped critical speed, rad/s, and logarithmic decrement there, of each."""
+        return list(zip(self.critical_speeds.tolist(), self.critical_log_decrements.tolist(), strict=True))
+
+    @property
+    def heavy_modes(self) -> BoolArray:
+        """Which modes are heavily damped at more than half of the speeds, shape (n,)."""
+        return np.asarray((~(self.log_decrements <= self.heavy)).mean(axis=0) > 0.5)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
+        errors = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
+        whole = self.tables()[0]
+        rows = [dict(zip(whole.headings, row, strict=True)) for row in whole.rows]
+        return plain(
+            {
+                "speeds_rad_s": self.speeds,
+                "frequencies_rad_s": self.frequencies.T,
+                **errors,
+                "log_decrements": self.log_decrements.T,
+                "direction": _words(self.direction, self.frequencies).T,
+                "damped_critical_speeds_rad_s": self.critical_speeds,
+                "damped_critical_speeds": rows,
+                "damped_critical_speeds_cut": self.cut or None,
+                "unstable": [mode.to_dict() for mode in self.unstable],
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The damped critical speeds; and the modes at each speed."""
+        at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
+        criticals = (
+            Column("speed_rad_s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Column("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Column("mode", self.critical_modes, key=at + "mode"),
+            Column("log_decrement", decrements, "{:z.4f}".format, at + "log_decrement"),
+            Column("direction", _words(self.critical_direction, self.critical_speeds)),
+            Column("heavily_damped", decrements > HEAVY, lambda heavy: f"no peak: above {HEAVY}" * heavy),
+        )
+        S, n = self.frequencies.shape
+        modes = (
+            Column("speed_rad_s", np.repeat(self.speeds, n), "{:.4f}".format),
+            Column("mode", np.tile(np.arange(1, n + 1), S)),
+            Column("frequency_rad_s", self.frequencies.ravel(), "{:.4f}".format),
+            *(Column("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
+            Column("log_decrement", self.log_decrements.ravel(), "{:z.4f}".format),
+            Column("direction", _words(self.direction, self.frequencies).ravel()),
+        )
+        return (Table("damped critical speeds", criticals), Table("modes", modes))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and mode."""
+        return frame(self.tables()[1])
+
+    def sentence(self) -> str:
+        """Whether it is stable, and how many damped critical speeds there are."""
+        unstable = listing([window.where() for window in self.windows], "and")
+        text = f"UNSTABLE {unstable}: a motion grows there." if unstable else "Stable: no motion grows."
+        heavy = int((self.critical_log_decrements > HEAVY).sum())
+        light = self.critical_speeds.size - heavy
+        count = counted(light, "damped critical speed") if light else "no damped critical speed"
+        more = f", {heavy} more without a peak" if heavy else ""
+        return f"{text}\nFrom {range_text(self.speeds[0], self.speeds[-1])}: {count}{more}."
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence, the damped critical speeds, the warnings, and the modes at every speed."""
+        criticals, modes = map(terminal, self.tables())
+        text = criticals if self.critical_speeds.size else ""
+        cut = (self.cut,) if self.cut else ()
+        return Answer(self.sentence(), text, self.warnings, cut, (modes,), "the modes at every speed")
+
+    def mesh_change(self) -> tuple[float, float]:
+        """Largest relative change of frequencies and of damped critical speeds on elements cut in two.
+
+        Of frequencies with decrements up to `heavy`. Elements converge as h⁴: 16/15 of it is the error of the
+        mesh. Infinite where modes or critical speeds are missing there.
+        """
+        fine = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1], heavy=self.heavy)
+        light = self.log_decrements <= self.heavy
+        if fine.frequencies.shape != light.shape:
+            return np.inf, np.inf
+        change = np.abs(nearest_modes(self.frequencies, fine.frequencies) / self.frequencies - 1)[light]
+        apart = np.abs(fine.critical_speeds / self.critical_speeds[:, None] - 1)
+        return float(np.nanmax(change, initial=0.0)), float(apart.min(axis=1, initial=np.inf).max(initial=0.0))
+
+
+def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: float = 6.0) -> Campbell:
+    """Compute whirl frequencies, logarithmic decrements and directions over speed.
+
+    Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
+    between the given speeds where it leaves a doubt; on rotationally symmetric supports forward and backward
+    whirl are kept apart exactly. The n modes are those that meet the 1× line first, then those that are most
+    often among the n of lowest frequency; they are numbered by frequency at the first speed, backward before
+    forward where a pair coincides. Modes that are heavily damped at more than half of the speeds come last.
+    Where a curve crosses the 1× line between two speeds, the crossing is found by iteration on the model.
+
+    Parameters
+    ----------
+    rotor
+        The rotor with all its supports.
+    speeds
+        rad/s, ascending, shape (S,).
+    n
+        How many modes, by default 6; forward and backward whirl count apart. Where the model has fewer, all.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped.
+
+    Raises
+    ------
+    ValueError
+        If speeds are impossible or outside the table of a support, the mesh is too fine for float64, or the
+        rotor is pushed aside by negative stiffness at every speed.
+    """
+    speeds = checked_speeds(speeds, ascending=True)
+    available = available_modes(rotor)
+    fewer: tuple[str, ...] = ()
+    if n is not None and whole(n, "the number of modes") > available:
+        fewer, n = (f"the model has only {available} of {n} modes",), available
+    n = checked_number(rotor, n)
+    paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
+    columns, whirl = paths.columns, paths.whirl
+    if not columns.size:
+        raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
+    if all(runs_away(whirl)):
+        raise ValueError(
+            "the rotor on its supports is statically unstable at these speeds: a support has negative "
+            "stiffness; check its sign and size"
+        )
+    asked = np.searchsorted(paths.speeds, speeds)
+    lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
+    roots = [root for root in paths.roots(_off_synchronous)[0].values() if _swings(root.value)]
+    roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
+    vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
+    there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
+    unstable = _growing(paths)
+    windows, hidden = [], []
+    for window in holding(windows_of(covering(whirl)), speeds):
+        same = [one.mode for one in unstable if one.speed <= window.last and window.first <= one.last]
+        windows.append(replace(window, mode=same[0]) if same else window)
+        hidden += [] if same else [f"{window.sentence()} (a mode that is not listed: ask for more)"]
+    warnings = (*(mode.sentence() for mode in unstable), *hidden, *_warnings(paths, n, asked), *fewer)
+    result = Campbell(
+        speeds=speeds,
+        frequencies=lam.imag,
+        log_decrements=_decrements(lam),
+        direction=direction,
+        critical_speeds=np.array([root.speed for root in roots]),
+        critical_modes=np.array([root.mode + 1 for root in roots], dtype=np.intp),
+        critical_log_decrements=_decrements(there),
+        critical_direction=ways,
+        error=whirl.error,
+        rotor=rotor,
+        warnings=warnings,
+        unstable=unstable,
+        windows=tuple(windows),
+        cut=_cut(paths),
+        heavy=heavy,
+    )
+    read_only(result.frequencies, result.log_decrements, direction, result.critical_speeds)
+    return result
+
+
+class _Root(NamedTuple):
+    """A mode (column, from 0) at a speed, rad/s, where a function of it vanishes: eigenvalue, vector (R,)."""
+
+    speed: float
+    mode: int
+    value: complex
+    vector: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """Modes over speeds, (S,), in the basis of `whirl`, and the columns of those asked for.
+
+    λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in which
+    steps shapes do not tell a mode apart from others.
+    """
+
+    whirl: Whirl
+    speeds: FloatArray
+    values: ComplexArray
+    vectors: ComplexArray
+    doubtful: BoolArray
+    columns: IndexArray
+
+    def roots(self, function: Function) -> tuple[dict[tuple[int, int], _Root], list[int]]:
+        """Roots of a function of λ and speed on modes, by (step, mode), and steps in which a mode was lost."""
+        f = function(self.values[:, self.columns], self.speeds[:, None])
+        change = (f[:-1] * f[1:] < 0) | ((f[1:] == 0) & (f[:-1] != 0))
+        change[:1] |= f[:1] == 0
+        roots, lost = {}, []
+        for k, mode in np.argwhere(change).tolist():
+            root, sure = self._root(k, mode, f[k : k + 2, mode], function)
+            if root is not None:
+                roots[k, mode] = root
+            lost += [] if sure else [k]
+        return roots, lost
+
+    def _root(self, k: int, mode: int, f: FloatArray, function: Function) -> tuple[_Root | None, bool]:
+        """A root on a mode, or None, and whether the mode there is surely that of both ends."""
+        from scipy.optimize import brentq
+
+        ends, column = self.speeds[k : k + 2], self.columns[mode]
+        there = dict(zip(ends.tolist(), f.tolist(), strict=True))
+        near = slice(k, k + 1) if abs(f[0]) < abs(f[1]) else slice(k + 1, k + 2)
+        lam, X = self.values[near, column], self.vectors[near, column]
+
+        def excess(speed: float) -> float:
+            nonlocal lam, X
+            if speed not in there:
+                lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, dtype=np.intp), lam, X, 3)[:2]
+                there[speed] = float(function(lam, speed)[0])
+            return there[speed]
+
+        speed = float(brentq(excess, *ends, xtol=1e-14 * ends[1], rtol=1e-15))
+        there.pop(speed)
+        if abs(excess(speed)) > _VANISHES * np.abs(f).max():
+            return None, False
+        both = slice(k, k + 2)
+        mac = likeness(self.whirl, lam, X, self.values[both], self.vectors[both])[:, 0]
+        return _Root(speed, mode, complex(lam[0]), X[0]), bool((mac.argmax(axis=1) == column).all())
+
+
+def _off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
+    """Whirl frequency less the speed."""
+    return np.asarray(np.abs(lam.imag) - speed)
+
+
+def _growth(lam: ComplexArray, _: object = None) -> FloatArray:
+    return np.asarray(lam.real / np.abs(lam))
+
+
+def _decrements(lam: ComplexArray) -> FloatArray:
+    """Of what neither grows nor decays, but for rounding, 0."""
+    return np.where(np.abs(_growth(lam)) <= GROWTH, 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+
+
+def _swings(lam: AnyArray) -> BoolArray:
+    """Which modes oscillate so that a critical speed has a meaning."""
+    return np.asarray(np.abs(lam.imag) > _SWINGS * np.abs(lam))
+
+
+def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
+    lam, x, y = in_both_planes(values, whirl.Q.nodes(np.nan_to_num(vectors)))
+    return lam, np.where(np.isnan(lam), 0.0, whirl_direction(x, y))
+
+
+def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
+    """Directions in words, None where there is no motion."""
+    words = np.vectorize(DIRECTION_NAMES.get, otypes=[object])(direction)
+    return np.where(np.isfinite(there), words, None)
+
+
+def likeness(whirl: Whirl, one: ComplexArray, X: ComplexArray, other: ComplexArray, Y: ComplexArray) -> FloatArray:
+    """MAC of states between modes (…, i) and (…, j), vectors (…, i, R) and (…, j, R); 0 where there is none."""
+    weight = whirl.Q.M * whirl.scale**2
+    weight = weight + 1e-3 * np.trace(weight) / len(weight) * np.eye(len(weight))  # of what has no mass
+    X, Y = np.nan_to_num(X, nan=1.0), np.nan_to_num(Y, nan=1.0)
+    X, Y = (Z / np.sqrt(np.einsum("...r,rs,...s->...", Z.conj(), weight, Z).real)[..., None] for Z in (X, Y))
+    turn = np.angle(one)[..., :, None] - np.angle(other)[..., None, :]
+    mac = np.abs(X.conj() @ weight @ np.swapaxes(Y, -1, -2)) ** 2 * np.cos(turn / 2) ** 2
+    if whirl.Q.P.planes == 1:
+        mac[(one.imag > 0)[..., :, None] != (other.imag > 0)[..., None, :]] = 0.0
+    return np.asarray(np.nan_to_num(mac))
+
+
+def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
+    """Modes over speed, n (or fewer) of them asked for."""
+    P, available = both_planes(rotor), available_modes(rotor)
+    m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
+    while True:
+        paths = _closely(solve_whirl(P, speeds, m), n, heavy)
+        light = _light(paths.values[:, paths.columns], heavy).mean(axis=0) >= 0.5
+        if (light.sum() == n and not _above(paths).any()) or m >= min(_MOST * n + 16, available):
+            return paths
+        m = min(m + max(4, n), available)
+
+
+def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
+    """The modes of a whirl followed, with so many speeds between that nothing is in doubt."""
+    speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
+    for _ in range(_ROUNDS):
+        paths = _chained(whirl, speeds, values, X, n, heavy)
+        steps = paths.doubtful[:, paths.columns].any(axis=1)
+        for gap in _off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
+            steps[near_level(np.nan_to_num(gap), 0.0)] = True
+        if not steps.any():
+            steps[paths.roots(_off_synchronous)[1]] = True
+        k = np.flatnonzero(steps & (np.diff(speeds) > _NARROW * speeds[-1]))
+        if not k.size or speeds.size > _DENSE * whirl.speeds.size:
+            break
+        more = solve(whirl.Q, (speeds[k] + speeds[k + 1]) / 2, values.shape[1], whirl.scale)
+        speeds, values, X = (
+            np.insert(old, k + 1, new, axis=0)
+            for old, new in ((speeds, more.speeds), (values, more.values), (X, more.vectors))
+        )
+    return paths
+
+
+def _chained(
+    whirl: Whirl, speeds: FloatArray, values: ComplexArray, X: ComplexArray, n: int, heavy: float
+) -> _Paths:
+    """Modes of neighbouring speeds, (S, m) and (S, m, R), chained."""
+    from scipy.optimize import linear_sum_assignment
+
+    S, m = values.shape
+    mac = likeness(whirl, values[:-1], X[:-1], values[1:], X[1:])
+    partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
+    best, others = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0], mac.copy()
+    np.put_along_axis(others, partner[..., None], 0.0, axis=2)
+    rivals = np.maximum(others.max(axis=2), np.take_along_axis(others.max(axis=1), partner, axis=1))
+    clear = (best >= _ALIKE) & ((rivals <= _OTHER * best) | (1 - best <= _NEARER * (1 - rivals)))
+    labels = np.tile(np.arange(m), (S, 1))
+    count = m
+    for k, mine in enumerate(partner):
+        # What is hardly alike is another mode that came while this one went.
+        new = best[k] < _HARDLY
+        labels[k + 1, mine] = np.where(new, count + np.cumsum(new) - 1, labels[k])
+        count += int(new.sum())
+    rows = np.arange(S)[:, None]
+    paths, vectors = np.full((S, count), NONE), np.full((S, count, X.shape[2]), NONE)
+    doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
+    paths[rows, labels], vectors[rows, labels] = values, X
+    doubtful[rows[:-1], labels[:-1]] = ~clear & (best > 0) & _light(values[:-1], heavy)
+    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy))
+
+
+def _light(values: ComplexArray, heavy: float) -> BoolArray:
+    """Which oscillate without heavy damping."""
+    return np.asarray(-2 * np.pi * values.real <= heavy * np.abs(values.imag))
+
+
+def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> IndexArray:
+    """The n lowest modes, by frequency at the first speed, backward first where a pair starts as one.
+
+    Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
+    speed is left out below that of another; then those that are most often among the n of lowest frequency.
+    Modes that grow go before all others, those that are heavily damped at half of the speeds come last.
+    """
+    light, there = _light(values, heavy), np.isfinite(values)
+    size = np.where(there, np.abs(values.imag), np.inf)
+    low = there & (size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1])
+    grows = (low & (_growth(values) > GROWTH)).any(axis=0)
+    below, modes = light & (size <= speeds[:, None]), np.arange(size.shape[1])
+    meets = np.where(below.any(axis=0), size[below.argmax(axis=0), modes], np.inf)
+    begins = there.argmax(axis=0)
+    start = values[begins, modes].imag  # in a complex coordinate negative of backward whirl
+    start = np.abs(start) * (1 + _PAIR * (start > 0))
+    best = np.lexsort((start, begins, -low.sum(axis=0), meets, light.mean(axis=0) < 0.5, ~grows))
+    best = best[(low.any(axis=0) | np.isfinite(meets))[best]][:n]
+    return np.asarray(best[np.lexsort((start[best], begins[best]))])
+
+
+def _above(paths: _Paths) -> BoolArray:
+    """Where a mode is missing that may lie above those that were computed, shape (S, n)."""
+    size = np.abs(paths.values[:, paths.columns].imag)
+    every = np.abs(paths.values.imag)
+    computed = np.isfinite(every).sum(axis=1) >= paths.whirl.values.shape[1]
+    high = np.nanmax(size, axis=0, initial=0.0) > np.nanmax(every, axis=1, initial=0.0)[:, None] / 2
+    return np.asarray(np.isnan(size) & computed[:, None] & high)
+
+
+def _growing(paths: _Paths) -> tuple[Growing, ...]:
+    """Ranges in which modes grow, by the speed where they start to."""
+    speeds, values = paths.speeds, paths.values[:, paths.columns]
+    grows = _growth(values) > GROWTH
+    roots = paths.roots(_growth)[0] if grows.any() else {}
+    out = []
+    for mode, column in enumerate(paths.columns.tolist()):
+        edges = np.flatnonzero(np.diff(grows[:, mode], prepend=False, append=False)).tolist()
+        for i, k in zip(edges[::2], edges[1::2], strict=True):
+            before = i > 0 and bool(np.isfinite(values[i - 1, mode]))
+            after = k < speeds.size and bool(np.isfinite(values[k, mode]))
+            here = _Root(float(speeds[i]), mode, values[i, mode], paths.vectors[i, column])
+            start, end = roots.get((i - 1, mode), here), roots.get((k - 1, mode))
+            lam, way = _whirling(paths.whirl, np.array([start.value]), start.vector[None])
+            out.append(
+                Growing(
+                    mode=mode + 1,
+                    speed=start.speed,
+                    from_start=not before,
+                    last=float(speeds[k - 1]),
+                    end=(end.speed if end else float(speeds[k - 1])) if after else None,
+                    frequency=float(lam.imag[0]),
+                    direction=float(way[0]),
+                    log_decrement=float(_decrements(values[i:k, mode]).min()),
+                )
+            )
+    return tuple(sorted(out, key=lambda one: (one.speed, one.mode)))
+
+
+def _cut(paths: _Paths) -> str:
+    """What to say where modes that are not listed have critical speeds in the range."""
+    others = np.delete(paths.values, paths.columns, axis=1)
+    f, light = _off_synchronous(others, paths.speeds[:, None]), _swings(others)
+    k, _ = np.nonzero((f[:-1] * f[1:] < 0) & (light[:-1] | light[1:]))
+    top, last = float(np.nanmax(np.abs(paths.values[-1].imag), initial=0.0)), float(paths.speeds[-1])
+    if k.size:
+        text = f"is cut: modes that are not listed have {k.size} more from {paths.speeds[k[0]]:.6g} rad/s on"
+    elif top < last and paths.whirl.values.shape[1] < available_modes(paths.whirl.Q.P.rotor):
+        text = f"may be cut: the modes followed reach {top:.6g} rad/s only at {last:.6g} rad/s"
+    else:
+        return ""
+    return f"the list of critical speeds {text}; ask for more modes (-n)"
+
+
+def _warnings(paths: _Paths, n: int, asked: IndexArray) -> tuple[str, ...]:
+    speeds, gone = paths.speeds[asked], np.isnan(paths.values[asked][:, paths.columns])
+    texts = []
+    for mode in np.flatnonzero(gone.any(axis=0)).tolist():
+        where = speeds[gone[:, mode]]
+        texts.append(
+            f"mode {mode + 1} does not oscillate (overdamped, or above the frequencies computed) at "
+            f"{where.size} of {counted(speeds.size, 'speed')}, from {where[0]:.6g} to {where[-1]:.6g} rad/s"
+        )
+    if paths.columns.size < n:
+        texts.append(f"only {paths.columns.size} of {n} modes oscillate, the others are overdamped")
+    if (paths.whirl.still > 1).any():
+        texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
+    doubt = paths.speeds[:-1][paths.doubtful[:, paths.columns].any(axis=1)]
+    if doubt.size:
+        texts.append(
+            f"modes could not be told apart by shape just above {doubt[0]:.6g} rad/s: from there on two curves "
+            "may be exchanged"
+        )
+    return tuple(texts)
