@@ -51,7 +51,6 @@ HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
 _ALIKE, _OTHER, _NEARER = 0.8, 0.5, 0.2  # MAC of a mode with itself, with another by it, distances to 1
 _HARDLY = 0.3  # MAC below which two modes are not one
-_ROUNDS = 12  # of halving steps
 _NARROW = 1e-4  # of the highest speed: steps that are not halved
 _DENSE = 8  # times the speeds asked for: so many are computed at most
 _SWINGS = 0.4  # |Im λ| / |λ| below which a critical speed has no meaning: log decrement above 14
@@ -257,15 +256,13 @@ class Campbell(Result):
         """Largest relative change of frequencies and of damped critical speeds on elements cut in two.
 
         Of frequencies with decrements up to `heavy`. Elements converge as h⁴: 16/15 of it is the error of the
-        mesh. Infinite where modes or critical speeds are missing there.
+        mesh.
         """
         fine = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1], heavy=self.heavy)
-        light = self.log_decrements <= self.heavy
-        if fine.frequencies.shape != light.shape:
-            return np.inf, np.inf
-        change = np.abs(nearest_modes(self.frequencies, fine.frequencies) / self.frequencies - 1)[light]
-        apart = np.abs(fine.critical_speeds / self.critical_speeds[:, None] - 1)
-        return float(np.nanmax(change, initial=0.0)), float(apart.min(axis=1, initial=np.inf).max(initial=0.0))
+        frequencies = nearest_modes(self.frequencies, fine.frequencies)
+        change = np.where(self.log_decrements <= self.heavy, np.abs(frequencies / self.frequencies - 1), 0.0)
+        apart = np.abs(fine.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
+        return float(np.nanmax(change)), float(apart.max(initial=0.0))
 
 
 def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: float = 6.0) -> Campbell:
@@ -312,16 +309,17 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         )
     asked = np.searchsorted(paths.speeds, speeds)
     lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
-    roots = [root for root in paths.roots(_off_synchronous)[0].values() if _swings(root.value)]
+    roots = [root for root in paths.crossings.values() if _swings(root.value)]
     roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
     vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
     there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
     unstable = _growing(paths)
-    windows, hidden = [], []
-    for window in holding(windows_of(covering(whirl)), speeds):
-        same = [one.mode for one in unstable if one.speed <= window.last and window.first <= one.last]
-        windows.append(replace(window, mode=same[0]) if same else window)
-        hidden += [] if same else [f"{window.sentence()} (a mode that is not listed: ask for more)"]
+    windows = holding(windows_of(covering(whirl)), speeds)
+    hidden = [
+        f"{window.sentence()} (a mode that is not listed: ask for more)"
+        for window in windows
+        if not any(one.speed <= window.last and window.first <= one.last for one in unstable)
+    ]
     warnings = (*(mode.sentence() for mode in unstable), *hidden, *_warnings(paths, n, asked), *fewer)
     result = Campbell(
         speeds=speeds,
@@ -336,7 +334,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         rotor=rotor,
         warnings=warnings,
         unstable=unstable,
-        windows=tuple(windows),
+        windows=windows,
         cut=_cut(paths),
         heavy=heavy,
     )
@@ -355,7 +353,7 @@ class _Root(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Paths:
-    """Modes over speeds, (S,), in the basis of `whirl`, and the columns of those asked for.
+    """Modes over speeds, (S,), in the basis of `whirl`, the columns of those asked for, and their crossings.
 
     λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in which
     steps shapes do not tell a mode apart from others.
@@ -367,43 +365,35 @@ class _Paths:
     vectors: ComplexArray
     doubtful: BoolArray
     columns: IndexArray
+    crossings: dict[tuple[int, int], _Root]
 
     def roots(self, function: Function) -> tuple[dict[tuple[int, int], _Root], list[int]]:
         """Roots of a function of λ and speed on modes, by (step, mode), and steps in which a mode was lost."""
         f = function(self.values[:, self.columns], self.speeds[:, None])
-        change = (f[:-1] * f[1:] < 0) | ((f[1:] == 0) & (f[:-1] != 0))
-        change[:1] |= f[:1] == 0
-        roots, lost = {}, []
-        for k, mode in np.argwhere(change).tolist():
-            root, sure = self._root(k, mode, f[k : k + 2, mode], function)
-            if root is not None:
-                roots[k, mode] = root
-            lost += [] if sure else [k]
-        return roots, lost
+        change = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
+        steps = np.argwhere(change).tolist()
+        roots = {(k, mode): self._root(k, mode, f[k : k + 2, mode], function) for k, mode in steps}
+        return {at: root for at, root in roots.items() if root}, [k for (k, _), root in roots.items() if not root]
 
-    def _root(self, k: int, mode: int, f: FloatArray, function: Function) -> tuple[_Root | None, bool]:
-        """A root on a mode, or None, and whether the mode there is surely that of both ends."""
+    def _root(self, k: int, mode: int, f: FloatArray, function: Function) -> _Root | None:
+        """A root on a mode, followed from the nearer end; None if it was lost."""
         from scipy.optimize import brentq
 
-        ends, column = self.speeds[k : k + 2], self.columns[mode]
-        there = dict(zip(ends.tolist(), f.tolist(), strict=True))
-        near = slice(k, k + 1) if abs(f[0]) < abs(f[1]) else slice(k + 1, k + 2)
-        lam, X = self.values[near, column], self.vectors[near, column]
+        there = dict(zip(self.speeds[k : k + 2].tolist(), f.tolist(), strict=True))
+        near, column = k + int(np.abs(f).argmin()), self.columns[mode]
+        lam, X = self.values[[near], column], self.vectors[[near], column]
 
         def excess(speed: float) -> float:
             nonlocal lam, X
             if speed not in there:
-                lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, dtype=np.intp), lam, X, 3)[:2]
+                lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, dtype=np.intp), lam, X, 2)[:2]
                 there[speed] = float(function(lam, speed)[0])
             return there[speed]
 
-        speed = float(brentq(excess, *ends, xtol=1e-14 * ends[1], rtol=1e-15))
-        there.pop(speed)
-        if abs(excess(speed)) > _VANISHES * np.abs(f).max():
-            return None, False
-        both = slice(k, k + 2)
-        mac = likeness(self.whirl, lam, X, self.values[both], self.vectors[both])[:, 0]
-        return _Root(speed, mode, complex(lam[0]), X[0]), bool((mac.argmax(axis=1) == column).all())
+        speed = float(brentq(excess, *there, xtol=1e-14 * max(there), rtol=1e-15))
+        there.clear()
+        lost = abs(excess(speed)) > _VANISHES * np.abs(f).max()
+        return None if lost else _Root(speed, mode, complex(lam[0]), X[0])
 
 
 def _off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
@@ -456,8 +446,9 @@ def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
     m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
     while True:
         paths = _closely(solve_whirl(P, speeds, m), n, heavy)
-        light = _light(paths.values[:, paths.columns], heavy).mean(axis=0) >= 0.5
-        if (light.sum() == n and not _above(paths).any()) or m >= min(_MOST * n + 16, available):
+        listed = paths.values[:, paths.columns]
+        full = np.isfinite(listed).all() and (_light(listed, heavy).mean(axis=0) >= 0.5).sum() == n
+        if full or m >= min(_MOST * n + 16, available):
             return paths
         m = min(m + max(4, n), available)
 
@@ -465,22 +456,24 @@ def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
 def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
     """The modes of a whirl followed, with so many speeds between that nothing is in doubt."""
     speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
-    for _ in range(_ROUNDS):
+    while True:
         paths = _chained(whirl, speeds, values, X, n, heavy)
         steps = paths.doubtful[:, paths.columns].any(axis=1)
         for gap in _off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
             steps[near_level(np.nan_to_num(gap), 0.0)] = True
-        if not steps.any():
-            steps[paths.roots(_off_synchronous)[1]] = True
-        k = np.flatnonzero(steps & (np.diff(speeds) > _NARROW * speeds[-1]))
-        if not k.size or speeds.size > _DENSE * whirl.speeds.size:
-            break
+        wide = np.diff(speeds) > _NARROW * speeds[-1]
+        dense = speeds.size > _DENSE * whirl.speeds.size
+        if dense or not (steps & wide).any():
+            crossings, lost = paths.roots(_off_synchronous)
+            steps[lost] = True
+            if dense or not (steps & wide).any():
+                return replace(paths, crossings=crossings)
+        k = np.flatnonzero(steps & wide)
         more = solve(whirl.Q, (speeds[k] + speeds[k + 1]) / 2, values.shape[1], whirl.scale)
         speeds, values, X = (
             np.insert(old, k + 1, new, axis=0)
             for old, new in ((speeds, more.speeds), (values, more.values), (X, more.vectors))
         )
-    return paths
 
 
 def _chained(
@@ -508,7 +501,7 @@ def _chained(
     doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
     paths[rows, labels], vectors[rows, labels] = values, X
     doubtful[rows[:-1], labels[:-1]] = ~clear & (best > 0) & _light(values[:-1], heavy)
-    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy))
+    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), {})
 
 
 def _light(values: ComplexArray, heavy: float) -> BoolArray:
@@ -537,68 +530,56 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     return np.asarray(best[np.lexsort((start[best], begins[best]))])
 
 
-def _above(paths: _Paths) -> BoolArray:
-    """Where a mode is missing that may lie above those that were computed, shape (S, n)."""
-    size = np.abs(paths.values[:, paths.columns].imag)
-    every = np.abs(paths.values.imag)
-    computed = np.isfinite(every).sum(axis=1) >= paths.whirl.values.shape[1]
-    high = np.nanmax(size, axis=0, initial=0.0) > np.nanmax(every, axis=1, initial=0.0)[:, None] / 2
-    return np.asarray(np.isnan(size) & computed[:, None] & high)
-
-
 def _growing(paths: _Paths) -> tuple[Growing, ...]:
     """Ranges in which modes grow, by the speed where they start to."""
     speeds, values = paths.speeds, paths.values[:, paths.columns]
     grows = _growth(values) > GROWTH
     roots = paths.roots(_growth)[0] if grows.any() else {}
+    there = np.pad(np.isfinite(values), ((1, 1), (0, 0)))
     out = []
     for mode, column in enumerate(paths.columns.tolist()):
         edges = np.flatnonzero(np.diff(grows[:, mode], prepend=False, append=False)).tolist()
         for i, k in zip(edges[::2], edges[1::2], strict=True):
-            before = i > 0 and bool(np.isfinite(values[i - 1, mode]))
-            after = k < speeds.size and bool(np.isfinite(values[k, mode]))
-            here = _Root(float(speeds[i]), mode, values[i, mode], paths.vectors[i, column])
-            start, end = roots.get((i - 1, mode), here), roots.get((k - 1, mode))
+            last = float(speeds[k - 1])
+            start = roots.get((i - 1, mode)) or _Root(float(speeds[i]), mode, values[i, mode], paths.vectors[i, column])
+            end = roots[k - 1, mode].speed if (k - 1, mode) in roots else last
             lam, way = _whirling(paths.whirl, np.array([start.value]), start.vector[None])
             out.append(
                 Growing(
-                    mode=mode + 1,
-                    speed=start.speed,
-                    from_start=not before,
-                    last=float(speeds[k - 1]),
-                    end=(end.speed if end else float(speeds[k - 1])) if after else None,
-                    frequency=float(lam.imag[0]),
-                    direction=float(way[0]),
-                    log_decrement=float(_decrements(values[i:k, mode]).min()),
+                    mode + 1,
+                    start.speed,
+                    not there[i, mode],
+                    last,
+                    end if there[k + 1, mode] else None,
+                    float(lam.imag[0]),
+                    float(way[0]),
+                    float(_decrements(values[i:k, mode]).min()),
                 )
             )
     return tuple(sorted(out, key=lambda one: (one.speed, one.mode)))
 
 
 def _cut(paths: _Paths) -> str:
-    """What to say where modes that are not listed have critical speeds in the range."""
+    """What to say where modes that are not listed have critical speeds in the range, or may have."""
     others = np.delete(paths.values, paths.columns, axis=1)
-    f, light = _off_synchronous(others, paths.speeds[:, None]), _swings(others)
-    k, _ = np.nonzero((f[:-1] * f[1:] < 0) & (light[:-1] | light[1:]))
-    top, last = float(np.nanmax(np.abs(paths.values[-1].imag), initial=0.0)), float(paths.speeds[-1])
+    f = np.where(_swings(others), _off_synchronous(others, paths.speeds[:, None]), np.nan)
+    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
     if k.size:
-        text = f"is cut: modes that are not listed have {k.size} more from {paths.speeds[k[0]]:.6g} rad/s on"
-    elif top < last and paths.whirl.values.shape[1] < available_modes(paths.whirl.Q.P.rotor):
-        text = f"may be cut: the modes followed reach {top:.6g} rad/s only at {last:.6g} rad/s"
+        where = f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
+    elif np.nanmax(np.abs(paths.values[-1].imag)) < paths.speeds[-1] and others.size:
+        where = f"no mode was followed that reaches {paths.speeds[-1]:.6g} rad/s there"
     else:
         return ""
-    return f"the list of critical speeds {text}; ask for more modes (-n)"
+    return f"the list of critical speeds is cut: {where}; ask for more modes (-n)"
 
 
 def _warnings(paths: _Paths, n: int, asked: IndexArray) -> tuple[str, ...]:
     speeds, gone = paths.speeds[asked], np.isnan(paths.values[asked][:, paths.columns])
-    texts = []
-    for mode in np.flatnonzero(gone.any(axis=0)).tolist():
-        where = speeds[gone[:, mode]]
-        texts.append(
-            f"mode {mode + 1} does not oscillate (overdamped, or above the frequencies computed) at "
-            f"{where.size} of {counted(speeds.size, 'speed')}, from {where[0]:.6g} to {where[-1]:.6g} rad/s"
-        )
+    texts = [
+        f"mode {mode + 1} does not oscillate (overdamped, or above the frequencies computed) at "
+        f"{gone[:, mode].sum()} of {counted(speeds.size, 'speed')}, the first {speeds[gone[:, mode]][0]:.6g} rad/s"
+        for mode in np.flatnonzero(gone.any(axis=0)).tolist()
+    ]
     if paths.columns.size < n:
         texts.append(f"only {paths.columns.size} of {n} modes oscillate, the others are overdamped")
     if (paths.whirl.still > 1).any():
