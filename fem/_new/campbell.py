@@ -379,21 +379,22 @@ class _Paths:
         """A root on a mode, followed from the nearer end; None if it was lost."""
         from scipy.optimize import brentq
 
-        there = dict(zip(self.speeds[k : k + 2].tolist(), f.tolist(), strict=True))
-        near, column = k + int(np.abs(f).argmin()), self.columns[mode]
-        lam, X = self.values[[near], column], self.vectors[[near], column]
+        column, ends = self.columns[mode], [k, k + 1]
+        at = self.speeds[ends].tolist()
+        states = list(zip(f, self.values[ends, column], self.vectors[ends, column], strict=True))
+        there, last = dict(zip(at, states, strict=True)), states[int(np.abs(f).argmin())]
 
         def excess(speed: float) -> float:
-            nonlocal lam, X
+            nonlocal last
             if speed not in there:
-                lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, dtype=np.intp), lam, X, 2)[:2]
-                there[speed] = float(function(lam, speed)[0])
-            return there[speed]
+                pair = np.array([speed]), np.zeros(1, dtype=np.intp), np.array([last[1]]), last[2][None]
+                lam, X = polish(self.whirl.Q, *pair, 2)[:2]
+                last = there[speed] = function(lam, speed)[0], lam[0], X[0]
+            return float(there[speed][0])
 
-        speed = float(brentq(excess, *there, xtol=1e-14 * max(there), rtol=1e-15))
-        there.clear()
-        lost = abs(excess(speed)) > _VANISHES * np.abs(f).max()
-        return None if lost else _Root(speed, mode, complex(lam[0]), X[0])
+        speed = float(brentq(excess, *at, xtol=1e-14 * at[1], rtol=1e-15))
+        left, value, vector = there[speed]
+        return None if abs(left) > _VANISHES * np.abs(f).max() else _Root(speed, mode, complex(value), vector)
 
 
 def _off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:

@@ -1,15 +1,15 @@
 """Where a rotor whirls by itself: the largest growth of all its motions over speed.
 
-Growth of a motion is Re λ / |λ|. The largest one of all motions is continuous in speed whatever mode has it, so
-that no mode must be followed: it is looked at on a grid of speeds, which is halved where its slopes tell of a
-change of sign between two of them. A motion grows where it is above `GROWTH`, the rounding of what damps and
-drives it: motions without any damping do not. Edges of unstable ranges are where the largest growth passes this
-level, moved back to Re λ = 0 on the mode that grows.
+Growth of a motion is Re λ / |λ|. The largest one of all motions is continuous in speed whatever mode has it,
+so that no mode must be followed: it is looked at on a grid of speeds, which is halved where its slopes tell of
+a change of sign between two of them. A motion grows where it is above `GROWTH`, the rounding of what damps and
+drives it: motions without any damping do not. Edges of unstable ranges are where the largest growth passes
+this level, moved back to Re λ = 0 on the mode that grows.
 
 Which motions may grow is bounded. Multiplied by the conjugate velocity the equations show that on positive
-stiffness and damping a growing motion of frequency ω takes work q from circulating forces and gives c ω to the
-damping, so that ω < q / c for one of them at least: kxy − kyx = 2 q at a support, ω < Ω for material and other
-damping that turns with the shaft (c z' − i Ω c z). Gyroscopic moments do no work.
+stiffness and damping a growing motion of frequency ω takes work q from circulating forces and gives c ω to
+the damping, so that ω < q / c for one of them at least: kxy − kyx = 2 q at a support, ω < Ω for material and
+other damping that turns with the shaft (c z' − i Ω c z). Gyroscopic moments do no work.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from fem._new.assembly import both_planes
 from fem._new.forces import InternalDamping
 from fem._new.response import whirl_direction
 from fem._new.rotor import Rotor
+from fem._new.undamped import Result
 from fem._new.whirl import (
     DIRECTION_NAMES,
     GROWTH,
@@ -34,11 +35,12 @@ from fem._new.whirl import (
     solve,
     solve_whirl,
 )
+from rotorid.base.answer import Answer
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
-from rotorid.base.tables import Column, Table, frame, html
+from rotorid.base.tables import Column, Table, frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,8 +70,8 @@ class Window:
     begins, ends
         Whether these are such edges, and not the first or last speed asked for.
     mode
-        Which mode grows there, by frequency at the edge, from 1; None if the rotor runs away without
-        oscillating.
+        Which mode grows there, by frequency at `first`, from 1, of two that coincide the backward one first;
+        None if the rotor runs away without oscillating.
     frequency, direction
         Its whirl frequency, rad/s, and 1 forward, −1 backward, 0 neither; None likewise.
     """
@@ -122,7 +124,7 @@ def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability:
+class Stability(Result):
     """Where a rotor loses stability.
 
     Attributes
@@ -208,15 +210,10 @@ class Stability:
             f"{self.frequency:.6g} rad/s{ratio}"
         )
 
-    def summary(self) -> str:
-        """The answer as text."""
-        return "\n".join([self.sentence(), *(f"Warning: {text}" for text in self.warnings)])
-
-    def __repr__(self) -> str:
-        return f"Stability({self.sentence()})"
-
-    def _repr_html_(self) -> str:
-        return html(self.tables()[0])
+    @property
+    def answer(self) -> Answer:
+        """The sentence and the warnings."""
+        return Answer(self.sentence(), warnings=self.warnings)
 
 
 def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
@@ -225,11 +222,9 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     bound = np.where(turning, speeds, 0.0)
     for support in rotor.supports:
         k, c = support.at(speeds)
+        tiny, slack = (_SLACK * np.abs(one).max(axis=(1, 2)) for one in (k, c))
+        stiffness, damping = (np.linalg.eigvalsh(one + one.swapaxes(1, 2))[:, 0] / 2 for one in (k, c))
         driving = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2
-        (stiffness, tiny), (damping, slack) = (
-            (np.linalg.eigvalsh(one + np.swapaxes(one, 1, 2))[:, 0] / 2, _SLACK * np.abs(one).max(axis=(1, 2)))
-            for one in (k, c)
-        )
         with np.errstate(divide="ignore", invalid="ignore"):
             highest = np.where(driving > tiny, driving / np.maximum(damping, 0.0), 0.0)
         bound = np.maximum(bound, np.where((stiffness < -tiny) | (damping < -slack), np.inf, highest))
@@ -321,17 +316,14 @@ def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, com
 
 
 def _mode(whirl: Whirl, speed: float, value: complex) -> tuple[int, float, float] | tuple[None, None, None]:
-    """Number by frequency, from 1, whirl frequency and direction of a mode; None if it does not oscillate.
-
-    Of two that coincide the backward one comes first.
-    """
+    """Number by frequency, whirl frequency and direction of a mode, as `Window` has them."""
     if not value.imag:
         return None, None, None
     pairs = _at(whirl, speed)
     lam, size = pairs.values[0], np.abs(pairs.values[0].imag)
     k = int(np.nanargmin(np.abs(lam - value)))
-    forward = lam[k].imag > 0
-    number = (size < size[k] * (1 + _PAIR * (1 if forward else -1))).sum() + (not forward)
+    way = np.sign(lam[k].imag)  # in a complex coordinate −1 of backward whirl
+    number = (size < size[k] * (1 + way * _PAIR)).sum() + (way < 0)
     _, x, y = in_both_planes(lam[k : k + 1], whirl.Q.nodes(pairs.vectors[:1, k]))
     return int(number), float(size[k]), float(whirl_direction(x, y)[0])
 
@@ -342,15 +334,13 @@ def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     changes = np.flatnonzero(np.diff(rates > GROWTH, prepend=False, append=False)).tolist()
     out = []
     for i, j in zip(changes[::2], changes[1::2], strict=True):
-        edges = [
-            _edge(whirl, grid[[a, b]], rates[[a, b]])
-            if 0 <= b < grid.size
-            else (float(grid[a]), _fastest(whirl, grid[a]))
-            for a, b in ((i, i - 1), (j - 1, j))
-        ]
-        begins, ends = i > 0, j < grid.size
-        mode = _mode(whirl, *edges[int(ends and not begins)])
-        out.append(Window(edges[0][0], edges[1][0], begins, ends, *mode))
+        first, last = grid[i], grid[j - 1]
+        value = _fastest(whirl, first)
+        if i:
+            first, value = _edge(whirl, grid[[i, i - 1]], rates[[i, i - 1]])
+        if j < grid.size:
+            last, _ = _edge(whirl, grid[[j - 1, j]], rates[[j - 1, j]])
+        out.append(Window(float(first), float(last), i > 0, j < grid.size, *_mode(whirl, first, value)))
     return tuple(out)
 
 
@@ -359,8 +349,8 @@ def holding(windows: Iterable[Window], speeds: FloatArray) -> tuple[Window, ...]
     return tuple(window for window in windows if within((window,), speeds).any())
 
 
-def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
-    """Ranges of speed without a steady response, as far as they hold one of the speeds asked for.
+def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
+    """Ranges of speed without a steady response that hold one of the speeds asked for, and sentences on them.
 
     Parameters
     ----------
@@ -369,25 +359,17 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     speeds
         rad/s, in any order, shape (S,).
 
-    Raises
-    ------
-    ValueError
-        If the rotor on the mean stiffness of its supports is statically unstable, or a speed lies outside the
-        table of a support.
+    Returns
+    -------
+    The ranges, and a sentence of each; or none, and why stability cannot be judged.
     """
     asked = np.unique(speeds)
-    grid = asked if asked.size <= _GRID else np.linspace(asked[0], asked[-1], _GRID)
-    grid = grid_of(rotor, grid)
-    if not growth_bound(rotor, grid).any():
-        return ()
-    whirl = solve_whirl(both_planes(rotor), grid, checked_number(rotor, None))
-    return holding(windows_of(covering(whirl)), asked)
-
-
-def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
-    """`unstable_windows`, and a sentence of each; also where stability cannot be judged."""
     try:
-        windows = unstable_windows(rotor, speeds)
+        grid = grid_of(rotor, asked if asked.size <= _GRID else np.linspace(asked[0], asked[-1], _GRID))
+        if not growth_bound(rotor, grid).any():
+            return (), ()
+        whirl = solve_whirl(both_planes(rotor), grid, checked_number(rotor, None))
+        windows = holding(windows_of(covering(whirl)), asked)
     except ValueError as problem:
         return (), (f"whether the rotor is stable at these speeds is not known: {problem}",)
     return windows, tuple(window.sentence() for window in windows)
@@ -421,27 +403,27 @@ def stability_threshold(
         raise ValueError(
             f"the range of speeds is empty: {lowest!r} to {highest!r} rad/s; give finite lowest < highest"
         )
-    if whole(steps, "the number of steps") < 1:
+    if int(steps) != steps or steps < 1:
         raise ValueError(f"the range is divided into at least one step; got {steps!r}")
-    speeds = grid_of(rotor, checked_speeds(np.linspace(lowest, highest, steps + 1)))
+    speeds = grid_of(rotor, checked_speeds(np.linspace(lowest, highest, int(steps) + 1)))
     n = checked_number(rotor, min(n, available_modes(rotor)))
     return threshold_of(covering(solve_whirl(both_planes(rotor), speeds, n)), n)
 
 
 def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
-    """The first threshold in the speeds of a whirl that has all modes that may grow; the margin of n of them."""
+    """The first threshold in a whirl that has all modes that may grow; its margin is that of n of them."""
     speeds, windows = whirl.speeds, windows_of(whirl)
     first = windows[0] if windows else Window(np.inf, np.inf, False, False)
     lam = whirl.values[: max(1, int((speeds < first.first).sum())), :n]
     margin = np.nan_to_num(-2 * np.pi * lam.real / np.abs(lam.imag), nan=np.inf).min()
-    start = speeds[0]
-    mode = _mode(whirl, start, _fastest(whirl, start)) if first.first == start else None
     return Stability(
         "threshold" if first.begins else "unstable" if windows else "stable",
-        float(start),
+        float(speeds[0]),
         float(speeds[-1]),
         first.first if first.begins else None,
-        *(mode or (first.mode, first.frequency, first.direction)),
+        first.mode,
+        first.frequency,
+        first.direction,
         margin if np.isfinite(margin) else float("nan"),
         whirl.Q.P.rotor,
     )

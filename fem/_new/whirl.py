@@ -51,7 +51,8 @@ GROWTH = 1e-14
 NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
 DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
-_TOLERANCE = 1e-8  # sum of all relative errors of eigenvalues at three speeds
+_TOLERANCE = 1.5e-8  # sum of the relative errors of eigenvalues at some speeds; the largest is a third
+_CHECKS = 5  # speeds at which errors are estimated
 _MORE = 3  # modes of a plane beyond those asked for
 _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
@@ -199,10 +200,11 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
     most = finite_modes(P.A)
     modes = min(m // 2 + _MORE, most)
     while True:
-        Q, scale, error = _reduced(P, speeds, m, modes)
+        spectrum, scale = reference(P, speeds, modes)
+        Q, error = _reduced(P, spectrum, speeds, m, scale)
         whirl = replace(solve(Q, speeds, m, scale), error=error)
-        # Rigid-body motions and overdamped ones take room, too.
-        if modes == most or np.isfinite(whirl.values).all():
+        # Rigid-body motions and overdamped ones take room, too; and modes near the next ones feel them.
+        if modes == most or (np.abs(whirl.values) ** 2 < spectrum.squares[-1]).all():
             return whirl
         modes = min(2 * modes, most)
 
@@ -220,16 +222,17 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     return spectrum, float(np.sqrt(moving[0] if moving.size else spectrum.shift))
 
 
-def _reduced(P: Planes, speeds: FloatArray, m: int, modes: int) -> tuple[Reduced, float, float]:
-    """The equations in a basis that begins with so many modes, the scale, and the error that it leaves."""
+def _reduced(
+    P: Planes, spectrum: Spectrum, speeds: FloatArray, m: int, scale: float
+) -> tuple[Reduced, float]:
+    """The equations in a basis that begins with the modes of a spectrum, and the error that it leaves."""
     from scipy.linalg.lapack import dtbtrs
 
-    spectrum, scale = reference(P, speeds, modes)
     n, U = P.A.size, spectrum.factor
     begin = np.hstack((multiply(P.A.mass, spectrum.vectors), np.eye(n)[:, P.rows]))
     images, Y = dtbtrs(U, begin, trans="T")[0], np.empty((n, 0))
     images /= np.linalg.norm(images, axis=0)
-    some = speeds[sorted({0, speeds.size // 2, speeds.size - 1})]
+    some = speeds[np.unique(np.linspace(0, speeds.size - 1, _CHECKS).astype(int))]
     while True:
         directions, sizes, _ = np.linalg.svd(images - Y @ (Y.T @ images), full_matrices=False)
         errors = np.cumsum(sizes[::-1] ** 2)[::-1]  # if this direction and those after it do not join
@@ -241,7 +244,7 @@ def _reduced(P: Planes, speeds: FloatArray, m: int, modes: int) -> tuple[Reduced
         loads = _unanswered(solve(Q, some, m, scale), spectrum.shift)
         images = dtbtrs(U, np.hstack((loads.real, loads.imag)), trans="T")[0]
         images -= Y @ (Y.T @ images)  # twice, for rounding
-    return Q, scale, float(errors[0])
+    return Q, float(errors[0])
 
 
 def _unanswered(whirl: Whirl, shift: float) -> ComplexArray:
