@@ -33,7 +33,7 @@ from fem.plots import draw_rotor
 from fem.response import influence, response_peaks, unbalance_response
 from fem.response_result import BearingForces, InfluenceCoefficients, Response
 from fem.speed_map import Intersection, SpeedMap, speed_map
-from fem._new.stability import Stability, Window, judge, stability_threshold, threshold_of
+from fem._new.stability import Stability, Window, judge, range_of_speeds, stability_threshold, threshold_of
 from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.whirl import WhirlModes, whirl_modes

@@ -72,7 +72,7 @@ class Growing:
     from_start
         Whether it grows at the first speed already (or at the first where it oscillates).
     last
-        Last of the speeds computed at which it grows, rad/s.
+        Last of the given speeds at which it grows, rad/s.
     end
         Where it stops growing, rad/s; None if it grows at the last speed (or the last where it oscillates).
     frequency, direction
@@ -313,7 +313,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
     vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
     there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
-    unstable = _growing(paths)
+    unstable = _growing(paths, speeds)
     windows = holding(windows_of(covering(whirl)), speeds)
     hidden = [
         f"{window.sentence()} (a mode that is not listed: ask for more)"
@@ -521,8 +521,13 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     size = np.where(there, np.abs(values.imag), np.inf)
     low = there & (size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1])
     grows = (low & (_growth(values) > GROWTH)).any(axis=0)
-    below, modes = light & (size <= speeds[:, None]), np.arange(size.shape[1])
-    meets = np.where(below.any(axis=0), size[below.argmax(axis=0), modes], np.inf)
+    modes, gap = np.arange(size.shape[1]), size - speeds[:, None]
+    k = (light & (gap <= 0)).argmax(axis=0)
+    before, after = gap[k - 1, modes], gap[k, modes]
+    with np.errstate(invalid="ignore"):
+        part = np.nan_to_num(after / (before - after))
+    meets = np.where(k > 0, speeds[k] + part * (speeds[k] - speeds[k - 1]), size[0])
+    meets = np.where(after <= 0, meets, np.inf)
     begins = there.argmax(axis=0)
     start = values[begins, modes].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
@@ -531,7 +536,7 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     return np.asarray(best[np.lexsort((start[best], begins[best]))])
 
 
-def _growing(paths: _Paths) -> tuple[Growing, ...]:
+def _growing(paths: _Paths, asked: FloatArray) -> tuple[Growing, ...]:
     """Ranges in which modes grow, by the speed where they start to."""
     speeds, values = paths.speeds, paths.values[:, paths.columns]
     grows = _growth(values) > GROWTH
@@ -541,16 +546,15 @@ def _growing(paths: _Paths) -> tuple[Growing, ...]:
     for mode, column in enumerate(paths.columns.tolist()):
         edges = np.flatnonzero(np.diff(grows[:, mode], prepend=False, append=False)).tolist()
         for i, k in zip(edges[::2], edges[1::2], strict=True):
-            last = float(speeds[k - 1])
             start = roots.get((i - 1, mode)) or _Root(float(speeds[i]), mode, values[i, mode], paths.vectors[i, column])
-            end = roots[k - 1, mode].speed if (k - 1, mode) in roots else last
+            end = roots[k - 1, mode].speed if (k - 1, mode) in roots else float(speeds[k - 1])
             lam, way = _whirling(paths.whirl, np.array([start.value]), start.vector[None])
             out.append(
                 Growing(
                     mode + 1,
                     start.speed,
                     not there[i, mode],
-                    last,
+                    float(asked[asked <= end].max(initial=start.speed)),
                     end if there[k + 1, mode] else None,
                     float(lam.imag[0]),
                     float(way[0]),

@@ -53,7 +53,7 @@ _TIMES = 2.0  # the highest speed: up to there modes are looked at, where no bou
 _GRID = 60  # speeds of a grid at most, before it is halved
 _PARTS = 20  # of a range over tables, at least
 _ROUNDS = 6  # of halving
-_BACK = 1e-4  # of a step: to which the slope at an edge belongs
+_BACK = 1e-5  # of a step: to which the slope at an edge belongs
 _PAIR = 1e-6  # relative distance of forward and backward whirl that coincide
 
 Status = Literal["stable", "threshold", "unstable"]
@@ -399,15 +399,26 @@ def stability_threshold(
     ValueError
         For an impossible range, or outside the table of a support.
     """
+    n = checked_number(rotor, min(n, available_modes(rotor)))
+    speeds = grid_of(rotor, range_of_speeds(lowest, highest, steps))
+    return threshold_of(covering(solve_whirl(both_planes(rotor), speeds, n)), n)
+
+
+def range_of_speeds(lowest: float, highest: float, steps: int) -> FloatArray:
+    """The speeds of a search for a threshold, rad/s, shape (steps + 1,).
+
+    Raises
+    ------
+    ValueError
+        For an impossible range.
+    """
     if not -np.inf < lowest < highest < np.inf:
         raise ValueError(
             f"the range of speeds is empty: {lowest!r} to {highest!r} rad/s; give finite lowest < highest"
         )
     if int(steps) != steps or steps < 1:
         raise ValueError(f"the range is divided into at least one step; got {steps!r}")
-    speeds = grid_of(rotor, checked_speeds(np.linspace(lowest, highest, int(steps) + 1)))
-    n = checked_number(rotor, min(n, available_modes(rotor)))
-    return threshold_of(covering(solve_whirl(both_planes(rotor), speeds, n)), n)
+    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1))
 
 
 def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
@@ -427,6 +438,20 @@ def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
         margin if np.isfinite(margin) else float("nan"),
         whirl.Q.P.rotor,
     )
+
+
+def least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
+    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each.
+
+    −inf and NaN where the rotor runs away without oscillating, NaN where nothing oscillates.
+    """
+    values = whirl.values
+    decrements = np.nan_to_num(-2 * np.pi * values.real / np.abs(values.imag), nan=np.inf)
+    k = decrements.argmin(axis=1)[:, None]
+    least = np.take_along_axis(np.where(np.isnan(values), np.nan, decrements), k, axis=1)[:, 0]
+    away = np.array(runs_away(whirl))
+    frequency = np.take_along_axis(np.abs(values.imag), k, axis=1)[:, 0]
+    return np.where(away, -np.inf, least), np.where(away, np.nan, frequency)
 
 
 def runs_away(whirl: Whirl) -> list[bool]:

@@ -51,15 +51,14 @@ GROWTH = 1e-14
 NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
 DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
-_TOLERANCE = 1.5e-8  # sum of the relative errors of eigenvalues at some speeds; the largest is a third
-_CHECKS = 5  # speeds at which errors are estimated
+_TOLERANCE = 6e-9  # of eigenvalues, relative to their size
+_FEW = 5  # speeds, about, for which the basis is made first
 _MORE = 3  # modes of a plane beyond those asked for
 _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
 _REAL = 0.1  # |Im λ| below this part of |λ| is no oscillation: log decrement above 62
 _INFINITE = 1e-6  # |μ| below this part of the largest: no mass moves, or too little to be of interest
 _QUIET = 1e-6  # |Re λ| below this part of |λ| comes from work, not from the eigenvalue, which has rounding
-_BESIDE = 1 + 1e-14  # times an eigenvalue: there the matrix is not singular to the last bit
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +167,8 @@ def _answers(
     M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, loads: ComplexArray
 ) -> ComplexArray:
     """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
-    terms = np.stack((np.broadcast_to(M, D.shape), D, K), axis=1).reshape(len(D), 3, M.size)
-    lam = values * _BESIDE
+    terms = np.stack(np.broadcast_arrays(M, D, K), axis=1).reshape(len(D), 3, M.size)
+    lam = values * (1 + 1e-14)  # beside an eigenvalue: there the matrix is not singular to the last bit
     powers = np.stack((lam * lam, lam, np.ones_like(lam)), axis=2)
     dynamic = (powers @ terms).reshape(*lam.shape, *M.shape)
     return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads, dynamic.shape[:-1])[..., None])[..., 0])
@@ -201,8 +200,7 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
     modes = min(m // 2 + _MORE, most)
     while True:
         spectrum, scale = reference(P, speeds, modes)
-        Q, error = _reduced(P, spectrum, speeds, m, scale)
-        whirl = replace(solve(Q, speeds, m, scale), error=error)
+        whirl = _in_basis(P, spectrum, scale, speeds, m)
         # Rigid-body motions and overdamped ones take room, too; and modes near the next ones feel them.
         if modes == most or (np.abs(whirl.values) ** 2 < spectrum.squares[-1]).all():
             return whirl
@@ -222,44 +220,44 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     return spectrum, float(np.sqrt(moving[0] if moving.size else spectrum.shift))
 
 
-def _reduced(
-    P: Planes, spectrum: Spectrum, speeds: FloatArray, m: int, scale: float
-) -> tuple[Reduced, float]:
-    """The equations in a basis that begins with the modes of a spectrum, and the error that it leaves."""
+def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m: int) -> Whirl:
+    """The same in a basis that begins with modes, and grows for a few speeds, then for all."""
     from scipy.linalg.lapack import dtbtrs
 
-    n, U = P.A.size, spectrum.factor
-    begin = np.hstack((multiply(P.A.mass, spectrum.vectors), np.eye(n)[:, P.rows]))
-    images, Y = dtbtrs(U, begin, trans="T")[0], np.empty((n, 0))
-    images /= np.linalg.norm(images, axis=0)
-    some = speeds[np.unique(np.linspace(0, speeds.size - 1, _CHECKS).astype(int))]
+    A, U = P.A, spectrum.factor
+    loads = np.hstack((multiply(A.mass, spectrum.vectors), np.eye(A.size)[:, P.rows]))
+    Y = np.linalg.qr(dtbtrs(U, loads, trans="T")[0])[0]
+    some = speeds[:: -1 - speeds.size // _FEW][::-1]  # with the last, where gyroscopic loads are largest
     while True:
-        directions, sizes, _ = np.linalg.svd(images - Y @ (Y.T @ images), full_matrices=False)
-        errors = np.cumsum(sizes[::-1] ** 2)[::-1]  # if this direction and those after it do not join
-        if errors[0] <= _TOLERANCE:
-            break
-        new = directions[:, errors > _TOLERANCE][:, : n - Y.shape[1]]
+        X = dtbtrs(U, Y)[0]
+        Q = project(P, X)
+        loads = np.hstack([multiply(band, X) for band in (A.mass, A.gyroscopic, A.material)])
+        images = dtbtrs(U, loads, trans="T")[0]
+        outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
+        while True:
+            whirl = solve(Q, some, m, scale)
+            left = _loads(whirl, spectrum.shift) @ triangle.T
+            errors = (left**2).sum(axis=(2, 3))
+            wrong = errors > _TOLERANCE
+            if wrong.any() or some.size == speeds.size:
+                break
+            some = speeds
+        if not wrong.any():
+            return replace(whirl, error=float(errors.max()))
+        columns = left[wrong].reshape(-1, len(triangle))
+        sizes, directions = np.linalg.eigh(columns.T @ columns)
+        new = outside @ directions[:, np.cumsum(sizes) > _TOLERANCE]
         Y = np.hstack((Y, new - Y @ (Y.T @ new)))
-        Q = project(P, dtbtrs(U, Y)[0])
-        loads = _unanswered(solve(Q, some, m, scale), spectrum.shift)
-        images = dtbtrs(U, np.hstack((loads.real, loads.imag)), trans="T")[0]
-        images -= Y @ (Y.T @ images)  # twice, for rounding
-    return Q, float(errors[0])
 
 
-def _unanswered(whirl: Whirl, shift: float) -> ComplexArray:
-    """The loads r of each pair in each plane, shape (size, k)."""
-    A = whirl.Q.P.A
-    lam = np.nan_to_num(whirl.values)[..., None, None]
-    shapes = whirl.Q.expand(np.nan_to_num(whirl.vectors))
-    across = np.array([[-1j]]) if whirl.Q.P.planes == 1 else np.array([[0.0, 1.0], [-1.0, 0.0]])
-    inertia, turning, material = (
-        multiply(band, shapes.reshape(-1, A.size).T).T.reshape(shapes.shape)
-        for band in (A.mass, A.gyroscopic, A.material)
-    )
-    turned = across @ (lam * turning + material)
-    loads = (lam * lam - shift) * inertia + lam * material + whirl.speeds[:, None, None, None] * turned
-    return np.asarray(loads.reshape(-1, A.size).T)
+def _loads(whirl: Whirl, shift: float) -> FloatArray:
+    """The loads r: factors of M, G and B times the basis, shape (S, m, real and imaginary planes, 3 d)."""
+    p, d = whirl.Q.P.planes, whirl.Q.basis.shape[1]
+    lam, speed = np.nan_to_num(whirl.values)[..., None, None], whirl.speeds[:, None, None, None]
+    x = np.nan_to_num(whirl.vectors)[..., : p * d].reshape(*whirl.values.shape, p, d)
+    turned = speed * (np.array([[-1j]] if p == 1 else [[0.0, 1.0], [-1.0, 0.0]]) @ x)
+    r = np.concatenate(((lam * lam - shift) * x, lam * turned, lam * x + turned), axis=3)
+    return np.concatenate((r.real, r.imag), axis=2)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -385,7 +383,7 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     values, x, y = in_both_planes(whirl.values[0, there], whirl.Q.nodes(whirl.vectors[0, there]))
     size = np.hypot(np.abs(x), np.abs(y)).max(axis=1)
     real = whirl.real[0]
-    warnings = missing_modes(P.planes, real, int(whirl.still[0]), values.size, n)
+    warnings = missing_modes(real, int(whirl.still[0]), values.size, n)
     return WhirlModes(float(speeds[0]), values, x.T / size, y.T / size, real, whirl.error, rotor, warnings)
 
 
@@ -402,7 +400,7 @@ def in_both_planes(
     return np.where(back, values.conj(), values), x, np.where(back[..., None], 1j, -1j) * x
 
 
-def missing_modes(planes: int, real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
+def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
     """What is not among the modes, of which `count` of n oscillate."""
     texts = [f"only {count} of {n} modes oscillate, the others are overdamped"] if count < n else []
     if still > 1:
