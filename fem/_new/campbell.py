@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 Function = Callable[[Any, Any], AnyArray]
 HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
-_ALIKE, _OTHER, _NEARER = 0.8, 0.5, 0.2  # MAC of a mode with itself, with another by it, distances to 1
+_ALIKE = 0.8  # MAC of a mode with itself a step further
 _HARDLY = 0.3  # MAC below which two modes are not one
 _NARROW = 1e-4  # of the highest speed: steps that are not halved
 _DENSE = 8  # times the speeds asked for: so many are computed at most
@@ -70,11 +70,11 @@ class Growing:
     speed
         Where it starts to grow, rad/s; the first speed if it grows there already.
     from_start
-        Whether it grows at the first speed already (or at the first where it oscillates).
+        Whether it grows at the first speed already.
     last
         Last of the given speeds at which it grows, rad/s.
     end
-        Where it stops growing, rad/s; None if it grows at the last speed (or the last where it oscillates).
+        Where it stops growing (or to oscillate), rad/s; None if it grows at the last speed.
     frequency, direction
         Whirl frequency, rad/s, and 1 forward, −1 backward, 0 neither, where it starts.
     log_decrement
@@ -181,11 +181,6 @@ class Campbell(Result):
     def criticals(self) -> list[tuple[float, float]]:
         """Damped critical speed, rad/s, and logarithmic decrement there, of each."""
         return list(zip(self.critical_speeds.tolist(), self.critical_log_decrements.tolist(), strict=True))
-
-    @property
-    def heavy_modes(self) -> BoolArray:
-        """Which modes are heavily damped at more than half of the speeds, shape (n,)."""
-        return np.asarray((~(self.log_decrements <= self.heavy)).mean(axis=0) > 0.5)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
@@ -486,10 +481,7 @@ def _chained(
     S, m = values.shape
     mac = likeness(whirl, values[:-1], X[:-1], values[1:], X[1:])
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
-    best, others = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0], mac.copy()
-    np.put_along_axis(others, partner[..., None], 0.0, axis=2)
-    rivals = np.maximum(others.max(axis=2), np.take_along_axis(others.max(axis=1), partner, axis=1))
-    clear = (best >= _ALIKE) & ((rivals <= _OTHER * best) | (1 - best <= _NEARER * (1 - rivals)))
+    best = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0]
     labels = np.tile(np.arange(m), (S, 1))
     count = m
     for k, mine in enumerate(partner):
@@ -501,7 +493,7 @@ def _chained(
     paths, vectors = np.full((S, count), NONE), np.full((S, count, X.shape[2]), NONE)
     doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
     paths[rows, labels], vectors[rows, labels] = values, X
-    doubtful[rows[:-1], labels[:-1]] = ~clear & (best > 0) & _light(values[:-1], heavy)
+    doubtful[rows[:-1], labels[:-1]] = (best < _ALIKE) & (best > 0) & _light(values[:-1], heavy)
     return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), {})
 
 
@@ -521,13 +513,8 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     size = np.where(there, np.abs(values.imag), np.inf)
     low = there & (size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1])
     grows = (low & (_growth(values) > GROWTH)).any(axis=0)
-    modes, gap = np.arange(size.shape[1]), size - speeds[:, None]
-    k = (light & (gap <= 0)).argmax(axis=0)
-    before, after = gap[k - 1, modes], gap[k, modes]
-    with np.errstate(invalid="ignore"):
-        part = np.nan_to_num(after / (before - after))
-    meets = np.where(k > 0, speeds[k] + part * (speeds[k] - speeds[k - 1]), size[0])
-    meets = np.where(after <= 0, meets, np.inf)
+    below, modes = light & (size <= speeds[:, None]), np.arange(size.shape[1])
+    meets = np.where(below.any(axis=0), size[below.argmax(axis=0), modes], np.inf)
     begins = there.argmax(axis=0)
     start = values[begins, modes].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
@@ -541,7 +528,6 @@ def _growing(paths: _Paths, asked: FloatArray) -> tuple[Growing, ...]:
     speeds, values = paths.speeds, paths.values[:, paths.columns]
     grows = _growth(values) > GROWTH
     roots = paths.roots(_growth)[0] if grows.any() else {}
-    there = np.pad(np.isfinite(values), ((1, 1), (0, 0)))
     out = []
     for mode, column in enumerate(paths.columns.tolist()):
         edges = np.flatnonzero(np.diff(grows[:, mode], prepend=False, append=False)).tolist()
@@ -553,9 +539,9 @@ def _growing(paths: _Paths, asked: FloatArray) -> tuple[Growing, ...]:
                 Growing(
                     mode + 1,
                     start.speed,
-                    not there[i, mode],
+                    i == 0,
                     float(asked[asked <= end].max(initial=start.speed)),
-                    end if there[k + 1, mode] else None,
+                    end if k < speeds.size else None,
                     float(lam.imag[0]),
                     float(way[0]),
                     float(_decrements(values[i:k, mode]).min()),

@@ -440,20 +440,6 @@ def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
     )
 
 
-def least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
-    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each.
-
-    −inf and NaN where the rotor runs away without oscillating, NaN where nothing oscillates.
-    """
-    values = whirl.values
-    decrements = np.nan_to_num(-2 * np.pi * values.real / np.abs(values.imag), nan=np.inf)
-    k = decrements.argmin(axis=1)[:, None]
-    least = np.take_along_axis(np.where(np.isnan(values), np.nan, decrements), k, axis=1)[:, 0]
-    away = np.array(runs_away(whirl))
-    frequency = np.take_along_axis(np.abs(values.imag), k, axis=1)[:, 0]
-    return np.where(away, -np.inf, least), np.where(away, np.nan, frequency)
-
-
 def runs_away(whirl: Whirl) -> list[bool]:
     """At which speeds a motion grows without oscillating, length S."""
     return [bool(real.max(initial=-np.inf) > AWAY * whirl.scale) for real in whirl.real]

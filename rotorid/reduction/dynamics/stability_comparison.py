@@ -9,8 +9,8 @@ import numpy as np
 
 import fem
 from fem._new.assembly import both_planes
-from fem._new.stability import least_damped
-from fem._new.whirl import DIRECTION_NAMES, available_modes, checked_number, solve_whirl
+from fem._new.stability import runs_away
+from fem._new.whirl import DIRECTION_NAMES, Whirl, available_modes, checked_number, solve_whirl
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
@@ -205,8 +205,8 @@ def compare_stability(
     n_full = checked_number(rotor, min(max(8, n_small), available) if n is None else n)
     full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n_full, steps=steps)
     own = fem.threshold_of(whirl)
-    full_decrement, full_frequency = least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
-    small_decrement, small_frequency = least_damped(whirl)
+    full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
+    small_decrement, small_frequency = _least_damped(whirl)
     for array in (full_decrement, full_frequency, small_decrement, small_frequency):
         array.flags.writeable = False
     return StabilityCost(
@@ -227,6 +227,18 @@ def compare_stability(
             *_damping_differs(speeds, full_decrement, small_decrement),
         ),
     )
+
+
+def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
+    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each.
+
+    −inf and NaN where the rotor runs away.
+    """
+    decrements = -2 * np.pi * whirl.values.real / np.abs(whirl.values.imag)
+    rows, k = np.arange(len(decrements)), np.nan_to_num(decrements, nan=np.inf).argmin(axis=1)
+    away = np.array(runs_away(whirl))
+    frequency = np.abs(whirl.values.imag)[rows, k]
+    return np.where(away, -np.inf, decrements[rows, k]), np.where(away, np.nan, frequency)
 
 
 def _unconfirmed(full: fem.Stability, n: int) -> tuple[str, ...]:
