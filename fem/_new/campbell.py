@@ -5,12 +5,11 @@ assignment of all of them (`linear_sum_assignment`). Velocities tell apart forwa
 in a complex coordinate, where modes of different sign of Im λ never mix. A step in which the MAC leaves a doubt
 is halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
 Crossings are roots (`brentq`) on the mode itself, which inverse iteration follows from the nearer end of the
-step; where it slips to another mode the step is halved, too. So are the speeds where a mode begins to grow.
+step; where it slips to another mode the step is halved, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,7 +20,7 @@ from fem._new.assembly import both_planes
 from fem._new.parameters import nearest_modes
 from fem._new.response import whirl_direction
 from fem._new.rotor import Rotor, refined
-from fem._new.stability import Window, covering, grid_of, holding, near_level, runs_away, windows_of
+from fem._new.stability import Window, covering, grid_of, holding, near_level, runs_away, windows_of, within
 from fem._new.undamped import Result
 from fem._new.whirl import (
     DIRECTION_NAMES,
@@ -39,14 +38,13 @@ from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, range_text, speed_text
+from rotorid.base.rpm import RPM, range_text
 from rotorid.base.tables import Column, Table, frame, terminal
 from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Function = Callable[[Any, Any], AnyArray]
 HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
 _ALIKE = 0.8  # MAC of a mode with itself a step further
@@ -57,62 +55,6 @@ _SWINGS = 0.4  # |Im λ| / |λ| below which a critical speed has no meaning: log
 _VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
 _PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
 _SPARE, _MOST = 2, 3  # modes above those asked for, which may come down; computed for one asked for, at most
-
-
-@dataclass(frozen=True)
-class Growing:
-    """A range of speeds in which a mode grows; a mode may have several.
-
-    Attributes
-    ----------
-    mode
-        Its number, from 1.
-    speed
-        Where it starts to grow, rad/s; the first speed if it grows there already.
-    from_start
-        Whether it grows at the first speed already.
-    last
-        Last of the given speeds at which it grows, rad/s.
-    end
-        Where it stops growing (or to oscillate), rad/s; None if it grows at the last speed.
-    frequency, direction
-        Whirl frequency, rad/s, and 1 forward, −1 backward, 0 neither, where it starts.
-    log_decrement
-        The lowest in the range.
-    """
-
-    mode: int
-    speed: float
-    from_start: bool
-    last: float
-    end: float | None
-    frequency: float
-    direction: float
-    log_decrement: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {
-            "mode": self.mode,
-            "speed_rad_s": self.speed,
-            "speed_rpm": self.speed * RPM,
-            "from_start": self.from_start,
-            "last_speed_rad_s": self.last,
-            "end_rad_s": self.end,
-            "frequency_rad_s": self.frequency,
-            "direction": DIRECTION_NAMES[self.direction],
-            "lowest_log_decrement": self.log_decrement,
-        }
-
-    def sentence(self) -> str:
-        """What happens, as a warning."""
-        where = ("already at " if self.from_start else "above ") + speed_text(self.speed)
-        if self.end is not None:
-            where = f"from {speed_text(self.speed)} to {speed_text(self.end)}"
-        return (
-            f"unstable: mode {self.mode} ({DIRECTION_NAMES[self.direction]} whirl, {self.frequency:.6g} rad/s) "
-            f"grows {where}, log decrement down to {self.log_decrement:.3g} in this range"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,7 +85,7 @@ class Campbell(Result):
     warnings
         What the reader must know.
     unstable
-        Modes that grow at some of the speeds, and from which speed on, by that speed.
+        Those of `windows` in which a mode that is listed grows first, with its number in the list.
     windows
         Ranges of speed in which any mode grows, listed or not.
     cut
@@ -166,7 +108,7 @@ class Campbell(Result):
     error: float
     rotor: Rotor
     warnings: tuple[str, ...] = ()
-    unstable: tuple[Growing, ...] = ()
+    unstable: tuple[Window, ...] = ()
     windows: tuple[Window, ...] = ()
     cut: str = ""
     std: FloatArray | None = None
@@ -197,11 +139,25 @@ class Campbell(Result):
                 "damped_critical_speeds_rad_s": self.critical_speeds,
                 "damped_critical_speeds": rows,
                 "damped_critical_speeds_cut": self.cut or None,
-                "unstable": [mode.to_dict() for mode in self.unstable],
+                "unstable": [self._growing(window) for window in self.unstable],
                 "unstable_speeds": [window.to_dict() for window in self.windows],
                 "warnings": self.warnings,
             }
         )
+
+    def _growing(self, window: Window) -> dict[str, Any]:
+        inside = within((window,), self.speeds)
+        return {
+            "mode": window.mode,
+            "speed_rad_s": window.first,
+            "speed_rpm": window.first * RPM,
+            "from_start": not window.begins,
+            "last_speed_rad_s": self.speeds[inside][-1],
+            "end_rad_s": window.last if window.ends else None,
+            "frequency_rad_s": window.frequency,
+            "direction": window.way,
+            "lowest_log_decrement": np.nanmin(self.log_decrements[inside]),
+        }
 
     def tables(self) -> tuple[Table, ...]:
         """The damped critical speeds; and the modes at each speed."""
@@ -304,22 +260,24 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         )
     asked = np.searchsorted(paths.speeds, speeds)
     lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
-    roots = [root for root in paths.crossings.values() if _swings(root.value)]
+    roots = [root for root in paths.crossings if _swings(root.value)]
     roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
     vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
     there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
-    unstable = _growing(paths, speeds)
+    unstable, texts, decrements = [], [], _decrements(lam)
     windows = holding(windows_of(covering(whirl)), speeds)
-    hidden = [
-        f"{window.sentence()} (a mode that is not listed: ask for more)"
-        for window in windows
-        if not any(one.speed <= window.last and window.first <= one.last for one in unstable)
-    ]
-    warnings = (*(mode.sentence() for mode in unstable), *hidden, *_warnings(paths, n, asked), *fewer)
+    for window in windows:
+        k = int(np.searchsorted(speeds, window.first))
+        apart = np.where(decrements[k] < 0, np.abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
+        if np.isfinite(apart).any():
+            unstable.append(replace(window, mode=int(np.nanargmin(apart)) + 1))
+            texts.append(unstable[-1].sentence())
+        else:
+            texts.append(f"{window.sentence()} (not listed: ask for more modes)")
     result = Campbell(
         speeds=speeds,
         frequencies=lam.imag,
-        log_decrements=_decrements(lam),
+        log_decrements=decrements,
         direction=direction,
         critical_speeds=np.array([root.speed for root in roots]),
         critical_modes=np.array([root.mode + 1 for root in roots], dtype=np.intp),
@@ -327,8 +285,8 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         critical_direction=ways,
         error=whirl.error,
         rotor=rotor,
-        warnings=warnings,
-        unstable=unstable,
+        warnings=(*texts, *_warnings(paths, n, asked), *fewer),
+        unstable=tuple(unstable),
         windows=windows,
         cut=_cut(paths),
         heavy=heavy,
@@ -338,7 +296,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
 
 
 class _Root(NamedTuple):
-    """A mode (column, from 0) at a speed, rad/s, where a function of it vanishes: eigenvalue, vector (R,)."""
+    """A mode (column, from 0) at a speed, rad/s, where it crosses the 1× line: eigenvalue, vector (R,)."""
 
     speed: float
     mode: int
@@ -360,18 +318,19 @@ class _Paths:
     vectors: ComplexArray
     doubtful: BoolArray
     columns: IndexArray
-    crossings: dict[tuple[int, int], _Root]
+    crossings: list[_Root]
 
-    def roots(self, function: Function) -> tuple[dict[tuple[int, int], _Root], list[int]]:
-        """Roots of a function of λ and speed on modes, by (step, mode), and steps in which a mode was lost."""
-        f = function(self.values[:, self.columns], self.speeds[:, None])
+    def roots(self) -> tuple[list[_Root], list[int]]:
+        """Crossings of the 1× line, and steps in which a mode was lost."""
+        f = off_synchronous(self.values[:, self.columns], self.speeds[:, None])
         change = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
         steps = np.argwhere(change).tolist()
-        roots = {(k, mode): self._root(k, mode, f[k : k + 2, mode], function) for k, mode in steps}
-        return {at: root for at, root in roots.items() if root}, [k for (k, _), root in roots.items() if not root]
+        roots = [self._root(k, mode, f[k : k + 2, mode]) for k, mode in steps]
+        lost = [k for (k, _), root in zip(steps, roots, strict=True) if root is None]
+        return [root for root in roots if root], lost
 
-    def _root(self, k: int, mode: int, f: FloatArray, function: Function) -> _Root | None:
-        """A root on a mode, followed from the nearer end; None if it was lost."""
+    def _root(self, k: int, mode: int, f: FloatArray) -> _Root | None:
+        """The crossing of a mode in a step, followed from the nearer end; None if it was lost."""
         from scipy.optimize import brentq
 
         column, ends = self.columns[mode], [k, k + 1]
@@ -384,7 +343,7 @@ class _Paths:
             if speed not in there:
                 pair = np.array([speed]), np.zeros(1, dtype=np.intp), np.array([last[1]]), last[2][None]
                 lam, X = polish(self.whirl.Q, *pair, 2)[:2]
-                last = there[speed] = function(lam, speed)[0], lam[0], X[0]
+                last = there[speed] = off_synchronous(lam, speed)[0], lam[0], X[0]
             return float(there[speed][0])
 
         speed = float(brentq(excess, *at, xtol=1e-14 * at[1], rtol=1e-15))
@@ -392,12 +351,12 @@ class _Paths:
         return None if abs(left) > _VANISHES * np.abs(f).max() else _Root(speed, mode, complex(value), vector)
 
 
-def _off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
+def off_synchronous(lam: ComplexArray, speed: FloatArray | float) -> FloatArray:
     """Whirl frequency less the speed."""
     return np.asarray(np.abs(lam.imag) - speed)
 
 
-def _growth(lam: ComplexArray, _: object = None) -> FloatArray:
+def _growth(lam: ComplexArray) -> FloatArray:
     return np.asarray(lam.real / np.abs(lam))
 
 
@@ -455,12 +414,12 @@ def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
     while True:
         paths = _chained(whirl, speeds, values, X, n, heavy)
         steps = paths.doubtful[:, paths.columns].any(axis=1)
-        for gap in _off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
+        for gap in off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
             steps[near_level(np.nan_to_num(gap), 0.0)] = True
         wide = np.diff(speeds) > _NARROW * speeds[-1]
         dense = speeds.size > _DENSE * whirl.speeds.size
         if dense or not (steps & wide).any():
-            crossings, lost = paths.roots(_off_synchronous)
+            crossings, lost = paths.roots()
             steps[lost] = True
             if dense or not (steps & wide).any():
                 return replace(paths, crossings=crossings)
@@ -494,7 +453,7 @@ def _chained(
     doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
     paths[rows, labels], vectors[rows, labels] = values, X
     doubtful[rows[:-1], labels[:-1]] = (best < _ALIKE) & (best > 0) & _light(values[:-1], heavy)
-    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), {})
+    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), [])
 
 
 def _light(values: ComplexArray, heavy: float) -> BoolArray:
@@ -523,37 +482,10 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     return np.asarray(best[np.lexsort((start[best], begins[best]))])
 
 
-def _growing(paths: _Paths, asked: FloatArray) -> tuple[Growing, ...]:
-    """Ranges in which modes grow, by the speed where they start to."""
-    speeds, values = paths.speeds, paths.values[:, paths.columns]
-    grows = _growth(values) > GROWTH
-    roots = paths.roots(_growth)[0] if grows.any() else {}
-    out = []
-    for mode, column in enumerate(paths.columns.tolist()):
-        edges = np.flatnonzero(np.diff(grows[:, mode], prepend=False, append=False)).tolist()
-        for i, k in zip(edges[::2], edges[1::2], strict=True):
-            start = roots.get((i - 1, mode)) or _Root(float(speeds[i]), mode, values[i, mode], paths.vectors[i, column])
-            end = roots[k - 1, mode].speed if (k - 1, mode) in roots else float(speeds[k - 1])
-            lam, way = _whirling(paths.whirl, np.array([start.value]), start.vector[None])
-            out.append(
-                Growing(
-                    mode + 1,
-                    start.speed,
-                    i == 0,
-                    float(asked[asked <= end].max(initial=start.speed)),
-                    end if k < speeds.size else None,
-                    float(lam.imag[0]),
-                    float(way[0]),
-                    float(_decrements(values[i:k, mode]).min()),
-                )
-            )
-    return tuple(sorted(out, key=lambda one: (one.speed, one.mode)))
-
-
 def _cut(paths: _Paths) -> str:
     """What to say where modes that are not listed have critical speeds in the range, or may have."""
     others = np.delete(paths.values, paths.columns, axis=1)
-    f = np.where(_swings(others), _off_synchronous(others, paths.speeds[:, None]), np.nan)
+    f = np.where(_swings(others), off_synchronous(others, paths.speeds[:, None]), np.nan)
     k, _ = np.nonzero(f[:-1] * f[1:] < 0)
     if k.size:
         where = f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"

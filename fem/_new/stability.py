@@ -84,6 +84,11 @@ class Window:
     frequency: float | None = None
     direction: float | None = None
 
+    @property
+    def way(self) -> str | None:
+        """The direction in a word."""
+        return None if self.direction is None else DIRECTION_NAMES[self.direction]
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
@@ -95,7 +100,7 @@ class Window:
             "ends": self.ends,
             "mode": self.mode,
             "frequency_rad_s": self.frequency,
-            "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
+            "direction": self.way,
         }
 
     def where(self) -> str:
@@ -109,9 +114,8 @@ class Window:
     def sentence(self) -> str:
         """What happens, as a warning."""
         cause = "the rotor runs away without oscillating; check negative stiffness"
-        if self.mode is not None and self.direction is not None:
-            way = DIRECTION_NAMES[self.direction]
-            cause = f"mode {self.mode} ({way} whirl, {self.frequency:.6g} rad/s) grows"
+        if self.mode is not None:
+            cause = f"mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows"
         return f"the steady response does not exist {self.where()}: there {cause}"
 
 
