@@ -1,8 +1,8 @@
 """Campbell diagram: whirl frequencies and decrements over speed, and the damped critical speeds.
 
-Modes of neighbouring speeds are the same where their states (u, λ u / |λ|) are alike: mass-weighted MAC, the best
-assignment of all of them (`linear_sum_assignment`). Velocities tell apart forward and backward whirl of one shape
-in a complex coordinate, where modes of different sign of Im λ never mix. A step in which the MAC leaves a doubt
+Modes of neighbouring speeds are the same where their states (u, λ u / |λ|) are alike: MAC in the energy of
+the basis, in which vectors have length 1, and the best assignment of all (`linear_sum_assignment`).
+Velocities tell apart forward and backward whirl of one shape. A step in which a mode is hardly like itself
 is halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
 Crossings are roots (`brentq`) on the mode itself, which inverse iteration follows from the nearer end of the
 step; where it slips to another mode the step is halved, too.
@@ -20,7 +20,16 @@ from fem._new.assembly import both_planes
 from fem._new.parameters import nearest_modes
 from fem._new.response import whirl_direction
 from fem._new.rotor import Rotor, refined
-from fem._new.stability import Window, covering, grid_of, holding, near_level, runs_away, windows_of, within
+from fem._new.stability import (
+    Window,
+    covering,
+    grid_of,
+    holding,
+    near_level,
+    runs_away,
+    windows_of,
+    within,
+)
 from fem._new.undamped import Result
 from fem._new.whirl import (
     DIRECTION_NAMES,
@@ -51,7 +60,7 @@ _ALIKE = 0.8  # MAC of a mode with itself a step further
 _HARDLY = 0.3  # MAC below which two modes are not one
 _NARROW = 1e-4  # of the highest speed: steps that are not halved
 _DENSE = 8  # times the speeds asked for: so many are computed at most
-_SWINGS = 0.4  # |Im λ| / |λ| below which a critical speed has no meaning: log decrement above 14
+_SWINGS = 14.0  # log decrement above which a critical speed has no meaning
 _VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
 _PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
 _SPARE, _MOST = 2, 3  # modes above those asked for, which may come down; computed for one asked for, at most
@@ -220,11 +229,11 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     """Compute whirl frequencies, logarithmic decrements and directions over speed.
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
-    between the given speeds where it leaves a doubt; on rotationally symmetric supports forward and backward
-    whirl are kept apart exactly. The n modes are those that meet the 1× line first, then those that are most
-    often among the n of lowest frequency; they are numbered by frequency at the first speed, backward before
-    forward where a pair coincides. Modes that are heavily damped at more than half of the speeds come last.
-    Where a curve crosses the 1× line between two speeds, the crossing is found by iteration on the model.
+    between the given speeds where it leaves a doubt. The n modes are those that meet the 1× line first, then
+    those that are most often among the n of lowest frequency; they are numbered by frequency at the first
+    speed, backward before forward where a pair coincides. Modes that are heavily damped at more than half of
+    the speeds come last. Where a curve crosses the 1× line between two speeds, the crossing is found by
+    iteration on the model.
 
     Parameters
     ----------
@@ -244,11 +253,8 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         rotor is pushed aside by negative stiffness at every speed.
     """
     speeds = checked_speeds(speeds, ascending=True)
-    available = available_modes(rotor)
-    fewer: tuple[str, ...] = ()
-    if n is not None and whole(n, "the number of modes") > available:
-        fewer, n = (f"the model has only {available} of {n} modes",), available
-    n = checked_number(rotor, n)
+    asked_for = checked_number(rotor, None) if n is None else whole(n, "the number of modes")
+    n = checked_number(rotor, min(asked_for, available_modes(rotor)))
     paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
     columns, whirl = paths.columns, paths.whirl
     if not columns.size:
@@ -260,7 +266,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         )
     asked = np.searchsorted(paths.speeds, speeds)
     lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
-    roots = [root for root in paths.crossings if _swings(root.value)]
+    roots = [root for root in paths.crossings if _light(root.value, _SWINGS)]
     roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
     vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
     there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
@@ -285,7 +291,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         critical_direction=ways,
         error=whirl.error,
         rotor=rotor,
-        warnings=(*texts, *_warnings(paths, n, asked), *fewer),
+        warnings=(*texts, *_warnings(paths, asked_for, asked)),
         unstable=tuple(unstable),
         windows=windows,
         cut=_cut(paths),
@@ -306,10 +312,10 @@ class _Root(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Paths:
-    """Modes over speeds, (S,), in the basis of `whirl`, the columns of those asked for, and their crossings.
+    """Modes over speeds (S,) in the basis of `whirl`, the columns of those asked for, and their crossings.
 
-    λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in which
-    steps shapes do not tell a mode apart from others.
+    λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in
+    which steps shapes do not tell a mode apart from others.
     """
 
     whirl: Whirl
@@ -365,11 +371,6 @@ def _decrements(lam: ComplexArray) -> FloatArray:
     return np.where(np.abs(_growth(lam)) <= GROWTH, 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
 
 
-def _swings(lam: AnyArray) -> BoolArray:
-    """Which modes oscillate so that a critical speed has a meaning."""
-    return np.asarray(np.abs(lam.imag) > _SWINGS * np.abs(lam))
-
-
 def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
     lam, x, y = in_both_planes(values, whirl.Q.nodes(np.nan_to_num(vectors)))
@@ -380,19 +381,6 @@ def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
     """Directions in words, None where there is no motion."""
     words = np.vectorize(DIRECTION_NAMES.get, otypes=[object])(direction)
     return np.where(np.isfinite(there), words, None)
-
-
-def likeness(whirl: Whirl, one: ComplexArray, X: ComplexArray, other: ComplexArray, Y: ComplexArray) -> FloatArray:
-    """MAC of states between modes (…, i) and (…, j), vectors (…, i, R) and (…, j, R); 0 where there is none."""
-    weight = whirl.Q.M * whirl.scale**2
-    weight = weight + 1e-3 * np.trace(weight) / len(weight) * np.eye(len(weight))  # of what has no mass
-    X, Y = np.nan_to_num(X, nan=1.0), np.nan_to_num(Y, nan=1.0)
-    X, Y = (Z / np.sqrt(np.einsum("...r,rs,...s->...", Z.conj(), weight, Z).real)[..., None] for Z in (X, Y))
-    turn = np.angle(one)[..., :, None] - np.angle(other)[..., None, :]
-    mac = np.abs(X.conj() @ weight @ np.swapaxes(Y, -1, -2)) ** 2 * np.cos(turn / 2) ** 2
-    if whirl.Q.P.planes == 1:
-        mac[(one.imag > 0)[..., :, None] != (other.imag > 0)[..., None, :]] = 0.0
-    return np.asarray(np.nan_to_num(mac))
 
 
 def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
@@ -438,7 +426,9 @@ def _chained(
     from scipy.optimize import linear_sum_assignment
 
     S, m = values.shape
-    mac = likeness(whirl, values[:-1], X[:-1], values[1:], X[1:])
+    phase = values / np.abs(values)
+    states = (1 + phase[:-1, :, None].conj() * phase[1:, None]) / 2
+    mac = np.nan_to_num(np.abs(X[:-1].conj() @ X[1:].swapaxes(1, 2) * states)) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
     best = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0]
     labels = np.tile(np.arange(m), (S, 1))
@@ -456,7 +446,7 @@ def _chained(
     return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), [])
 
 
-def _light(values: ComplexArray, heavy: float) -> BoolArray:
+def _light(values: ComplexArray | complex, heavy: float) -> BoolArray:
     """Which oscillate without heavy damping."""
     return np.asarray(-2 * np.pi * values.real <= heavy * np.abs(values.imag))
 
@@ -470,7 +460,9 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     """
     light, there = _light(values, heavy), np.isfinite(values)
     size = np.where(there, np.abs(values.imag), np.inf)
-    low = there & (size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1])
+    low = there & (
+        size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1]
+    )
     grows = (low & (_growth(values) > GROWTH)).any(axis=0)
     below, modes = light & (size <= speeds[:, None]), np.arange(size.shape[1])
     meets = np.where(below.any(axis=0), size[below.argmax(axis=0), modes], np.inf)
@@ -485,10 +477,12 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
 def _cut(paths: _Paths) -> str:
     """What to say where modes that are not listed have critical speeds in the range, or may have."""
     others = np.delete(paths.values, paths.columns, axis=1)
-    f = np.where(_swings(others), off_synchronous(others, paths.speeds[:, None]), np.nan)
+    f = np.where(_light(others, _SWINGS), off_synchronous(others, paths.speeds[:, None]), np.nan)
     k, _ = np.nonzero(f[:-1] * f[1:] < 0)
     if k.size:
-        where = f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
+        where = (
+            f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
+        )
     elif np.nanmax(np.abs(paths.values[-1].imag)) < paths.speeds[-1] and others.size:
         where = f"no mode was followed that reaches {paths.speeds[-1]:.6g} rad/s there"
     else:
@@ -497,20 +491,19 @@ def _cut(paths: _Paths) -> str:
 
 
 def _warnings(paths: _Paths, n: int, asked: IndexArray) -> tuple[str, ...]:
-    speeds, gone = paths.speeds[asked], np.isnan(paths.values[asked][:, paths.columns])
+    gone = np.isnan(paths.values[asked][:, paths.columns])
     texts = [
-        f"mode {mode + 1} does not oscillate (overdamped, or above the frequencies computed) at "
-        f"{gone[:, mode].sum()} of {counted(speeds.size, 'speed')}, the first {speeds[gone[:, mode]][0]:.6g} rad/s"
+        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {gone[:, mode].sum()} of "
+        f"{len(gone)} speeds, the first {paths.speeds[asked[gone[:, mode].argmax()]]:.6g} rad/s"
         for mode in np.flatnonzero(gone.any(axis=0)).tolist()
     ]
     if paths.columns.size < n:
-        texts.append(f"only {paths.columns.size} of {n} modes oscillate, the others are overdamped")
+        texts.append(f"only {paths.columns.size} of {n} modes oscillate")
     if (paths.whirl.still > 1).any():
         texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
     doubt = paths.speeds[:-1][paths.doubtful[:, paths.columns].any(axis=1)]
     if doubt.size:
         texts.append(
-            f"modes could not be told apart by shape just above {doubt[0]:.6g} rad/s: from there on two curves "
-            "may be exchanged"
+            f"modes could not be told apart by shape above {doubt[0]:.6g} rad/s: two curves may be exchanged"
         )
     return tuple(texts)

@@ -1,8 +1,8 @@
 """Where a rotor whirls by itself: the largest growth of all its motions over speed.
 
-Growth of a motion is Re λ / |λ|. The largest one of all motions is continuous in speed whatever mode has it,
-so that no mode must be followed: it is looked at on a grid of speeds, which is halved where its slopes tell of
-a change of sign between two of them. A motion grows where it is above `GROWTH`, the rounding of what damps and
+Growth of a motion is Re λ / |λ|. The largest one of all motions is continuous in speed whatever mode has it:
+no mode must be followed. It is looked at on a grid of speeds, which is halved where its slopes tell of a
+change of sign between two of them. A motion grows where it is above `GROWTH`, the rounding of what damps and
 drives it: motions without any damping do not. Edges of unstable ranges are where the largest growth passes
 this level, moved back to Re λ = 0 on the mode that grows.
 
@@ -257,47 +257,40 @@ def covering(whirl: Whirl) -> Whirl:
     return whirl
 
 
-def _motions(whirl: Whirl, s: int) -> tuple[ComplexArray, FloatArray]:
-    """Eigenvalues at the speed number s, and their growth: by the scale of what does not oscillate."""
-    lam, real = whirl.values[s], whirl.real[s]
-    lam = lam[np.isfinite(lam)]
-    rates = np.concatenate((lam.real / np.abs(lam), _BESIDE * (real / whirl.scale - AWAY), [-1.0]))
-    return np.concatenate((lam, real, [-whirl.scale])), rates
-
-
-def growth(whirl: Whirl) -> FloatArray:
-    """Growth of the motion that grows fastest at each speed, shape (S,)."""
-    return np.array([_motions(whirl, s)[1].max() for s in range(whirl.speeds.size)])
-
-
 def _at(whirl: Whirl, *speeds: float) -> Whirl:
     return solve(whirl.Q, np.array(speeds), whirl.values.shape[1], whirl.scale)
 
 
-def _fastest(whirl: Whirl, speed: float) -> complex:
-    lam, rates = _motions(_at(whirl, speed), 0)
-    return complex(lam[np.argmax(rates)])
+def fastest(whirl: Whirl) -> tuple[ComplexArray, FloatArray]:
+    """Eigenvalue of the motion that grows fastest at each speed, and its growth, shape (S,) each.
+
+    That of what does not oscillate by the scale.
+    """
+    rates = np.nan_to_num(whirl.values.real / np.abs(whirl.values), nan=-1.0)
+    rows, k = np.arange(len(rates)), rates.argmax(axis=1)
+    real = np.array([one.max(initial=-whirl.scale) for one in whirl.real])
+    away = _BESIDE * (real / whirl.scale - AWAY)
+    return np.where(away > rates[rows, k], real, whirl.values[rows, k]), np.maximum(away, rates[rows, k])
 
 
 def near_level(values: FloatArray, level: float) -> IndexArray:
     """Steps beside values that are the nearest to a level, where one more such step would pass it."""
-    beyond = values > level
-    near = np.where(beyond, level - values, values - level)
+    near, crossed = -np.abs(values - level), np.diff(values > level)
     before, here, after = near[:-2], near[1:-1], near[2:]
     close = (here >= np.maximum(before, after)) & (2 * here > np.minimum(before, after))
-    k = np.flatnonzero(close & (beyond[:-2] == beyond[1:-1]) & (beyond[1:-1] == beyond[2:]))
+    k = np.flatnonzero(close & ~crossed[:-1] & ~crossed[1:])
     return np.union1d(k, k + 1)
 
 
 def _scan(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
     """Speeds between which the largest growth does not pass its level unseen, and it there."""
-    grid, rates = whirl.speeds, growth(whirl)
+    grid, rates = whirl.speeds, fastest(whirl)[1]
     for _ in range(_ROUNDS):
         k = near_level(rates, GROWTH)
         if not k.size:
             break
         more = (grid[k] + grid[k + 1]) / 2
-        rates = np.insert(rates, k + 1, growth(_at(whirl, *more)))
+        rates = np.insert(rates, k + 1, fastest(_at(whirl, *more))[1])
         grid = np.insert(grid, k + 1, more)
     return grid, rates
 
@@ -309,12 +302,12 @@ def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, com
     there = dict(zip(ends.tolist(), rates.tolist(), strict=True))
 
     def excess(speed: float) -> float:
-        return (there[speed] if speed in there else float(growth(_at(whirl, speed))[0])) - GROWTH
+        return (there[speed] if speed in there else float(fastest(_at(whirl, speed))[1][0])) - GROWTH
 
     speed = float(brentq(excess, *ends, xtol=1e-13 * max(ends), rtol=1e-15))
-    value, step = _fastest(whirl, speed), _BACK * float(ends[0] - speed)
-    lam, _ = _motions(_at(whirl, speed + step), 0)
-    rise = (lam[np.argmin(np.abs(lam - value))] - value).real
+    step = _BACK * (ends[0] - speed)
+    value, other = fastest(_at(whirl, speed, speed + step))[0]
+    rise = (other - value).real
     back = step * value.real / rise if rise > 0 else 0.0
     return float(np.clip(speed - back, min(ends), max(ends))), value
 
@@ -339,9 +332,10 @@ def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     out = []
     for i, j in zip(changes[::2], changes[1::2], strict=True):
         first, last = grid[i], grid[j - 1]
-        value = _fastest(whirl, first)
         if i:
             first, value = _edge(whirl, grid[[i, i - 1]], rates[[i, i - 1]])
+        else:
+            value = fastest(whirl)[0][0]
         if j < grid.size:
             last, _ = _edge(whirl, grid[[j - 1, j]], rates[[j - 1, j]])
         out.append(Window(float(first), float(last), i > 0, j < grid.size, *_mode(whirl, first, value)))

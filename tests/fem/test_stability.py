@@ -71,7 +71,7 @@ def test_cross_coupling_that_grows_with_speed():
     assert found.threshold == pytest.approx(2 * CRITICAL, rel=1e-7)
     assert found.whirl_ratio == pytest.approx(0.5, rel=1e-8)
     assert found.mode in (1, 2)
-    assert "0.5 × speed" in found.summary()
+    assert "0.5 × speed" in found.sentence()
 
 
 def test_anisotropic_bearings_shift_the_limit():
