@@ -464,10 +464,14 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
         size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1]
     )
     grows = (low & (_growth(values) > GROWTH)).any(axis=0)
-    below, modes = light & (size <= speeds[:, None]), np.arange(size.shape[1])
-    meets = np.where(below.any(axis=0), size[below.argmax(axis=0), modes], np.inf)
+    meets = np.array(
+        [
+            np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
+            for mode in np.where(light, size, 1e9 * speeds[-1]).T
+        ]
+    )
     begins = there.argmax(axis=0)
-    start = values[begins, modes].imag  # in a complex coordinate negative of backward whirl
+    start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
     best = np.lexsort((start, begins, -low.sum(axis=0), meets, light.mean(axis=0) < 0.5, ~grows))
     best = best[(low.any(axis=0) | np.isfinite(meets))[best]][:n]
