@@ -9,8 +9,9 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem.api684_peaks import Peak, Peaks, required_margin
 from fem._new.campbell import Campbell, campbell
+from fem._new.stability import Stability, Window, judge, range_of_speeds, stability_threshold, threshold_of
+from fem.api684_peaks import Peak, Peaks, required_margin
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
 from fem.mesh import MeshCheck, mesh_check, refined
@@ -33,7 +34,6 @@ from fem.plots import draw_rotor
 from fem.response import influence, response_peaks, unbalance_response
 from fem.response_result import BearingForces, InfluenceCoefficients, Response
 from fem.speed_map import Intersection, SpeedMap, speed_map
-from fem._new.stability import Stability, Window, judge, range_of_speeds, stability_threshold, threshold_of
 from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.whirl import WhirlModes, whirl_modes
@@ -79,9 +79,11 @@ __all__ = [
     "draw_rotor",
     "equations_of_motion",
     "influence",
+    "judge",
     "mesh_check",
     "orbits",
     "probe",
+    "range_of_speeds",
     "refined",
     "required_margin",
     "resolve_peaks",
@@ -90,6 +92,7 @@ __all__ = [
     "stability_threshold",
     "state_space",
     "static_deflection",
+    "threshold_of",
     "unbalance_response",
     "whirl_direction",
     "whirl_modes",

@@ -137,7 +137,8 @@ class Campbell(Result):
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
         errors = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
         whole = self.tables()[0]
-        rows = [dict(zip(whole.headings, row, strict=True)) for row in whole.rows]
+        keys = [column.key.rpartition(".")[2] for column in whole.columns]
+        rows = [dict(zip(keys, row, strict=True)) for row in whole.rows]
         return plain(
             {
                 "speeds_rad_s": self.speeds,
@@ -172,12 +173,12 @@ class Campbell(Result):
         """The damped critical speeds; and the modes at each speed."""
         at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
         criticals = (
-            Column("speed_rad_s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
-            Column("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
             Column("mode", self.critical_modes, key=at + "mode"),
-            Column("log_decrement", decrements, "{:z.4f}".format, at + "log_decrement"),
-            Column("direction", _words(self.critical_direction, self.critical_speeds)),
-            Column("heavily_damped", decrements > HEAVY, lambda heavy: f"no peak: above {HEAVY}" * heavy),
+            Column("whirl", _words(self.critical_direction, self.critical_speeds), key=at + "direction"),
+            Column("rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Column("rad/s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Column("log dec", decrements, "{:z.4f}".format, at + "log_decrement"),
+            Column("", decrements > HEAVY, f"no peak: above {HEAVY}".__mul__, at + "heavily_damped"),
         )
         S, n = self.frequencies.shape
         modes = (
@@ -197,12 +198,12 @@ class Campbell(Result):
     def sentence(self) -> str:
         """Whether it is stable, and how many damped critical speeds there are."""
         unstable = listing([window.where() for window in self.windows], "and")
-        text = f"UNSTABLE {unstable}: a motion grows there." if unstable else "Stable: no motion grows."
+        text = f"UNSTABLE {unstable}: a motion grows there" if unstable else "Stable: no motion grows"
         heavy = int((self.critical_log_decrements > HEAVY).sum())
         light = self.critical_speeds.size - heavy
-        count = counted(light, "damped critical speed") if light else "no damped critical speed"
+        count = counted(light, "damped critical speed") if light else "No damped critical speed"
         more = f", {heavy} more without a peak" if heavy else ""
-        return f"{text}\nFrom {range_text(self.speeds[0], self.speeds[-1])}: {count}{more}."
+        return f"{text}. {count}{more} from {range_text(self.speeds[0], self.speeds[-1])}."
 
     @property
     def answer(self) -> Answer:
@@ -379,8 +380,9 @@ def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tupl
 
 def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
     """Directions in words, None where there is no motion."""
-    words = np.vectorize(DIRECTION_NAMES.get, otypes=[object])(direction)
-    return np.where(np.isfinite(there), words, None)
+    words: AnyArray = np.vectorize(DIRECTION_NAMES.get, otypes=[object])(direction)
+    words[np.isnan(there)] = None
+    return words
 
 
 def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
@@ -393,7 +395,7 @@ def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
         full = np.isfinite(listed).all() and (_light(listed, heavy).mean(axis=0) >= 0.5).sum() == n
         if full or m >= min(_MOST * n + 16, available):
             return paths
-        m = min(m + max(4, n), available)
+        m = min(2 * m, available)
 
 
 def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
@@ -401,7 +403,7 @@ def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
     speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
     while True:
         paths = _chained(whirl, speeds, values, X, n, heavy)
-        steps = paths.doubtful[:, paths.columns].any(axis=1)
+        steps: BoolArray = np.asarray(paths.doubtful[:, paths.columns].any(axis=1))
         for gap in off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
             steps[near_level(np.nan_to_num(gap), 0.0)] = True
         wide = np.diff(speeds) > _NARROW * speeds[-1]
@@ -413,10 +415,8 @@ def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
                 return replace(paths, crossings=crossings)
         k = np.flatnonzero(steps & wide)
         more = solve(whirl.Q, (speeds[k] + speeds[k + 1]) / 2, values.shape[1], whirl.scale)
-        speeds, values, X = (
-            np.insert(old, k + 1, new, axis=0)
-            for old, new in ((speeds, more.speeds), (values, more.values), (X, more.vectors))
-        )
+        speeds = np.insert(speeds, k + 1, more.speeds)
+        values, X = np.insert(values, k + 1, more.values, 0), np.insert(X, k + 1, more.vectors, 0)
 
 
 def _chained(
@@ -426,7 +426,8 @@ def _chained(
     from scipy.optimize import linear_sum_assignment
 
     S, m = values.shape
-    phase = values / np.abs(values)
+    phase = np.nan_to_num(values, nan=1.0)
+    phase /= np.abs(phase)
     states = (1 + phase[:-1, :, None].conj() * phase[1:, None]) / 2
     mac = np.nan_to_num(np.abs(X[:-1].conj() @ X[1:].swapaxes(1, 2) * states)) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)

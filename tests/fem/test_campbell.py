@@ -266,3 +266,43 @@ def test_undamped_decrements_have_no_sign():
     assert "0.0000" in text
     assert "-0.0000" not in text
     assert "-0.0000" not in fem.whirl_modes(symmetric(damping=0.0), 300.0, 8).summary()
+
+
+def test_heavily_damped_modes_push_no_other_out():
+    """On strongly damped pedestals two pairs of modes below the second of the shaft hardly oscillate."""
+    stand = fem.Pedestal(60.0, 2e7, 6e4)
+    rotor = fem.Rotor(
+        np.full(8, 0.15),
+        0.05,
+        discs=[fem.Disc(5, 40.0, 0.8, 0.5)],
+        supports=[fem.Support(node, ((2e6, 0), (0, 3e6)), 200.0, pedestal=stand) for node in (1, 9)],
+        model=FULL,
+    )
+    speeds = np.linspace(10.0, 900.0, 25)
+    light, all_modes = fem.campbell(rotor, speeds, 4), fem.campbell(rotor, speeds, 8, heavy=np.inf)
+    assert (all_modes.log_decrements > 6).all(axis=0).sum() == 4
+    assert (light.log_decrements < 6).all()
+    some = (all_modes.log_decrements < 6).all(axis=0)
+    np.testing.assert_allclose(light.frequencies, all_modes.frequencies[:, some], rtol=1e-9)
+    some = all_modes.critical_log_decrements < 6
+    np.testing.assert_allclose(light.critical_speeds, all_modes.critical_speeds[some], rtol=1e-9)
+
+
+def test_each_circle_lies_on_its_curve_and_no_other_crosses():
+    found = fem.campbell(overhung(), np.linspace(10.0, 1500.0, 12), 6)
+    gaps = found.frequencies - found.speeds[:, None]
+    for mode in range(6):
+        speeds = found.critical_speeds[found.critical_modes == mode + 1]
+        crossed = np.flatnonzero(np.diff(gaps[:, mode] > 0))
+        assert speeds.size == crossed.size
+        assert ((speeds > found.speeds[crossed]) & (speeds < found.speeds[crossed + 1])).all()
+
+
+def test_elements_cut_in_two_change_little():
+    frequencies, speeds = fem.campbell(machine(), np.linspace(0.0, 1000.0, 11), 4).mesh_change()
+    assert 0 < frequencies < 1e-4
+    assert 0 < speeds < 1e-4
+
+
+def test_modes_at_one_speed_are_printed_once():
+    assert fem.campbell(machine(), [300.0], 4).answer.whole().count("300.0000") == 4
