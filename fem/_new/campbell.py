@@ -231,10 +231,10 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
     between the given speeds where it leaves a doubt. The n modes are those that meet the 1× line first, then
-    those that are most often among the n of lowest frequency; they are numbered by frequency at the first
-    speed, backward before forward where a pair coincides. Modes that are heavily damped at more than half of
-    the speeds come last. Where a curve crosses the 1× line between two speeds, the crossing is found by
-    iteration on the model.
+    those of the lowest frequency on the whole; they are numbered by frequency at the first speed, backward
+    before forward where a pair coincides. Modes that are heavily damped at more than half of the speeds come
+    last. Where a curve crosses the 1× line between two speeds, the crossing is found by iteration on the
+    model.
 
     Parameters
     ----------
@@ -363,13 +363,9 @@ def off_synchronous(lam: ComplexArray, speed: FloatArray | float) -> FloatArray:
     return np.asarray(np.abs(lam.imag) - speed)
 
 
-def _growth(lam: ComplexArray) -> FloatArray:
-    return np.asarray(lam.real / np.abs(lam))
-
-
 def _decrements(lam: ComplexArray) -> FloatArray:
     """Of what neither grows nor decays, but for rounding, 0."""
-    return np.where(np.abs(_growth(lam)) <= GROWTH, 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
 
 
 def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
@@ -456,26 +452,19 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     """The n lowest modes, by frequency at the first speed, backward first where a pair starts as one.
 
     Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
-    speed is left out below that of another; then those that are most often among the n of lowest frequency.
-    Modes that grow go before all others, those that are heavily damped at half of the speeds come last.
+    speed is left out below that of another; then those of the lowest frequency on the whole. Those
+    that are heavily damped at half of the speeds come last.
     """
     light, there = _light(values, heavy), np.isfinite(values)
-    size = np.where(there, np.abs(values.imag), np.inf)
-    low = there & (
-        size <= np.sort(np.where(light, size, np.inf), axis=1)[:, min(n, size.shape[1]) - 1 :][:, :1]
-    )
-    grows = (low & (_growth(values) > GROWTH)).any(axis=0)
-    meets = np.array(
-        [
-            np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
-            for mode in np.where(light, size, 1e9 * speeds[-1]).T
-        ]
-    )
+    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    meets = [
+        np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
+        for mode in np.where(light, size, 1e9 * speeds[-1]).T
+    ]
     begins = there.argmax(axis=0)
     start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
-    best = np.lexsort((start, begins, -low.sum(axis=0), meets, light.mean(axis=0) < 0.5, ~grows))
-    best = best[(low.any(axis=0) | np.isfinite(meets))[best]][:n]
+    best = np.lexsort((start, size.mean(axis=0), meets, light.mean(axis=0) < 0.5))[:n]
     return np.asarray(best[np.lexsort((start[best], begins[best]))])
 
 
@@ -488,7 +477,7 @@ def _cut(paths: _Paths) -> str:
         where = (
             f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
         )
-    elif np.nanmax(np.abs(paths.values[-1].imag)) < paths.speeds[-1] and others.size:
+    elif np.nan_to_num(np.abs(paths.values[-1].imag)).max() < paths.speeds[-1] and others.size:
         where = f"no mode was followed that reaches {paths.speeds[-1]:.6g} rad/s there"
     else:
         return ""
