@@ -14,7 +14,7 @@ other damping that turns with the shaft (c z' − i Ω c z). Gyroscopic moments 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -39,7 +39,7 @@ from rotorid.base.answer import Answer
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, speed_text
+from rotorid.base.rpm import RPM, rpm_text, speed_text
 from rotorid.base.tables import Column, Table, frame
 
 if TYPE_CHECKING:
@@ -103,20 +103,20 @@ class Window:
             "direction": self.way,
         }
 
-    def where(self) -> str:
-        """The range, in both units."""
+    def where(self, text: Callable[[float], str] = rpm_text) -> str:
+        """The range, in rpm or as another function writes a speed."""
         if self.first == self.last:
-            return f"at {speed_text(self.first)}"
+            return f"at {text(self.first)}"
         if self.begins and not self.ends:
-            return f"above {speed_text(self.first)}"
-        return f"from {speed_text(self.first)} to {speed_text(self.last)}"
+            return f"above {text(self.first)}"
+        return f"from {text(self.first)} to {text(self.last)}"
 
     def sentence(self) -> str:
         """What happens, as a warning."""
         cause = "the rotor runs away without oscillating; check negative stiffness"
         if self.mode is not None:
             cause = f"mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows"
-        return f"the steady response does not exist {self.where()}: there {cause}"
+        return f"the steady response does not exist {self.where(speed_text)}: there {cause}"
 
 
 def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:

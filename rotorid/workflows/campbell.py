@@ -50,7 +50,7 @@ class CampbellDiagram(Parts):
     def parts(self) -> Mapping[str, Any]:
         """Whirl, and the critical speeds that show a peak beside the operating range."""
         from fem.api684_separation import Separation, unsearched
-        from fem.campbell import HEAVY
+        from fem._new.campbell import HEAVY
 
         peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
         doubt = unsearched(self.whirl.speeds[0], self.whirl.speeds[-1], self.operating)
