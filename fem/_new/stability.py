@@ -202,7 +202,7 @@ class Stability(Result):
         """Whether it is stable, or from which speed on which mode grows."""
         where = f"from {self.lowest:.6g} to {self.highest:.6g} rad/s"
         if self.status == "stable":
-            return f"stable {where}; smallest logarithmic decrement {self.margin:.4g}"
+            return f"stable {where}; smallest logarithmic decrement {self.margin:z.4g}"
         text = f"unstable already at {self.lowest:.6g} rad/s, where the search began"
         if self.threshold is not None:
             text = f"stable up to {speed_text(self.threshold)}"
