@@ -10,6 +10,7 @@ step; where it slips to another mode the step is halved, too.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from fem._new.assembly import both_planes
 from fem._new.parameters import nearest_modes
-from fem._new.response import whirl_direction
+from fem._new.response import DIRECTION_NAMES, whirl_direction
 from fem._new.rotor import Rotor, refined
 from fem._new.stability import (
     Window,
@@ -32,7 +33,6 @@ from fem._new.stability import (
 )
 from fem._new.undamped import Result
 from fem._new.whirl import (
-    DIRECTION_NAMES,
     GROWTH,
     NONE,
     Whirl,
@@ -348,8 +348,10 @@ class _Paths:
         def excess(speed: float) -> float:
             nonlocal last
             if speed not in there:
-                pair = np.array([speed]), np.zeros(1, dtype=np.intp), np.array([last[1]]), last[2][None]
-                lam, X = polish(self.whirl.Q, *pair, 2)[:2]
+                lam, X = np.array([last[1]]), last[2][None]
+                with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
+                    for _ in range(2):
+                        lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), lam, X, 1)[:2]
                 last = there[speed] = off_synchronous(lam, speed)[0], lam[0], X[0]
             return float(there[speed][0])
 

@@ -22,11 +22,10 @@ import numpy as np
 
 from fem._new.assembly import both_planes
 from fem._new.forces import InternalDamping
-from fem._new.response import whirl_direction
+from fem._new.response import DIRECTION_NAMES, whirl_direction
 from fem._new.rotor import Rotor
 from fem._new.undamped import Result
 from fem._new.whirl import (
-    DIRECTION_NAMES,
     GROWTH,
     Whirl,
     available_modes,

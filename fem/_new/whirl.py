@@ -2,19 +2,18 @@
 
 λ² M + λ D(Ω) + K(Ω) of both planes (see `assembly`) is solved in one basis of the shaft for all speeds.
 
-Basis. Let K₀ be the stiffness of the rotor on the mean of its supports, σ ≥ 0, and Uᵀ U = K₀ + σ M. The
+Basis. Let K₀ be the stiffness of the rotor on springs like its supports, σ ≥ 0, and Uᵀ U = K₀ + σ M. The
 basis begins with the static answers to the inertia of the lowest modes of K₀ and to unit forces at the
-supports, so that K − K₀ never leaves its loads. For a pair (λ, x) of the reduced equations the shaft is then
-left with the loads
+supports, so that no force of a support is ever missing. For a pair (λ, x) of the reduced equations the shaft
+is left with the loads
 
     r = (λ² − σ) M x + λ B x + Ω J (λ G + B) x,      J (x, y) = (y, −x), or −i of z = x + i y,
 
-less those that the basis answers. With e the part of U⁻ᵀ r outside of the images U x of the basis, the
-relative error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x): it is of second order, as a Rayleigh quotient's.
-(x has unit strain energy xᴴ K₀ x, and the larger |e|² is the estimate.)
-The largest directions of all e (static answers to gyroscopic loads, to the inertia of the support vectors,
-to material damping that differs along the shaft) join the basis, until the errors at the first, the middle
-and the last speed are small. Images are orthonormal, in which low modes keep their digits.
+as far as the basis does not answer them: with e the part of U⁻ᵀ r outside of its images U x, the relative
+error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x), of second order as that of a Rayleigh quotient. Vectors
+have xᴴ K₀ x ≈ 1, images are orthonormal (in them low modes keep their digits), and |e|² is the estimate.
+Where it is too large the largest directions of all such e join the basis: they are static answers to
+gyroscopic loads, to the inertia of the support vectors, to material damping that differs along the shaft.
 
 Eigenvalues. With λ = σ + 1/μ the problem is μ² K_σ + μ D_σ + M with K_σ = K + σ D + σ² M and
 D_σ = D + 2 σ M: the slowest modes are the largest μ, and mass may be zero. σ > 0 leaves room for rigid-body
@@ -32,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem._new.assembly import Planes, Reduced, assemble, both_planes, multiply, project
-from fem._new.response import whirl_direction
+from fem._new.response import DIRECTION_NAMES, whirl_direction
 from fem._new.rotor import Rotor, Support
 from fem._new.undamped import Result, Spectrum, finite_modes, lowest_modes
 from rotorid.base.answer import Answer
@@ -50,10 +49,8 @@ GROWTH = 1e-14
 """Re λ / |λ| above which a mode grows: rounding of what damps and drives it."""
 NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
-DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 _TOLERANCE = 6e-9  # of eigenvalues, relative to their size
-_FEW = 5  # speeds, about, for which the basis is made first
-_MORE = 3  # modes of a plane beyond those asked for
+_FEW = 8  # speeds, about, for which the basis is made first
 _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
 _REAL = 0.1  # |Im λ| below this part of |λ| is no oscillation: log decrement above 62
@@ -107,18 +104,19 @@ def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     still = size < _STILL * scale
     oscillates = ~still & (frequency > _REAL * size)
     wanted = oscillates if Q.P.planes == 1 else oscillates & (lam.imag > 0)
-    rows, order = np.arange(len(lam))[:, None], np.argsort(np.where(wanted, frequency, np.inf), axis=1)[:, :m]
+    key = np.where(wanted, frequency, np.inf)
+    rows, order = np.arange(len(lam))[:, None], np.argsort(key, axis=1, kind="stable")[:, :m]
     missing = ~wanted[rows, order]
     values = lam[rows, order]
     values[missing] = 1j * scale
     # Something of every unknown, so that no mode is left out, and apart for modes of one frequency.
-    start = np.exp(1j * np.outer(np.arange(1, order.shape[1] + 1), np.arange(Q.size) ** 1.5))
-    vectors = _answers(Q.M, D, K, values, start)
+    phases = np.outer(np.arange(1, m + 1), np.arange(Q.size) ** 1.5)
+    vectors = _answers(Q.M, D, K, values, np.exp(1j * phases))
     vectors /= np.linalg.norm(vectors, axis=2, keepdims=True)
     values = _by_work(Q.M, D, K, values, vectors)
     values[missing] = vectors[missing] = NONE
-    at_rest = ~still & ~oscillates & (size < np.inf)
-    real = tuple(np.sort(one.real[rest])[::-1] for one, rest in zip(lam, at_rest, strict=True))
+    others = ~still & ~oscillates & (size < np.inf)
+    real = tuple(np.sort(one.real[which])[::-1] for one, which in zip(lam, others, strict=True))
     return Whirl(Q, speeds, scale, values, vectors, real, still.sum(axis=1))
 
 
@@ -153,8 +151,10 @@ def _eigenvalues(M: FloatArray, D: AnyArray, K: AnyArray, scale: float) -> Compl
     M, D = scale * scale * M, scale * D
     A = np.zeros((len(D), 2 * R, 2 * R), dtype=D.dtype)
     A[:, :R, R:] = np.eye(R)
-    loads = np.concatenate((np.broadcast_to(M, D.shape), D + 2 * _SHIFT * M), axis=2)
-    A[:, R:] = -np.linalg.solve(K + _SHIFT * D + _SHIFT**2 * M, loads)
+    A[:, R:] = -np.linalg.solve(
+        K + _SHIFT * D + _SHIFT**2 * M,
+        np.concatenate((np.broadcast_to(M, D.shape), D + 2 * _SHIFT * M), axis=2),
+    )
     mu = np.linalg.eigvals(A).astype(complex)
     # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
     size = np.abs(mu)
@@ -197,7 +197,7 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
         If a support has no table at a speed, or the mesh is too fine for float64.
     """
     most = finite_modes(P.A)
-    modes = min(m // 2 + _MORE, most)
+    modes = min(m // 2 + 3, most)  # of a plane; some more than asked for
     while True:
         spectrum, scale = reference(P, speeds, modes)
         whirl = _in_basis(P, spectrum, scale, speeds, m)
@@ -212,12 +212,12 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     K, _ = P.supports(speeds[speeds.size // 2, None])
     springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
     supports = [
-        Support(s.node, float(spring), tilting_stiffness=s.tilting_stiffness)
+        Support(s.node, spring, tilting_stiffness=s.tilting_stiffness)
         for s, spring in zip(P.rotor.supports, springs, strict=True)
     ]
     spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
     moving = spectrum.squares[spectrum.squares > 0]
-    return spectrum, float(np.sqrt(moving[0] if moving.size else spectrum.shift))
+    return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
 
 
 def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m: int) -> Whirl:
@@ -229,16 +229,15 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
     Y = np.linalg.qr(dtbtrs(U, loads, trans="T")[0])[0]
     some = speeds[:: -1 - speeds.size // _FEW][::-1]  # with the last, where gyroscopic loads are largest
     while True:
-        X = dtbtrs(U, Y)[0]
-        Q = project(P, X)
-        loads = np.hstack([multiply(band, X) for band in (A.mass, A.gyroscopic, A.material)])
+        Q = project(P, dtbtrs(U, Y)[0])
+        loads = np.hstack([multiply(band, Q.basis) for band in (A.mass, A.gyroscopic, A.material)])
         images = dtbtrs(U, loads, trans="T")[0]
         outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
         while True:
             whirl = solve(Q, some, m, scale)
             left = _loads(whirl, spectrum.shift) @ triangle.T
             errors = (left**2).sum(axis=(2, 3))
-            wrong = errors > _TOLERANCE
+            wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
             if wrong.any() or some.size == speeds.size:
                 break
             some = speeds
@@ -246,7 +245,7 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
             return replace(whirl, error=float(errors.max()))
         columns = left[wrong].reshape(-1, len(triangle))
         sizes, directions = np.linalg.eigh(columns.T @ columns)
-        new = outside @ directions[:, np.cumsum(sizes) > _TOLERANCE]
+        new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
         Y = np.hstack((Y, new - Y @ (Y.T @ new)))
 
 
