@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from fem.growth_check import unstable_windows
 from fem.model.node_forces import SqueezeFilm, Stop, kind_of
 from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import speed_text
@@ -83,7 +82,7 @@ def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibriu
     every = [known[speed] for speed in sorted(known)]
     linear = linear_rotor(rotor, every)
     stable = fem.stability_threshold(linear, highest, lowest=lowest)
-    first = unstable_windows(linear, np.array(sorted(known)))[:1]
+    first = fem.judge(linear, np.array(sorted(known)))[0][:1]
     guesses = [one.first for one in first if one.begins] + [stable.threshold or highest]
     for share, steps in _AROUND:
         a, b = (float(np.clip(min(guesses) * (1 + s), lowest, highest)) for s in (-share, share))

@@ -49,8 +49,8 @@ class CampbellDiagram(Parts):
     @property
     def parts(self) -> Mapping[str, Any]:
         """Whirl, and the critical speeds that show a peak beside the operating range."""
+        from fem._new.campbell import HEAVY
         from fem.api684_separation import Separation, unsearched
-        from fem.campbell import HEAVY
 
         peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
         doubt = unsearched(self.whirl.speeds[0], self.whirl.speeds[-1], self.operating)

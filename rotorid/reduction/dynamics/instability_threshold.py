@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 import fem
-from fem.solvers.reduced_whirl import Whirl
-from fem.solvers.stable_speeds import Bases, growing_at
-from fem.stability import range_of_speeds, searched
 from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
 
 if TYPE_CHECKING:
@@ -41,10 +36,4 @@ def stability_threshold(
     ValueError
         For an impossible range, or outside the table of a support.
     """
-    return threshold_of(whirl_of(small, range_of_speeds(lowest, highest, steps)))
-
-
-def threshold_of(whirl: Whirl) -> fem.Stability:
-    """The same in the range of speeds of `whirl`, which holds all modes of the small model."""
-    found = Bases(whirl.Q, whirl.Q, whirl.scale, np.inf, np.inf)
-    return searched(found, growing_at(found, whirl.speeds), whirl)
+    return fem.threshold_of(whirl_of(small, fem.range_of_speeds(lowest, highest, steps)))

@@ -7,21 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.matrices.lateral_planes import Quadratic, both_planes, project
-from fem.solvers.quadratic_eigenvalues import solve
-from fem.solvers.reduced_whirl import Whirl
-from fem.solvers.whirl_basis import reference
+from fem._new.assembly import Reduced, both_planes, project
+from fem._new.whirl import Whirl, reference, solve
 from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from rotorid.reduction.dynamics.small_rotor import SmallRotor
 
 
-def equations(small: SmallRotor) -> Quadratic:
+def equations(small: SmallRotor) -> Reduced:
     """λ² M + λ D(Ω) + K(Ω) of a small rotor: of z = x + i y if the rotor is symmetric, else of both planes.
 
-    In this form `quadratic_eigenvalues`, `mode_tracking` and `crossing` of `fem.solvers` take it for the
-    full rotor's equations in a basis of the shaft, and both models are solved in the same way. Modal damping
+    In this form `fem` takes it for the full rotor's equations in a basis of the shaft, and both models are
+    solved in the same way. Modal damping
     is the same in both planes and does not couple them, so that its block of one plane damps z, too.
     """
     Q = small.quadratic
@@ -45,7 +43,5 @@ def whirl_of(small: SmallRotor, speeds: FloatArray) -> Whirl:
     Q = equations(small)
     # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
     n = Q.size if Q.P.planes == 2 else 2 * Q.size
-    ref = reference(Q.P, speeds, 2)
-    # The basis is the whole space: nothing of the small model is left out.
-    whole = np.eye(Q.basis.shape[1])
-    return Whirl(Q, speeds, solve(Q, speeds, n, ref.scale), ref.scale, 0.0, ref, whole)
+    _, scale = reference(Q.P, speeds, 1)
+    return solve(Q, speeds, n, scale)

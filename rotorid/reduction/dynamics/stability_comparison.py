@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fem
-from fem.campbell_modes import runs_away
-from fem.matrices.lateral_planes import both_planes
-from fem.orbits import DIRECTION_NAMES
-from fem.solvers.reduced_whirl import Whirl, solve_whirl
-from fem.stability import least_damped, range_of_speeds
-from fem.whirl import available_modes, checked_number
+from fem._new.assembly import both_planes
+from fem._new.response import DIRECTION_NAMES
+from fem._new.stability import runs_away
+from fem._new.whirl import Whirl, available_modes, checked_number, solve_whirl
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import counted, sentence
-from rotorid.reduction.dynamics.instability_threshold import STEPS, stability_threshold, threshold_of
+from rotorid.reduction.dynamics.instability_threshold import STEPS, stability_threshold
 from rotorid.reduction.dynamics.response_comparison import without_modal_damping
 from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
 
@@ -197,17 +195,17 @@ def compare_stability(
     ValueError
         For an impossible range, a number of modes out of range, or a speed outside the table of a support.
     """
-    speeds = range_of_speeds(lowest, highest, steps)
+    speeds = fem.range_of_speeds(lowest, highest, steps)
     rotor = small.rotor
     left = without_modal_damping(small)
     if left:
         small = small.undamped_modes
     whirl = whirl_of(small, speeds)
-    n_small = int(np.isfinite(whirl.found.values).sum(axis=1).max())
+    n_small = int(np.isfinite(whirl.values).sum(axis=1).max())
     available = available_modes(rotor)
     n_full = checked_number(rotor, min(max(8, n_small), available) if n is None else n)
     full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n_full, steps=steps)
-    own = threshold_of(whirl)
+    own = fem.threshold_of(whirl)
     full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
     small_decrement, small_frequency = _least_damped(whirl)
     for array in (full_decrement, full_frequency, small_decrement, small_frequency):
@@ -233,10 +231,15 @@ def compare_stability(
 
 
 def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
-    """`least_damped`; −inf and NaN where the rotor runs away."""
-    least, frequency = least_damped(whirl)
+    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each.
+
+    −inf and NaN where the rotor runs away.
+    """
+    decrements = -2 * np.pi * whirl.values.real / np.abs(whirl.values.imag)
+    rows, k = np.arange(len(decrements)), np.nan_to_num(decrements, nan=np.inf).argmin(axis=1)
     away = np.array(runs_away(whirl))
-    return np.where(away, -np.inf, least), np.where(away, np.nan, frequency)
+    frequency = np.abs(whirl.values.imag)[rows, k]
+    return np.where(away, -np.inf, decrements[rows, k]), np.where(away, np.nan, frequency)
 
 
 def _unconfirmed(full: fem.Stability, n: int) -> tuple[str, ...]:
@@ -244,7 +247,7 @@ def _unconfirmed(full: fem.Stability, n: int) -> tuple[str, ...]:
     if full.threshold is None or full.frequency is None:
         return ()
     whirl = solve_whirl(both_planes(full.rotor), np.array([full.threshold]), max(n, full.mode or 1))
-    values = whirl.found.values[np.isfinite(whirl.found.values)]
+    values = whirl.values[np.isfinite(whirl.values)]
     fastest = float((values.real / np.abs(values)).max(initial=-np.inf))
     if abs(fastest) <= CONFIRMED:
         return ()

@@ -239,7 +239,7 @@ def test_running_away():
     for steps in (3, 7, 40):
         found = stability_threshold(small, top, steps=steps)
         assert found.status == "threshold"
-        assert found.threshold == pytest.approx(612.0, rel=1e-11)
+        assert found.threshold == pytest.approx(612.0, rel=1e-10)
         assert found.frequency is None
         assert "runs away" in found.summary()
     cost = compare_stability(small, top)
@@ -343,7 +343,7 @@ def test_no_motion_is_left_out():
     small = small_rotor(rotor, (2, 3, 4), [20.0] * 3)
     values = small.eigenvalues(500.0)
     expected = values[values.imag > 0.1 * np.abs(values)]
-    found = whirl_of(small, np.array([500.0])).found.values[0]
+    found = whirl_of(small, np.array([500.0])).values[0]
     found = found[np.isfinite(found)]
     assert expected.size == found.size == 7
     both_ways = np.where(found.imag > 0, found, found.conj())

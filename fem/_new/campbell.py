@@ -1,0 +1,505 @@
+"""Campbell diagram: whirl frequencies and decrements over speed, and the damped critical speeds.
+
+Modes of neighbouring speeds are the same where their states (u, λ u / |λ|) are alike: MAC in the energy of
+the basis, in which vectors have length 1, and the best assignment of all (`linear_sum_assignment`).
+Velocities tell apart forward and backward whirl of one shape. A step in which a mode is hardly like itself
+is halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
+Crossings are roots (`brentq`) on the mode itself, which inverse iteration follows from the nearer end of the
+step; where it slips to another mode the step is halved, too.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem._new.assembly import both_planes
+from fem._new.parameters import nearest_modes
+from fem._new.response import DIRECTION_NAMES, whirl_direction
+from fem._new.rotor import Rotor, refined
+from fem._new.stability import (
+    Window,
+    covering,
+    grid_of,
+    holding,
+    near_level,
+    runs_away,
+    windows_of,
+    within,
+)
+from fem._new.undamped import Result
+from fem._new.whirl import (
+    GROWTH,
+    NONE,
+    Whirl,
+    available_modes,
+    checked_number,
+    in_both_planes,
+    polish,
+    solve,
+    solve_whirl,
+)
+from rotorid.base.answer import Answer
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM, range_text
+from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.text import counted, listing
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+HEAVY = 1.28
+"""Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
+_ALIKE = 0.8  # MAC of a mode with itself a step further
+_HARDLY = 0.3  # MAC below which two modes are not one
+_NARROW = 1e-4  # of the highest speed: steps that are not halved
+_DENSE = 8  # times the speeds asked for: so many are computed at most
+_SWINGS = 14.0  # log decrement above which a critical speed has no meaning
+_VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
+_PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
+_SPARE, _MOST = 2, 3  # modes above those asked for, which may come down; computed for one asked for, at most
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Campbell(Result):
+    """Whirl over speed; each column is one mode, followed through crossings.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    frequencies
+        |Im λ|, rad/s, shape (S, n); NaN where a mode does not oscillate.
+    log_decrements
+        −2π Re λ / |Im λ|, shape (S, n); negative: unstable.
+    direction
+        1 forward, −1 backward, 0 neither (a line, or different along the rotor), shape (S, n).
+    critical_speeds
+        Damped critical speeds, where a frequency equals the speed, rad/s, ascending, shape (c,); not those of
+        motions that hardly oscillate (log decrement above 14).
+    critical_modes
+        Which column (from 1) each belongs to, shape (c,).
+    critical_log_decrements, critical_direction
+        There, shape (c,).
+    error
+        Estimated relative error of the eigenvalues.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    unstable
+        Those of `windows` in which a mode that is listed grows first, with its number in the list.
+    windows
+        Ranges of speed in which any mode grows, listed or not.
+    cut
+        What the list of critical speeds leaves out because only n modes were asked for; else empty.
+    std
+        Standard deviations of `frequencies`, from the calibration of the rotor; None without.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped: such modes are listed only where there are
+        fewer others, and drawn pale.
+    """
+
+    speeds: FloatArray
+    frequencies: FloatArray
+    log_decrements: FloatArray
+    direction: FloatArray
+    critical_speeds: FloatArray
+    critical_modes: IndexArray
+    critical_log_decrements: FloatArray
+    critical_direction: FloatArray
+    error: float
+    rotor: Rotor
+    warnings: tuple[str, ...] = ()
+    unstable: tuple[Window, ...] = ()
+    windows: tuple[Window, ...] = ()
+    cut: str = ""
+    std: FloatArray | None = None
+    heavy: float = 6.0
+
+    @property
+    def eigenvalues(self) -> ComplexArray:
+        """λ with Im λ > 0, rad/s, shape (S, n)."""
+        return np.asarray(self.frequencies * (1j - self.log_decrements / (2 * np.pi)))
+
+    @property
+    def criticals(self) -> list[tuple[float, float]]:
+        """Damped critical speed, rad/s, and logarithmic decrement there, of each."""
+        return list(zip(self.critical_speeds.tolist(), self.critical_log_decrements.tolist(), strict=True))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
+        errors = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
+        whole = self.tables()[0]
+        keys = [column.key.rpartition(".")[2] for column in whole.columns]
+        rows = [dict(zip(keys, row, strict=True)) for row in whole.rows]
+        return plain(
+            {
+                "speeds_rad_s": self.speeds,
+                "frequencies_rad_s": self.frequencies.T,
+                **errors,
+                "log_decrements": self.log_decrements.T,
+                "direction": _words(self.direction, self.frequencies).T,
+                "damped_critical_speeds_rad_s": self.critical_speeds,
+                "damped_critical_speeds": rows,
+                "damped_critical_speeds_cut": self.cut or None,
+                "unstable": [self._growing(window) for window in self.unstable],
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def _growing(self, window: Window) -> dict[str, Any]:
+        inside = within((window,), self.speeds)
+        return {
+            "mode": window.mode,
+            "speed_rad_s": window.first,
+            "speed_rpm": window.first * RPM,
+            "from_start": not window.begins,
+            "last_speed_rad_s": self.speeds[inside][-1],
+            "end_rad_s": window.last if window.ends else None,
+            "frequency_rad_s": window.frequency,
+            "direction": window.way,
+            "lowest_log_decrement": np.nanmin(self.log_decrements[inside]),
+        }
+
+    def tables(self) -> tuple[Table, ...]:
+        """The damped critical speeds; and the modes at each speed."""
+        at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
+        criticals = (
+            Column("mode", self.critical_modes, key=at + "mode"),
+            Column("whirl", _words(self.critical_direction, self.critical_speeds), key=at + "direction"),
+            Column("rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Column("rad/s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Column("log dec", decrements, "{:z.4f}".format, at + "log_decrement"),
+            Column("", decrements > HEAVY, f"no peak: above {HEAVY}".__mul__, at + "heavily_damped"),
+        )
+        S, n = self.frequencies.shape
+        modes = (
+            Column("speed_rad_s", np.repeat(self.speeds, n), "{:.4f}".format),
+            Column("mode", np.tile(np.arange(1, n + 1), S)),
+            Column("frequency_rad_s", self.frequencies.ravel(), "{:.4f}".format),
+            *(Column("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
+            Column("log_decrement", self.log_decrements.ravel(), "{:z.4f}".format),
+            Column("direction", _words(self.direction, self.frequencies).ravel()),
+        )
+        return (Table("damped critical speeds", criticals), Table("modes", modes))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and mode."""
+        return frame(self.tables()[1])
+
+    def sentence(self) -> str:
+        """Whether it is stable, and how many damped critical speeds there are."""
+        unstable = listing([window.where() for window in self.windows], "and")
+        text = f"UNSTABLE {unstable}: a motion grows there" if unstable else "Stable: no motion grows"
+        heavy = int((self.critical_log_decrements > HEAVY).sum())
+        light = self.critical_speeds.size - heavy
+        count = counted(light, "damped critical speed") if light else "No damped critical speed"
+        more = f", {heavy} more without a peak" if heavy else ""
+        return f"{text}. {count}{more} from {range_text(self.speeds[0], self.speeds[-1])}."
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence, the damped critical speeds, the warnings, and the modes at every speed."""
+        criticals, modes = map(terminal, self.tables())
+        text = criticals if self.critical_speeds.size else ""
+        cut = (self.cut,) if self.cut else ()
+        return Answer(self.sentence(), text, self.warnings, cut, (modes,), "the modes at every speed")
+
+    def mesh_change(self) -> tuple[float, float]:
+        """Largest relative change of frequencies and of damped critical speeds on elements cut in two.
+
+        Of frequencies with decrements up to `heavy`. Elements converge as h⁴: 16/15 of it is the error of the
+        mesh.
+        """
+        fine = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1], heavy=self.heavy)
+        frequencies = nearest_modes(self.frequencies, fine.frequencies)
+        change = np.where(self.log_decrements <= self.heavy, np.abs(frequencies / self.frequencies - 1), 0.0)
+        apart = np.abs(fine.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
+        return float(np.nanmax(change)), float(apart.max(initial=0.0))
+
+
+def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: float = 6.0) -> Campbell:
+    """Compute whirl frequencies, logarithmic decrements and directions over speed.
+
+    Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
+    between the given speeds where it leaves a doubt. The n modes are those that meet the 1× line first, then
+    those of the lowest frequency on the whole; they are numbered by frequency at the first speed, backward
+    before forward where a pair coincides. Modes that are heavily damped at more than half of the speeds come
+    last. Where a curve crosses the 1× line between two speeds, the crossing is found by iteration on the
+    model.
+
+    Parameters
+    ----------
+    rotor
+        The rotor with all its supports.
+    speeds
+        rad/s, ascending, shape (S,).
+    n
+        How many modes, by default 6; forward and backward whirl count apart. Where the model has fewer, all.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped.
+
+    Raises
+    ------
+    ValueError
+        If speeds are impossible or outside the table of a support, the mesh is too fine for float64, or the
+        rotor is pushed aside by negative stiffness at every speed.
+    """
+    speeds = checked_speeds(speeds, ascending=True)
+    asked_for = checked_number(rotor, None) if n is None else whole(n, "the number of modes")
+    n = checked_number(rotor, min(asked_for, available_modes(rotor)))
+    paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
+    columns, whirl = paths.columns, paths.whirl
+    if not columns.size:
+        raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
+    if all(runs_away(whirl)):
+        raise ValueError(
+            "the rotor on its supports is statically unstable at these speeds: a support has negative "
+            "stiffness; check its sign and size"
+        )
+    asked = np.searchsorted(paths.speeds, speeds)
+    lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
+    roots = [root for root in paths.crossings if _light(root.value, _SWINGS)]
+    roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
+    vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
+    there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
+    unstable, texts, decrements = [], [], _decrements(lam)
+    windows = holding(windows_of(covering(whirl)), speeds)
+    for window in windows:
+        k = int(np.searchsorted(speeds, window.first))
+        apart = np.where(decrements[k] < 0, np.abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
+        if np.isfinite(apart).any():
+            unstable.append(replace(window, mode=int(np.nanargmin(apart)) + 1))
+            texts.append(unstable[-1].sentence())
+        else:
+            texts.append(f"{window.sentence()} (not listed: ask for more modes)")
+    result = Campbell(
+        speeds=speeds,
+        frequencies=lam.imag,
+        log_decrements=decrements,
+        direction=direction,
+        critical_speeds=np.array([root.speed for root in roots]),
+        critical_modes=np.array([root.mode + 1 for root in roots], dtype=np.intp),
+        critical_log_decrements=_decrements(there),
+        critical_direction=ways,
+        error=whirl.error,
+        rotor=rotor,
+        warnings=(*texts, *_warnings(paths, asked_for, asked)),
+        unstable=tuple(unstable),
+        windows=windows,
+        cut=_cut(paths),
+        heavy=heavy,
+    )
+    read_only(result.frequencies, result.log_decrements, direction, result.critical_speeds)
+    return result
+
+
+class _Root(NamedTuple):
+    """A mode (column, from 0) at a speed, rad/s, where it crosses the 1× line: eigenvalue, vector (R,)."""
+
+    speed: float
+    mode: int
+    value: complex
+    vector: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """Modes over speeds (S,) in the basis of `whirl`, the columns of those asked for, and their crossings.
+
+    λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in
+    which steps shapes do not tell a mode apart from others.
+    """
+
+    whirl: Whirl
+    speeds: FloatArray
+    values: ComplexArray
+    vectors: ComplexArray
+    doubtful: BoolArray
+    columns: IndexArray
+    crossings: list[_Root]
+
+    def roots(self) -> tuple[list[_Root], list[int]]:
+        """Crossings of the 1× line, and steps in which a mode was lost."""
+        f = off_synchronous(self.values[:, self.columns], self.speeds[:, None])
+        change = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
+        steps = np.argwhere(change).tolist()
+        roots = [self._root(k, mode, f[k : k + 2, mode]) for k, mode in steps]
+        lost = [k for (k, _), root in zip(steps, roots, strict=True) if root is None]
+        return [root for root in roots if root], lost
+
+    def _root(self, k: int, mode: int, f: FloatArray) -> _Root | None:
+        """The crossing of a mode in a step, followed from the nearer end; None if it was lost."""
+        from scipy.optimize import brentq
+
+        column, ends = self.columns[mode], [k, k + 1]
+        at = self.speeds[ends].tolist()
+        states = list(zip(f, self.values[ends, column], self.vectors[ends, column], strict=True))
+        there, last = dict(zip(at, states, strict=True)), states[int(np.abs(f).argmin())]
+
+        def excess(speed: float) -> float:
+            nonlocal last
+            if speed not in there:
+                lam, X = np.array([last[1]]), last[2][None]
+                with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
+                    for _ in range(2):
+                        lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), lam, X, 1)[:2]
+                last = there[speed] = off_synchronous(lam, speed)[0], lam[0], X[0]
+            return float(there[speed][0])
+
+        speed = float(brentq(excess, *at, xtol=1e-14 * at[1], rtol=1e-15))
+        left, value, vector = there[speed]
+        return None if abs(left) > _VANISHES * np.abs(f).max() else _Root(speed, mode, complex(value), vector)
+
+
+def off_synchronous(lam: ComplexArray, speed: FloatArray | float) -> FloatArray:
+    """Whirl frequency less the speed."""
+    return np.asarray(np.abs(lam.imag) - speed)
+
+
+def _decrements(lam: ComplexArray) -> FloatArray:
+    """Of what neither grows nor decays, but for rounding, 0."""
+    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+
+
+def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
+    lam, x, y = in_both_planes(values, whirl.Q.nodes(np.nan_to_num(vectors)))
+    return lam, np.where(np.isnan(lam), 0.0, whirl_direction(x, y))
+
+
+def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
+    """Directions in words, None where there is no motion."""
+    words: AnyArray = np.vectorize(DIRECTION_NAMES.get, otypes=[object])(direction)
+    words[np.isnan(there)] = None
+    return words
+
+
+def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
+    """Modes over speed, n (or fewer) of them asked for."""
+    P, available = both_planes(rotor), available_modes(rotor)
+    m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
+    while True:
+        paths = _closely(solve_whirl(P, speeds, m), n, heavy)
+        listed = paths.values[:, paths.columns]
+        full = np.isfinite(listed).all() and (_light(listed, heavy).mean(axis=0) >= 0.5).sum() == n
+        if full or m >= min(_MOST * n + 16, available):
+            return paths
+        m = min(2 * m, available)
+
+
+def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
+    """The modes of a whirl followed, with so many speeds between that nothing is in doubt."""
+    speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
+    while True:
+        paths = _chained(whirl, speeds, values, X, n, heavy)
+        steps: BoolArray = np.asarray(paths.doubtful[:, paths.columns].any(axis=1))
+        for gap in off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
+            steps[near_level(np.nan_to_num(gap), 0.0)] = True
+        wide = np.diff(speeds) > _NARROW * speeds[-1]
+        dense = speeds.size > _DENSE * whirl.speeds.size
+        if dense or not (steps & wide).any():
+            crossings, lost = paths.roots()
+            steps[lost] = True
+            if dense or not (steps & wide).any():
+                return replace(paths, crossings=crossings)
+        k = np.flatnonzero(steps & wide)
+        more = solve(whirl.Q, (speeds[k] + speeds[k + 1]) / 2, values.shape[1], whirl.scale)
+        speeds = np.insert(speeds, k + 1, more.speeds)
+        values, X = np.insert(values, k + 1, more.values, 0), np.insert(X, k + 1, more.vectors, 0)
+
+
+def _chained(
+    whirl: Whirl, speeds: FloatArray, values: ComplexArray, X: ComplexArray, n: int, heavy: float
+) -> _Paths:
+    """Modes of neighbouring speeds, (S, m) and (S, m, R), chained."""
+    from scipy.optimize import linear_sum_assignment
+
+    S, m = values.shape
+    phase = np.nan_to_num(values, nan=1.0)
+    phase /= np.abs(phase)
+    states = (1 + phase[:-1, :, None].conj() * phase[1:, None]) / 2
+    mac = np.nan_to_num(np.abs(X[:-1].conj() @ X[1:].swapaxes(1, 2) * states)) ** 2
+    partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
+    best = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0]
+    labels = np.tile(np.arange(m), (S, 1))
+    count = m
+    for k, mine in enumerate(partner):
+        # What is hardly alike is another mode that came while this one went.
+        new = best[k] < _HARDLY
+        labels[k + 1, mine] = np.where(new, count + np.cumsum(new) - 1, labels[k])
+        count += int(new.sum())
+    rows = np.arange(S)[:, None]
+    paths, vectors = np.full((S, count), NONE), np.full((S, count, X.shape[2]), NONE)
+    doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
+    paths[rows, labels], vectors[rows, labels] = values, X
+    doubtful[rows[:-1], labels[:-1]] = (best < _ALIKE) & (best > 0) & _light(values[:-1], heavy)
+    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), [])
+
+
+def _light(values: ComplexArray | complex, heavy: float) -> BoolArray:
+    """Which oscillate without heavy damping."""
+    return np.asarray(-2 * np.pi * values.real <= heavy * np.abs(values.imag))
+
+
+def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> IndexArray:
+    """The n lowest modes, by frequency at the first speed, backward first where a pair starts as one.
+
+    Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
+    speed is left out below that of another; then those of the lowest frequency on the whole. Those
+    that are heavily damped at half of the speeds come last.
+    """
+    light, there = _light(values, heavy), np.isfinite(values)
+    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    meets = [
+        np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
+        for mode in np.where(light, size, 1e9 * speeds[-1]).T
+    ]
+    begins = there.argmax(axis=0)
+    start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
+    start = np.abs(start) * (1 + _PAIR * (start > 0))
+    best = np.lexsort((start, size.mean(axis=0), meets, light.mean(axis=0) < 0.5))[:n]
+    return np.asarray(best[np.lexsort((start[best], begins[best]))])
+
+
+def _cut(paths: _Paths) -> str:
+    """What to say where modes that are not listed have critical speeds in the range, or may have."""
+    others = np.delete(paths.values, paths.columns, axis=1)
+    f = np.where(_light(others, _SWINGS), off_synchronous(others, paths.speeds[:, None]), np.nan)
+    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
+    if k.size:
+        where = (
+            f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
+        )
+    elif np.nan_to_num(np.abs(paths.values[-1].imag)).max() < paths.speeds[-1] and others.size:
+        where = f"no mode was followed that reaches {paths.speeds[-1]:.6g} rad/s there"
+    else:
+        return ""
+    return f"the list of critical speeds is cut: {where}; ask for more modes (-n)"
+
+
+def _warnings(paths: _Paths, n: int, asked: IndexArray) -> tuple[str, ...]:
+    gone = np.isnan(paths.values[asked][:, paths.columns])
+    texts = [
+        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {gone[:, mode].sum()} of "
+        f"{len(gone)} speeds, the first {paths.speeds[asked[gone[:, mode].argmax()]]:.6g} rad/s"
+        for mode in np.flatnonzero(gone.any(axis=0)).tolist()
+    ]
+    if paths.columns.size < n:
+        texts.append(f"only {paths.columns.size} of {n} modes oscillate")
+    if (paths.whirl.still > 1).any():
+        texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
+    doubt = paths.speeds[:-1][paths.doubtful[:, paths.columns].any(axis=1)]
+    if doubt.size:
+        texts.append(
+            f"modes could not be told apart by shape above {doubt[0]:.6g} rad/s: two curves may be exchanged"
+        )
+    return tuple(texts)
