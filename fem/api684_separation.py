@@ -8,6 +8,7 @@ from typing import Any
 
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing, table
 
 
@@ -28,6 +29,23 @@ class Separation(Answered):
             margin = 100 * (speed - high) / high if speed > high else max(0.0, below)
             rows.append({"speed_rad_s": speed, "inside": low <= speed <= high, "separation_percent": margin})
         return {"range_rad_s": [low, high], "critical_speeds": rows}
+
+    def tables(self) -> tuple[Table, ...]:
+        """How far each is from the range, the nearest first; none without any."""
+        rows = list(enumerate(self.to_dict()["critical_speeds"]))
+        rows.sort(key=lambda row: float(row[1]["separation_percent"]))
+        if not rows:
+            return ()
+        columns = (
+            Column("rpm", [row["speed_rad_s"] * RPM for _, row in rows], "{:.2f}".format),
+            Column("away, %", [row["separation_percent"] for _, row in rows], "{:.1f}".format),
+            Column("", ["INSIDE" if row["inside"] else "outside" for _, row in rows]),
+        )
+        return (Table("how far each is from the operating range", columns),)
+
+    def sentence(self) -> str:
+        """Whether one lies in the range, and which is nearest."""
+        return self.answer.judgement
 
     @property
     def answer(self) -> Answer:

@@ -25,6 +25,8 @@ from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.tables import Column as Told
+from rotorid.base.tables import Table
 from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
@@ -130,6 +132,44 @@ class Campbell(Answered):
                 Column("direction", self._ways().ravel()),
             )
         )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The damped critical speeds; whirl at the first and at the last speed; and at all of them."""
+        S, n = self.frequencies.shape
+        speed, rpm, mode, decrement, whirl, mark = self._criticals()
+        there = "damped_critical_speeds.*."
+        criticals = (
+            Told("mode", [*mode.values], key=f"{there}mode"),
+            Told("whirl", [*whirl.values]),
+            Told("rpm", [*rpm.values], "{:.2f}".format, f"{there}speed_rpm"),
+            Told("rad/s", [*speed.values], "{:.4f}".format, f"{there}speed_rad_s"),
+            Told("log dec", [*decrement.values], _rounded, f"{there}log_decrement"),
+            Told("", [_no_peak(heavy) for heavy in mark.values]),
+        )
+        every = (
+            Told("speed_rad_s", np.repeat(self.speeds, n)),
+            Told("mode", np.tile(np.arange(1, n + 1), S)),
+            Told("frequency_rad_s", self.frequencies.ravel()),
+            *(Told("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
+            Told("log_decrement", self.log_decrements.ravel()),
+            Told("direction", self._ways().ravel()),
+        )
+        ends = (self._whirl(s) for s in dict.fromkeys((0, S - 1)))
+        return (Table("damped critical speeds", criticals), *ends, Table("whirl", every))
+
+    def _whirl(self, s: int) -> Table:
+        columns = (
+            Told("mode", range(1, self.frequencies.shape[1] + 1)),
+            Told("whirl", [word or "none" for word in self._ways()[s]]),
+            Told("rpm", self.frequencies[s] * RPM, "{:.2f}".format, f"frequencies_rad_s.*.{s}", RPM),
+            Told("rad/s", self.frequencies[s], "{:.4f}".format, f"frequencies_rad_s.*.{s}"),
+            Told("log dec", self.log_decrements[s], _rounded, f"log_decrements.*.{s}"),
+        )
+        return Table(f"whirl at {rpm_text(self.speeds[s])}", columns)
+
+    def sentence(self) -> str:
+        """Whether it is stable, and how many damped critical speeds there are."""
+        return self.answer.judgement
 
     @property
     def answer(self) -> Answer:

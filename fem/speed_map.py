@@ -131,6 +131,10 @@ class SpeedMap(Answered):
         """One row per stiffness, one column per critical speed."""
         return frame(self.tables()[0])
 
+    def sentence(self) -> str:
+        """What the map is of."""
+        return self.answer.judgement
+
     @property
     def answer(self) -> Answer:
         """Where the supports' own stiffness meets the map; behind it the limits of each critical speed."""

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
-from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import cell
-from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import counted, listing
-from rotorid.workflows.input_checks import file_of, rotor_source
-from rotorid.workflows.option_values import (
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted, figures, listing
+from rotorid.commands.input_checks import file_of, rotor_source
+from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
+from rotorid.commands.quantities import (
     Band,
     Sensor,
     Speeds,
@@ -25,10 +25,8 @@ from rotorid.workflows.option_values import (
     rising_speeds,
     sensors,
 )
-from rotorid.workflows.result_provenance import Outcome, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from fem import Peak, Peaks, Response, Rotor
@@ -55,6 +53,8 @@ class ResponseOptions:
         supports, in x.
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
+    view
+        What --plot draws.
     at : SPEED
         Speed of the orbits that are drawn, 5800rpm; default: at the largest reading.
     """
@@ -62,11 +62,13 @@ class ResponseOptions:
     speeds: Speeds
     sensors: str | Sequence[Sensor] | None = None
     operating: Band | None = None
+    view: View = "bode"
     at: str | float | None = None
+    panels: ClassVar[Mapping[str, str]] = {"Output": "view at"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RotorResponse(Outcome):
+class Vibration:
     """Vibration at the speeds asked for, and the peaks between them.
 
     Attributes
@@ -77,8 +79,6 @@ class RotorResponse(Outcome):
         Where it is read, and the peaks there; none where too few speeds were asked for.
     operating
         Operating range, rad/s.
-    orbits_at
-        Which speed of `finer` the orbits are drawn at; None: that of the largest reading.
     std
         Of the amplitudes of `finer` from the rotor's calibration, m, shape (S, C); None without.
     """
@@ -88,11 +88,10 @@ class RotorResponse(Outcome):
     sensors: Sequence[SensorLike]
     peaks: Sequence[Peaks]
     operating: tuple[float, float] | None
-    orbits_at: int | None
     std: FloatArray | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance: what is largest, and the peaks, with the speeds between."""
+        """As JSON types: what is largest, and the peaks, with the speeds between."""
         document = self.response.to_dict(self.sensors)
         warnings = document.pop("warnings")
         at_support = self._largest(self.finer.bearing_forces().largest)
@@ -119,26 +118,90 @@ class RotorResponse(Outcome):
             "warnings": warnings,
         }
 
-    @property
-    def answer(self) -> Answer:
-        """The margins, what is largest, a peak of each critical speed; behind it readings and forces."""
-        found = sorted(
-            ((name, peak) for name, own in zip(self.labels, self.peaks, strict=False) for peak in own.peaks),
+    def sentences(self, chief: Sequence[Peak]) -> list[str]:
+        """Whether it runs steadily, whether the margins are as required, and what is largest."""
+        return [*self._judgement(chief).splitlines(), self.finer.highest]
+
+    def chief(self) -> list[tuple[str, Peak]]:
+        """A peak of each critical speed: the one that lacks a margin, or the highest."""
+        order = sorted(
+            self.named(),
             key=lambda one: (one[1].enough is not False, one[1].enough is None, -one[1].amplitude),
         )
-        near = {round(math.log(peak.speed, _APART)): (name, peak) for name, peak in reversed(found)}
-        chief = sorted(near.values(), key=lambda one: one[1].speed)
-        behind = [self.finer.bearing_forces().summary()] if self.response.rotor.supports else []
-        return Answer(
-            f"{self._judgement([peak for _, peak in chief])}\n{self.finer.highest}",
-            "\n\n".join([*([_peak_table(chief)] if chief else []), self._readings()]),
-            self.response.warnings,
-            tuple(
-                f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in found if peak.note
-            ),
-            (*behind, _peak_table(found)) if found else tuple(behind),
-            "forces on the supports; the peaks of every reading",
+        near = {round(math.log(peak.speed, _APART)): (name, peak) for name, peak in reversed(order)}
+        return sorted(near.values(), key=lambda one: one[1].speed)
+
+    def named(self) -> list[tuple[str, Peak]]:
+        """All peaks, each with its sensor."""
+        pairs = zip(self.labels, self.peaks, strict=False)
+        return [(name, peak) for name, peaks in pairs for peak in peaks.peaks]
+
+    def largest(self) -> Table:
+        """The largest reading of each sensor."""
+        where = self._largest(self.finer.readings(self.sensors))
+        sizes = [None if size is None else 1e6 * size for size, _ in where]
+        columns = (
+            Column("sensor", self.labels),
+            Column("largest reading, µm", sizes, figures, "largest.*.amplitude_m", 1e6),
+            Column("at rpm", _rpm(where), "{:.1f}".format, "largest.*.speed_rad_s", RPM),
         )
+        return Table("largest readings", columns)
+
+    def forces(self) -> tuple[Table, ...]:
+        """The largest force on each support."""
+        supports = self.response.rotor.supports
+        where = self._largest(self.finer.bearing_forces().largest)
+        columns = (
+            Column("support", [support.name or f"node {support.node}" for support in supports]),
+            Column("largest force, N", [size for size, _ in where], figures, "bearing_forces.largest_N.*"),
+            Column("at rpm", _rpm(where), "{:.1f}".format, "bearing_forces.largest_at_rad_s.*", RPM),
+        )
+        return (Table("forces on the supports", columns),) if supports else ()
+
+    def file(self) -> Table:
+        """One row per speed and sensor."""
+        import numpy as np
+
+        from rotorid.base.rpm import phase_deg
+
+        Z = self.response.readings(self.sensors)
+        S, C = Z.shape
+        std = () if self.std is None else (Column("amplitude_std_m", self._asked(self.std).ravel()),)
+        columns = (
+            Column("speed_rad_s", self.response.speeds.repeat(C)),
+            Column("sensor", self.labels * S),
+            Column("amplitude_m", np.abs(Z).ravel()),
+            Column("phase_deg", phase_deg(Z).ravel()),
+            *std,
+        )
+        return Table("readings", columns)
+
+    def readings(self) -> Table:
+        """One row per speed, amplitude and phase of each sensor beside each other."""
+        document = self.response.to_dict(self.sensors)
+        columns = [Column("rpm", RPM * self.response.speeds, "{:.1f}".format, "speeds_rad_s.*", RPM)]
+        for k, name in enumerate(self.labels):
+            sizes = [1e6 * size for size in document["amplitude_m"][k]]
+            columns.append(Column(f"{name}: µm peak", sizes, figures, f"amplitude_m.{k}.*", 1e6))
+            phases = document["phase_deg"][k]
+            columns.append(Column("phase, °", phases, "{:.1f}".format, f"phase_deg.{k}.*"))
+        return Table("amplitude and phase (lead)", tuple(columns))
+
+    def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
+        """What draws amplitude and phase over speed, polar curves, or orbits."""
+        from fem.plots import bode_figure, orbits_figure, polar_figure
+
+        one_of(view, "view", get_args(View))
+        finer, places = self.finer, self.sensors
+        draw: dict[str, tuple[str, Callable[[], Figure]]] = {
+            "bode": (
+                "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading.",
+                lambda: bode_figure(finer, places, self.peaks, operating=self.operating, std=self.std),
+            ),
+            "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
+            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of_orbits(at))),
+        }
+        return dict([draw[view]])
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, and whether the margins are as required."""
@@ -168,56 +231,6 @@ class RotorResponse(Outcome):
             doubt = f"no amplification factor at {listing(close, 'and')}" + (doubt and f"; {doubt}")
         return f"{said}NOT KNOWN whether all are far enough {beside}: {doubt}." if doubt else said + far
 
-    def _readings(self) -> str:
-        """The largest reading of each sensor."""
-        import numpy as np
-
-        from fem.response_result import largest_text
-
-        sizes, finer = 1e6 * np.abs(self.finer.readings(self.sensors)), self.finer
-        return largest_text("sensor", self.labels, "reading, µm", sizes, finer.speeds, finer.steady)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed and sensor."""
-        from fem.response_result import polar
-
-        Z = self.response.readings(self.sensors)
-        S, C = Z.shape
-        speed = Column("speed_rad_s", self.response.speeds.repeat(C))
-        own = () if self.std is None else (Column("amplitude_std_m", self._asked(self.std).ravel()),)
-        return frame((speed, Column("sensor", self.labels * S), *polar("amplitude_m", "phase_deg", Z), *own))
-
-    def figure(self, view: View = "bode") -> Figure:
-        """Amplitude and phase over speed, polar curves, or orbits.
-
-        Raises
-        ------
-        ValueError
-            For another view, and for orbits where there is no steady response.
-        """
-        from fem.plots import bode_figure, orbits_figure, polar_figure
-
-        one_of(view, "view", get_args(View))
-        if view == "bode":
-            return bode_figure(self.finer, self.sensors, self.peaks, operating=self.operating, std=self.std)
-        if view == "polar":
-            return polar_figure(self.finer, self.sensors)
-        return orbits_figure(self.finer, self.sensors, self._speed_of_orbits())
-
-    def sheet(self) -> bytes:
-        """To print: one HTML file."""
-        from rotorid.report.rotor import response_report
-
-        return response_report(
-            self.to_dict(),
-            self.finer,
-            self.sensors,
-            self.peaks,
-            provenance=self.provenance,
-            operating=self.operating,
-            std=self.std,
-        )
-
     @property
     def labels(self) -> list[str]:
         """Names of the sensors."""
@@ -238,11 +251,11 @@ class RotorResponse(Outcome):
             (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k])) for size, k in where
         ]
 
-    def _speed_of_orbits(self) -> int:
+    def _speed_of_orbits(self, at: int | None) -> int:
         from fem.response_result import largest_at
 
         sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        k = largest_at(sizes, self.finer.steady) if self.orbits_at is None else self.orbits_at
+        k = largest_at(sizes, self.finer.steady) if at is None else at
         if k is None:
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
         return k
@@ -273,25 +286,47 @@ def _may_lack(peak: Peak) -> bool:
     return peak.margin is None or peak.margin < _MOST_REQUIRED
 
 
-def _peak_table(found: Sequence[tuple[str, Peak]]) -> str:
+def _rpm(where: Iterable[tuple[float | None, float | None]]) -> list[float | None]:
+    return [None if speed is None else speed * RPM for _, speed in where]
+
+
+def _peak_table(name: str, found: Sequence[tuple[str, Peak]], key: str = "") -> tuple[Table, ...]:
+    """The peaks; none without any."""
     from fem.api684_peaks import peak_columns
 
-    names, peaks = zip(*found, strict=True)
-    return text((Column("peak at", names, str), *peak_columns(peaks, "µm", 1e6)), width=COLUMNS)
+    if not found:
+        return ()
+    sensors, peaks = zip(*found, strict=True)
+    columns = [
+        Column(
+            one.name if one.title is None else one.title,
+            [*one.values],
+            one.shown,
+            f"{key}.*.{one.name}" if key and one.name != "enough" else "",
+            1e6 if one.name == "amplitude" else 1.0,
+        )
+        for one in peak_columns(peaks, "µm", 1e6)
+        if one.shown is not None
+    ]
+    return (Table(name, (Column("peak at", sensors), *columns)),)
 
 
-@workflow
+@command
 def response(
     rotor: Rotor | Path | str, unbalance: Unbalance | Path | str, options: ResponseOptions
-) -> RotorResponse:
-    """Compute the vibration under unbalance: readings, orbits, bearing forces, and the peaks after API 684.
+) -> Outcome:
+    """Vibration under unbalance: readings, orbits, bearing forces, peaks after API 684.
+
+    Example: rotorid response sample_data/compressor/rotor.toml
+    --unbalance sample_data/compressor/unbalance.csv --speeds 1000:15000:20rpm
+    --sensors "probe DE:45,probe NDE:45" --operating 5300:6500rpm --plot bode.png
 
     Parameters
     ----------
-    rotor
-        A rotor, a rotor table or a rotor file.
-    unbalance
-        A table of unbalance, or `{node or station: m r e^{iφ}}` in kg·m.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml).
+    unbalance : FILE
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg.
     options
         The speeds, and what differs from the defaults.
 
@@ -306,6 +341,7 @@ def response(
     from fem.model.sensors import as_sensor
     from fem.parameter_bands import band as error_band
     from fem.response import response_from_rest
+    from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 
     model, files = rotor_source(rotor)
@@ -331,14 +367,31 @@ def response(
     std, said = error_band(model, "the amplitudes", amplitudes)
     finer = dataclasses.replace(finer, warnings=(*finer.warnings, *said))
     log_rotor(model, speeds=len(speeds))
-    return RotorResponse(
+    result = Vibration(
         response=dataclasses.replace(found, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
         std=std,
         sensors=places,
         peaks=peaks,
         operating=operating,
-        orbits_at=None if options.at is None else _nearest(finer, options.at),
+    )
+    at = None if options.at is None else _nearest(finer, options.at)
+    chief, every = result.chief(), result.named()
+    return Outcome(
+        result=result,
+        sentences=tuple(result.sentences([peak for _, peak in chief])),
+        tables=(*_peak_table("peaks", chief), result.largest()),
+        more=(*result.forces(), *_peak_table("peaks of every reading", every, "peaks")),
+        behind=(unbalance_table(model, found.unbalance), result.readings()),
+        file=result.file(),
+        keys=result.to_dict(),
+        warnings=result.response.warnings,
+        notes=tuple(
+            f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in every if peak.note
+        ),
+        pictures=result.pictures(options.view, at),
+        title="Unbalance response",
+        rotor={"rotor": model, "planes": sorted(found.unbalance), "sensors": places, "meaning": "unbalance"},
         provenance=provenance(files, options),
     )
 

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
-from rotorid.base.tables import Table, file_bytes, frame
 from rotorid.base.text import listing
-from rotorid.workflows.input_checks import rotor_source
-from rotorid.workflows.option_values import Band, band
-from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
+from rotorid.commands.input_checks import rotor_source
+from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
+from rotorid.commands.quantities import Band, band
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
-    from fem import MeshCheck, Modes, Rotor, SpeedMap
-    from rotorid.base.arrays import FloatArray
+    from fem import Modes, Rotor, SpeedMap
 
 
 @dataclass(frozen=True)
@@ -29,11 +26,11 @@ class CriticalOptions:
 
     Attributes
     ----------
-    number : N
+    number : -n N from 1
         How many critical speeds, by default 3; rigid-body motions come besides.
     mesh_check
         Estimate by refinement how far off the mesh makes each.
-    speed_map
+    speed_map : --map
         Critical speeds over the stiffness of the bearings, too; the picture is of them then.
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
@@ -43,76 +40,23 @@ class CriticalOptions:
     mesh_check: bool = False
     speed_map: bool = False
     operating: Band | None = None
+    panels: ClassVar[Mapping[str, str]] = {"Method": "speed_map mesh_check"}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CriticalSpeeds(Parts):
-    """Modes, what was asked for beside them, and whether there may be more above the last one."""
+@command
+def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) -> Outcome:
+    """Critical speeds with whirl directions, and mode shapes, of the undamped rotor.
 
-    modes: Modes
-    mesh: MeshCheck | None
-    chart: SpeedMap | None
-    operating: tuple[float, float] | None
-    more: bool
+    Damping and cross-coupling that does work are left out; `rotorid campbell` has them.
 
-    @property
-    def parts(self) -> Mapping[str, Any]:
-        """The modes, and what was asked for beside them."""
-        from fem.api684_separation import Separation, unsearched
+    Example: rotorid critical sample_data/rotor23.csv -n 3 --plot modes.png
 
-        speeds = self.modes.frequencies.tolist()
-        doubt = unsearched(0.0, max(speeds, default=0.0), self.operating) if self.more else ""
-        apart = self.operating and Separation(speeds, self.operating, doubt and f"{doubt} (-n)")
-        return {"": self.modes, "operating": apart, "mesh_check": self.mesh, "map": self.chart}
-
-    def tables(self) -> tuple[Table, ...]:
-        """The critical speeds and the shapes; and those of the map."""
-        return (*self.modes.tables(), *(self.chart.tables() if self.chart else ()))
-
-    def to_frame(self) -> pd.DataFrame:
-        """The modes, or the map."""
-        return frame(self._main)
-
-    def table_file(self, path: Path) -> bytes:
-        """The modes, or the map, as `.csv` or `.xlsx`."""
-        return file_bytes(path, self._main)
-
-    @property
-    def _main(self) -> Table:
-        """The shapes, or the map."""
-        return self.modes.tables()[1] if self.chart is None else self.chart.tables()[0]
-
-    def figure(self) -> Figure:
-        """The mode shapes, or the map."""
-        from fem.plots import draw_modes, draw_speed_map
-        from rotorid.base.plot_style import on_figure
-
-        if self.chart is None:
-            return on_figure(lambda ax: draw_modes(self.modes, ax))
-        chart = self.chart
-        return on_figure(lambda ax: draw_speed_map(chart, ax, self.operating), height=5.0)
-
-    def sheet(self) -> bytes:
-        """To print: one HTML file."""
-        from rotorid.report.rotor import critical_report
-
-        return critical_report(
-            self.to_dict(),
-            self.modes,
-            provenance=self.provenance,
-            chart=self.chart,
-            operating=self.operating,
-        )
-
-
-@workflow
-def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) -> CriticalSpeeds:
-    """Compute critical speeds with their whirl directions, and mode shapes, of the rotor without damping.
+    Example: rotorid critical sample_data/compressor/rotor.toml -n 4 --map --plot map.png
 
     Parameters
     ----------
-    rotor
-        A rotor, a rotor table or a rotor file.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml).
     options
         Those that differ from the defaults.
 
@@ -122,6 +66,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         For a rotor or an option that cannot be.
     """
     import fem
+    from fem.api684_separation import Separation, unsearched
     from fem.critical import critical_speeds_near
     from fem.parameter_bands import band as error_band
 
@@ -130,25 +75,67 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     model, files = rotor_source(rotor)
     with phase("critical speeds"):
         modes = fem.critical_speeds(model, options.number)
-        n = options.number or sum(frequency > 0 for frequency in modes.frequencies.tolist()) or 1
+        speeds = modes.frequencies
+        n = options.number or int((speeds > 0).sum()) or 1
         mesh = fem.mesh_check(model, n) if options.mesh_check else None
         chart, left_out = _map(model, n) if options.speed_map else (None, [])
-
-    def speeds(other: Rotor) -> FloatArray:
-        found = modes.frequencies
-        return found if other is model else critical_speeds_near(other, found)
-
-    std, said = error_band(model, "the critical speeds", speeds)
+    std, said = error_band(
+        model,
+        "the critical speeds",
+        lambda other: speeds if other is model else critical_speeds_near(other, speeds),
+    )
     left_out += _stubby(model, modes)
+    modes = dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *said))
     log_rotor(model)
-    return CriticalSpeeds(
-        modes=dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *said)),
-        mesh=mesh,
-        chart=chart,
-        operating=operating,
-        more=int((modes.frequencies > 0).sum()) >= (options.number or 3),
+    apart = None
+    if operating:
+        more = int((speeds > 0).sum()) >= (options.number or 3)
+        doubt = unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
+        apart = Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
+    table, shapes = modes.tables()
+    map_tables = chart.tables() if chart else ()
+    beside = {"operating": apart, "mesh_check": mesh, "map": chart}
+    asked = {key: result for key, result in beside.items() if result is not None}
+    return Outcome(
+        result=modes,
+        sentences=(modes.sentence(), *(part.sentence() for part in asked.values())),
+        tables=(table, *map_tables[1:2]),
+        more=(
+            *(
+                one
+                for key, part in asked.items()
+                if key != "map"
+                for one in (table.under(key) for table in part.tables())
+            ),
+            *map_tables[2:],
+        ),
+        behind=(shapes,),
+        file=map_tables[0] if chart else shapes,
+        keys={**modes.to_dict(), **{key: part.to_dict() for key, part in asked.items()}},
+        warnings=modes.warnings,
+        notes=(modes.cut,) if modes.cut else (),
+        pictures=_pictures(modes, chart, operating),
+        title="Critical speeds",
+        rotor={"rotor": model, "conservative": True},
         provenance=provenance(files, options),
     )
+
+
+def _pictures(
+    modes: Modes, chart: SpeedMap | None, operating: tuple[float, float] | None
+) -> dict[str, Callable[[], Figure]]:
+    """The map, if there is one, and the mode shapes."""
+    from fem.plots import draw_modes, draw_speed_map
+    from rotorid.base.plot_style import on_figure
+
+    pictures: dict[str, Callable[[], Figure]] = {}
+    if chart is not None:
+        caption = "Critical speeds over the stiffness of the supports; dotted: what the supports have."
+        pictures[caption] = lambda: on_figure(lambda ax: draw_speed_map(chart, ax, operating), height=5.0)
+    pictures["Mode shapes, each to its largest value 1, over the rotor."] = lambda: on_figure(
+        lambda ax: draw_modes(modes, ax)
+    )
+    return pictures
 
 
 def _stubby(model: Rotor, modes: Modes) -> list[str]:

@@ -1,0 +1,124 @@
+"""response: readings, orbits, forces, peaks, tables of unbalance, errors from a calibration."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from exact_solutions import exactly
+from tables_data import write_csv
+
+import fem
+from fem.parameter_bands import spread
+from rotorid import read_rotor, write_rotor
+from rotorid.commands import ResponseOptions, response
+from rotorid.tables import read_unbalance
+
+RPM = np.pi / 30
+OK_SPEEDS = ("--speeds", "100:200:50")
+
+
+def test_response_reads_at_angles_and_stations(cli, files, model):
+    document = cli(
+        "response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10",
+        "--sensors", "probe:45,wheel,3:-30", "--operating", "450:550", "--json",
+    ).json  # fmt: skip
+    assert document["sensors"] == ["probe at 45°", "wheel", "3 at -30°"]
+    speeds = np.array(document["speeds_rad_s"])
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, speeds)
+    Z = expected.at(("probe", 45.0))
+    np.testing.assert_allclose(document["amplitude_m"][0], np.abs(Z), rtol=1e-9)
+    np.testing.assert_allclose(
+        np.exp(1j * np.radians(document["phase_deg"][0])), Z / np.abs(Z), rtol=0, atol=1e-9
+    )
+    assert np.array(document["amplitude_m"]).shape == (3, speeds.size)
+    orbits = document["orbits"]
+    assert orbits["nodes"] == [2, 4, 3]
+    np.testing.assert_allclose(orbits["major_axis_m"][1], expected.major[:, 3], rtol=1e-9)
+    np.testing.assert_allclose(orbits["minor_axis_m"][1], np.abs(expected.minor[:, 3]), rtol=1e-6, atol=1e-15)
+    assert {way for node in orbits["direction"] for way in node} <= {"forward", "backward", "straight"}
+    assert document["bearing_forces"]["nodes"] == [1, 7]
+    peak = next(peak for peak in document["peaks"] if peak["sensor"] == "wheel")
+    summit = exactly(fem.unbalance_response, model, {4: 5e-4, 3: 1e-4j}, [peak["speed_rad_s"]])
+    assert peak["amplitude"] == pytest.approx(abs(summit.at("wheel")[0]), rel=1e-6)
+    assert peak["amplitude"] > max(document["amplitude_m"][1])
+    assert peak["amplification_factor"] > 1
+    assert peak["separation_margin_percent"] >= 0
+
+
+def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_path):
+    plain = fem.Rotor([0.3] * 3, 0.05, supports=[fem.Support(1, 1e7, 1e3), fem.Support(4, 1e7, 1e3)])
+    write_rotor(tmp_path / "plain.csv", plain)
+    write_csv(tmp_path / "n.csv", [["node", "mass_g", "radius_mm", "angle_deg"], [2, 2, 50, 0]])
+    command = ("--speeds", "60:200:70", "--json")
+    by_stations = cli("response", files[0], "--unbalance", files[1], *command).json
+    assert by_stations["sensors"] == ["wheel", "probe"]
+    by_supports = cli("response", tmp_path / "plain.csv", "--unbalance", tmp_path / "n.csv", *command).json
+    assert by_supports["sensors"] == [1, 4]
+    expected = fem.unbalance_response(plain, {2: 1e-4}, [60.0])
+    assert by_supports["amplitude_m"][0][0] == pytest.approx(abs(expected.at(1)[0]), rel=1e-9)
+    assert {way for node in by_supports["orbits"]["direction"] for way in node} == {"forward"}
+
+
+def test_table_and_orbits_of_a_response_are_those_of_the_model(cli, files, model, tmp_path):
+    command = ("response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10", "--sensors",
+               "probe:45,wheel")  # fmt: skip
+    document = cli(*command, "--json").json
+    assert cli(*command, "--output", tmp_path / "t.csv").code == 0
+    speeds = np.arange(60.0, 1001.0, 10.0)
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, speeds)
+    Z = np.stack([expected.at(("probe", 45.0)), expected.at("wheel")], axis=1)
+    frame = pd.read_csv(tmp_path / "t.csv")
+    np.testing.assert_allclose(frame["speed_rad_s"].to_numpy().reshape(-1, 2), np.stack([speeds, speeds], 1))
+    assert frame["sensor"].tolist() == ["probe at 45°", "wheel"] * speeds.size
+    found = frame["amplitude_m"] * np.exp(1j * np.radians(frame["phase_deg"]))
+    np.testing.assert_allclose(found.to_numpy().reshape(-1, 2), Z, rtol=1e-6)
+    for row in document["largest"]:
+        at = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [row["speed_rad_s"]])
+        where = ("probe", 45.0) if "probe" in row["sensor"] else "wheel"
+        assert row["amplitude_m"] == pytest.approx(abs(at.at(where)[0]), rel=1e-6)
+    forces = document["bearing_forces"]
+    for k, speed in enumerate(forces["largest_at_rad_s"]):
+        at = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [speed]).bearing_forces().largest
+        assert forces["largest_N"][k] == pytest.approx(at[0, k], rel=1e-6)
+
+
+BAD_UNBALANCE = [
+    ([["plane", "unbalance_g_mm"], ["4", 1]], "angle_deg"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["wheal", 1, 0]], "did you mean 'wheel'?"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["9", 1, 0]], "a node from 1 to 7 or a station"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 0, 0]], "a number above 0"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 1, 400]], "an angle from -360 to 360 degrees"),
+    ([["plane", "mass_g", "angle_deg"], ["4", 1, 0]], "either a column unbalance_<unit>, or both"),
+    ([["plane", "mass_g", "radius_mm", "unbalance_g_mm", "angle_deg"], ["4", 1, 1, 1, 0]], "either a column"),
+    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node: a node or a station"),
+    ([["plane", "node", "unbalance_g_mm", "angle_deg"], ["4", "4", 1, 0]], "plane or node, not both"),
+    ([["plane", "unbalance_gmm", "angle_deg"], ["4", 1, 0]], "unbalance_gmm"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("table", "message"), BAD_UNBALANCE)
+def test_bad_unbalance_tables(cli, files, table, message):
+    write_csv(files[1], table)
+    outcome = cli("response", files[0], "--unbalance", files[1], *OK_SPEEDS)
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1
+
+
+def test_unbalance_of_one_node_adds_up(model, tmp_path):
+    table = [["plane", "unbalance_oz_in", "angle_deg"], ["wheel", 1, 0], ["4", 1, 180], ["3", 1, -90]]
+    mounted = read_unbalance(write_csv(tmp_path / "u.csv", table), model)
+    assert mounted[4] == 0
+    assert mounted[3] == pytest.approx(-1j * 0.028349523125 * 0.0254, rel=1e-14)
+
+
+def test_amplitudes_have_their_errors(calibrated):
+    options = ResponseOptions(speeds="500:3000:50rpm", sensors="2:45,12")
+    found = response(calibrated, {12: 1e-3}, options)
+    speeds = RPM * np.arange(500.0, 3001.0, 50.0)
+
+    def amplitudes(rotor):
+        return np.abs(fem.unbalance_response(rotor, {12: 1e-3}, speeds).readings([(2, 45.0), 12]))
+
+    std = spread(read_rotor(calibrated), amplitudes)
+    np.testing.assert_allclose(found.document["amplitude_std_m"], std.T, rtol=1e-4)
+    np.testing.assert_allclose(found.to_frame()["amplitude_std_m"], std.ravel(), rtol=1e-4)
