@@ -9,7 +9,7 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem.api684_peaks import Peak, Peaks, required_margin
+from fem.api684_peaks import Peak, Peaks, api617_limit, required_margin
 from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
@@ -74,6 +74,7 @@ __all__ = [
     "Support",
     "WhirlModes",
     "Window",
+    "api617_limit",
     "campbell",
     "compliance",
     "critical_speeds",

@@ -188,6 +188,11 @@ def required_margin(amplification: float, *, above: bool) -> float:
     return min(26.0, 10 + margin) if above else min(16.0, margin)
 
 
+def api617_limit(speed: float) -> float:
+    """Vibration limit of API 617, 25.4 √(12000 / N) µm peak-to-peak, in m; speed in rad/s."""
+    return 25.4e-6 * float(np.sqrt(12000 / (speed * RPM)))
+
+
 def _peak(
     omega: FloatArray,
     A: FloatArray,

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 from fem.campbell_modes import followed_closely, runs_away, swings, went_above
 from fem.growth import Growing, growing, joined
 from fem.growth_check import growth_bound, judge
+from fem.mesh import refined
 from fem.model.rotor import Rotor, whole
 from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.parameter_bands import nearest_modes
 from fem.solvers.crossing import crossings, off_synchronous
 from fem.solvers.mode_tracking import Followed
 from fem.solvers.reduced_whirl import Whirl
@@ -89,6 +91,7 @@ class Campbell(Answered):
     windows: tuple[Window, ...] = ()
     cut: str = ""
     std: FloatArray | None = None
+    heavy: float = 6.0
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -134,19 +137,19 @@ class Campbell(Answered):
         )
 
     def tables(self) -> tuple[Table, ...]:
-        """The damped critical speeds; whirl at the first and at the last speed; and at all of them."""
-        S, n = self.frequencies.shape
-        speed, rpm, mode, decrement, whirl, mark = self._criticals()
-        there = "damped_critical_speeds.*."
+        """The damped critical speeds; and the modes at each speed."""
+        at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
+        ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
         criticals = (
-            Told("mode", [*mode.values], key=f"{there}mode"),
-            Told("whirl", [*whirl.values]),
-            Told("rpm", [*rpm.values], "{:.2f}".format, f"{there}speed_rpm"),
-            Told("rad/s", [*speed.values], "{:.4f}".format, f"{there}speed_rad_s"),
-            Told("log dec", [*decrement.values], _rounded, f"{there}log_decrement"),
-            Told("", [_no_peak(heavy) for heavy in mark.values]),
+            Told("speed_rad_s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Told("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Told("mode", self.critical_modes, key=at + "mode"),
+            Told("log_decrement", decrements, "{:.4f}".format, at + "log_decrement"),
+            Told("direction", ways),
+            Told("heavily_damped", decrements > HEAVY, _no_peak),
         )
-        every = (
+        S, n = self.frequencies.shape
+        modes = (
             Told("speed_rad_s", np.repeat(self.speeds, n)),
             Told("mode", np.tile(np.arange(1, n + 1), S)),
             Told("frequency_rad_s", self.frequencies.ravel()),
@@ -154,18 +157,16 @@ class Campbell(Answered):
             Told("log_decrement", self.log_decrements.ravel()),
             Told("direction", self._ways().ravel()),
         )
-        ends = (self._whirl(s) for s in dict.fromkeys((0, S - 1)))
-        return (Table("damped critical speeds", criticals), *ends, Table("whirl", every))
+        return (Table("damped critical speeds", criticals), Table("modes", modes))
 
-    def _whirl(self, s: int) -> Table:
-        columns = (
-            Told("mode", range(1, self.frequencies.shape[1] + 1)),
-            Told("whirl", [word or "none" for word in self._ways()[s]]),
-            Told("rpm", self.frequencies[s] * RPM, "{:.2f}".format, f"frequencies_rad_s.*.{s}", RPM),
-            Told("rad/s", self.frequencies[s], "{:.4f}".format, f"frequencies_rad_s.*.{s}"),
-            Told("log dec", self.log_decrements[s], _rounded, f"log_decrements.*.{s}"),
-        )
-        return Table(f"whirl at {rpm_text(self.speeds[s])}", columns)
+    def mesh_change(self) -> tuple[float, float]:
+        """Largest relative change of frequencies and of damped critical speeds on elements cut in two."""
+        halved = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1])
+        other = nearest_modes(self.frequencies, halved.frequencies)
+        light = self.log_decrements <= self.heavy
+        change = np.abs(other / self.frequencies - 1)[light]
+        apart = np.abs(halved.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
+        return float(np.nanmax(change, initial=0.0)), float(apart.max(initial=0.0))
 
     def sentence(self) -> str:
         """Whether it is stable, and how many damped critical speeds there are."""
@@ -221,7 +222,7 @@ class Campbell(Answered):
         return words
 
 
-def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
+def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: float = 6.0) -> Campbell:
     """Compute whirl frequencies, logarithmic decrements and directions over speed.
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
@@ -305,6 +306,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
         unstable=unstable,
         windows=windows,
         cut=_cut(whirl, paths, columns),
+        heavy=heavy,
     )
 
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -127,6 +127,12 @@ class Table:
         """The same, of a result that stands at this place of a document."""
         moved = (replace(each, key=each.key and f"{place}.{each.key}") for each in self.columns)
         return replace(self, columns=tuple(moved))
+
+    def only(self, headings: Mapping[str, str]) -> Table:
+        """Some of the columns, in this order, with other headings."""
+        columns = {each.heading: each for each in self.columns}
+        some = (replace(columns[name], heading=shown) for name, shown in headings.items())
+        return replace(self, columns=tuple(some))
 
     @property
     def headings(self) -> list[str]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from rotorid.base.json import cell
-from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, figures, listing
 from rotorid.commands.input_checks import file_of, rotor_source
@@ -34,10 +33,11 @@ if TYPE_CHECKING:
     from fem.response import Unbalance
     from rotorid.base.arrays import AnyArray, FloatArray
 
-View = Literal["bode", "polar", "orbits"]
+View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
-_MOST_REQUIRED = 26.0  # percent: API 684 asks for no larger margin, whatever the amplification
-_APART = 1.05  # ratio of speeds from which peaks belong to different critical speeds
+_MOST_BELOW, _MOST_REQUIRED = 16.0, 26.0
+"""Percent: API 684 asks for no larger margin below and above the range, whatever the amplification."""
+_APART = 1.05  # ratio of neighbouring speeds from which peaks belong to different critical speeds
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class ResponseOptions:
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
     view
-        What --plot draws.
+        What --plot draws; shape: the deflected rotor.
     at : SPEED
-        Speed of the orbits that are drawn, 5800rpm; default: at the largest reading.
+        Speed of the orbits or of the shape that are drawn, 5800rpm; default: at the largest reading.
     """
 
     speeds: Speeds
@@ -119,17 +119,43 @@ class Vibration:
         }
 
     def sentences(self, chief: Sequence[Peak]) -> list[str]:
-        """Whether it runs steadily, whether the margins are as required, and what is largest."""
-        return [*self._judgement(chief).splitlines(), self.finer.highest]
+        """Whether it runs steadily, whether the margins are as required, what is largest, and the limit."""
+        first = [*self._judgement(chief).splitlines(), self.finer.highest]
+        if self.operating is None or (largest := self.inside()) is None:
+            return first
+        import fem
+
+        limit, high = 1e6 * fem.api617_limit(self.operating[1]), rpm_text(self.operating[1])
+        size = figures(2e6 * largest)
+        return [
+            *first,
+            f"In the operating range readings reach {size} µm peak-to-peak; API 617 allows {limit:.3g} µm "
+            f"peak-to-peak at {high}.",
+        ]
+
+    def inside(self) -> float | None:
+        """The largest reading in the operating range, m; None where there is no steady response in it."""
+        import numpy as np
+
+        low, high = self.operating or (0.0, np.inf)
+        there = self.finer.steady & (self.finer.speeds >= low) & (self.finer.speeds <= high)
+        sizes = np.abs(self.finer.readings(self.sensors)[there])
+        return float(sizes.max()) if sizes.size else None
 
     def chief(self) -> list[tuple[str, Peak]]:
-        """A peak of each critical speed: the one that lacks a margin, or the highest."""
-        order = sorted(
-            self.named(),
-            key=lambda one: (one[1].enough is not False, one[1].enough is None, -one[1].amplitude),
-        )
-        near = {round(math.log(peak.speed, _APART)): (name, peak) for name, peak in reversed(order)}
-        return sorted(near.values(), key=lambda one: one[1].speed)
+        """A peak of each critical speed: one whose margin is too small, or of known margin, or the highest.
+
+        Peaks of several readings within 5 % of the next are of one critical speed.
+        """
+        groups: list[list[tuple[str, Peak]]] = []
+        for one in sorted(self.named(), key=lambda one: one[1].speed):
+            if not groups or one[1].speed > _APART * groups[-1][-1][1].speed:
+                groups.append([])
+            groups[-1].append(one)
+        return [
+            min(group, key=lambda one: (one[1].enough is not False, one[1].enough is None, -one[1].amplitude))
+            for group in groups
+        ]
 
     def named(self) -> list[tuple[str, Peak]]:
         """All peaks, each with its sensor."""
@@ -142,7 +168,8 @@ class Vibration:
         sizes = [None if size is None else 1e6 * size for size, _ in where]
         columns = (
             Column("sensor", self.labels),
-            Column("largest reading, µm", sizes, figures, "largest.*.amplitude_m", 1e6),
+            Column("largest reading, µm peak", sizes, figures, "largest.*.amplitude_m", 1e6),
+            Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), "largest.*.amplitude_m", 2e6),
             Column("at rpm", _rpm(where), "{:.1f}".format, "largest.*.speed_rad_s", RPM),
         )
         return Table("largest readings", columns)
@@ -153,7 +180,9 @@ class Vibration:
         where = self._largest(self.finer.bearing_forces().largest)
         columns = (
             Column("support", [support.name or f"node {support.node}" for support in supports]),
-            Column("largest force, N", [size for size, _ in where], figures, "bearing_forces.largest_N.*"),
+            Column(
+                "largest force, N peak", [size for size, _ in where], figures, "bearing_forces.largest_N.*"
+            ),
             Column("at rpm", _rpm(where), "{:.1f}".format, "bearing_forces.largest_at_rad_s.*", RPM),
         )
         return (Table("forces on the supports", columns),) if supports else ()
@@ -199,37 +228,82 @@ class Vibration:
                 lambda: bode_figure(finer, places, self.peaks, operating=self.operating, std=self.std),
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
-            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of_orbits(at))),
+            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
+            "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
         }
-        return dict([draw[view]])
+        asked = dict([draw[view]])
+        return asked if view == "shape" or not finer.steady.any() else asked | dict([draw["shape"]])
+
+    def shape_figure(self, at: int | None) -> Figure:
+        """The deflected rotor at a speed."""
+        from fem.plots import draw_deflected_shape
+        from rotorid.base.plot_style import on_figure
+
+        shape = self.finer.deflected(self.finer.speeds[self._speed_of(at)])
+        return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
+
+    def shape(self, at: int | None) -> tuple[Table, ...]:
+        """The orbit of each node at a speed; nothing without a steady response."""
+        if not self.finer.steady.any():
+            return ()
+        from rotorid.base.rpm import phase_deg
+
+        speed = float(self.finer.speeds[self._speed_of(at)])
+        shape = self.finer.deflected(speed)
+        columns = (
+            Column("node", shape.nodes),
+            Column("position, m", shape.rotor.positions, "{:.4f}".format),
+            Column("µm peak", 1e6 * shape.major[0], figures),
+            Column("minor axis", 1e6 * shape.minor[0], figures),
+            Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
+        )
+        return (Table(f"deflected shape at {rpm_text(speed)}", columns),)
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
-        """Whether it runs steadily, and whether the margins are as required."""
+        """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
         from fem.api684_separation import unsearched
-        from fem.response_result import speed_range
 
         unstable = listing([window.where() for window in self.response.windows], "and")
-        said = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
+        first = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
         known = [peak for peak in chief if peak.enough is not None]
-        close = [rpm_text(peak.speed) for peak in chief if peak.enough is None and _may_lack(peak)]
-        doubt = unsearched(self.finer.speeds[0], self.finer.speeds[-1], self.operating)
+        close = [peak for peak in chief if peak.enough is None and _may_lack(peak)]
+        speeds = self.finer.speeds
+        doubt = unsearched(speeds[0], speeds[-1], self.operating)
         if self.operating is None or not (known or close or doubt):
-            asked = f"at {speed_range(self.response.speeds)}, {counted(len(self.sensors), 'reading')}"
+            asked = (
+                f"at {counted(self.response.speeds.size, 'speed')} from {range_text(speeds[0], speeds[-1])}, "
+                f"{counted(len(self.sensors), 'reading')}"
+            )
             few = "" if self.response.steady.any() else "No steady response"
             few = few or ("No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:")
-            return f"{said}{counted(len(chief), 'peak') if chief else few} {asked}."
+            return f"{first}{counted(len(chief), 'critical speed') if chief else few} {asked}."
         low, high = self.operating
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
         near = [rpm_text(peak.speed) for peak in known if not peak.enough]
         if near:
             return (
-                f"{said}NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} "
+                f"{first}NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} "
                 f"{listing(near, 'and')}."
             )
-        far = f"{counted(len(known), 'critical speed')} far enough {beside}."
+        doubts = []
+        if doubt:
+            least, most = (1 - _MOST_BELOW / 100) * low * RPM, rpm_text((1 + _MOST_REQUIRED / 100) * high)
+            doubts.append(f"{doubt}; --speeds must hold {least:.5g} to {most}")
         if close:
-            doubt = f"no amplification factor at {listing(close, 'and')}" + (doubt and f"; {doubt}")
-        return f"{said}NOT KNOWN whether all are far enough {beside}: {doubt}." if doubt else said + far
+            where = listing([rpm_text(peak.speed) for peak in close], "and")
+            ends = all("outside the speeds" in peak.note for peak in close)
+            doubts.append(
+                f"no amplification factor at {where}; "
+                + (
+                    "widen --speeds until the reading has fallen to 0.707 on both sides"
+                    if ends
+                    else "another peak is too near: read it at another sensor, or keep it "
+                    f"{_MOST_BELOW:g} % below or {_MOST_REQUIRED:g} % above the range, enough for any factor"
+                )
+            )
+        if doubts:
+            return f"{first}NOT KNOWN whether all are far enough {beside}: {'; '.join(doubts)}."
+        return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
 
     @property
     def labels(self) -> list[str]:
@@ -244,21 +318,20 @@ class Vibration:
 
     def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None]]:
         """The largest size in each column of values where a steady response exists, and its speed, rad/s."""
-        from fem.response_result import largest_at
-
-        where = ((size, largest_at(size, self.finer.steady)) for size in abs(values).T)
+        steady, speeds = self.finer.steady, self.finer.speeds
+        if not steady.any():
+            return [(None, None)] * values.shape[1]
+        sizes = abs(values) * steady[:, None]
         return [
-            (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k])) for size, k in where
+            (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
         ]
 
-    def _speed_of_orbits(self, at: int | None) -> int:
-        from fem.response_result import largest_at
-
-        sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        k = largest_at(sizes, self.finer.steady) if at is None else at
-        if k is None:
+    def _speed_of(self, at: int | None) -> int:
+        steady = self.finer.steady
+        if not steady.any():
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
-        return k
+        sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
+        return int((sizes * steady).argmax()) if at is None else at
 
     def _orbits(self) -> dict[str, Any]:
         """Ellipses of the sensors' nodes, one list over speed for each sensor."""
@@ -305,7 +378,7 @@ def _peak_table(name: str, found: Sequence[tuple[str, Peak]], key: str = "") -> 
             f"{key}.*.{one.name}" if key and one.name != "enough" else "",
             1e6 if one.name == "amplitude" else 1.0,
         )
-        for one in peak_columns(peaks, "µm", 1e6)
+        for one in peak_columns(peaks, "µm peak", 1e6)
         if one.shown is not None
     ]
     return (Table(name, (Column("peak at", sensors), *columns)),)
@@ -381,7 +454,11 @@ def response(
         result=result,
         sentences=tuple(result.sentences([peak for _, peak in chief])),
         tables=(*_peak_table("peaks", chief), result.largest()),
-        more=(*result.forces(), *_peak_table("peaks of every reading", every, "peaks")),
+        more=(
+            *result.forces(),
+            *_peak_table("peaks of every reading", every, "peaks"),
+            *result.shape(at),
+        ),
         behind=(unbalance_table(model, found.unbalance), result.readings()),
         file=result.file(),
         keys=result.to_dict(),
