@@ -102,7 +102,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     beside: dict[str, Any] = {}
     if operating:
         doubt = unsearched(speeds[0], speeds[-1], operating)
-        doubt = doubt or ("the list may be cut, see the note" if whirl.cut else "")
+        doubt = doubt or ("the list may be cut, ask for more modes (-n)" if whirl.cut else "")
         peaks = [speed for speed, damping in whirl.criticals if damping <= HEAVY]
         beside["operating"] = Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]

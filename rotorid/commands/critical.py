@@ -109,7 +109,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
             ),
             *map_tables[2:],
         ),
-        behind=(shapes,),
+        behind=(shapes.only({name: _plain(name) for name in shapes.headings}),),
         file=map_tables[0] if chart else shapes,
         keys={**modes.to_dict(), **{key: part.to_dict() for key, part in asked.items()}},
         warnings=modes.warnings,
@@ -119,6 +119,11 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         rotor={"rotor": model, "conservative": True},
         provenance=provenance(files, options),
     )
+
+
+def _plain(heading: str) -> str:
+    """A heading of a file as people read it."""
+    return heading.replace("_m", ", m").replace("_", " ")
 
 
 def _pictures(

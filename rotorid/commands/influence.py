@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotorid.base.tables import LONG
 from rotorid.base.text import counted
 from rotorid.commands.input_checks import rotor_source
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
@@ -70,7 +71,7 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
         result=result,
         sentences=tuple(result.sentence().splitlines()),
         tables=tuple(largest),
-        behind=(every,),
+        behind=(every,) if len(every.rows) <= LONG else (),
         file=every,
         keys=result.to_dict(),
         warnings=result.warnings,
@@ -80,6 +81,6 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
             )
         },
         title="Influence coefficients",
-        rotor={"rotor": model, "planes": planes, "sensors": places},
+        rotor={"rotor": model, "planes": planes, "sensors": places, "meaning": "planes"},
         provenance=provenance(files, options),
     )

@@ -150,6 +150,7 @@ class Outcome(Delivered):
             self.provenance,
             title=self.title,
             sentences=self.sentences,
+            notes=self.notes,
             tables=(self.tables, (*self.more, *self.behind)),
             pictures=self.pictures,
             rotor=self.rotor,

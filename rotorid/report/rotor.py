@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.tables import Table
-from rotorid.base.text import capital
 from rotorid.report.number_tables import Part, every_warning
 from rotorid.report.page import inline_svg, render_report
 from rotorid.report.rotor_description import rotor_sheet
@@ -25,6 +24,7 @@ def rotor_page(
     *,
     title: str,
     sentences: Sequence[str],
+    notes: Sequence[str],
     tables: tuple[Sequence[Table], Sequence[Table]],
     pictures: Mapping[str, Callable[[], Figure]],
     rotor: Mapping[str, Any],
@@ -39,8 +39,10 @@ def rotor_page(
         Program version, input files, date and options.
     title
         Of the page.
-    sentences, tables, pictures
-        The answer; its tables and the further ones; what draws each picture, by its caption.
+    sentences, notes
+        The answer, and what a reader must know besides the warnings of the document.
+    tables, pictures
+        Those of the answer and the further ones; what draws each picture, by its caption.
     rotor
         What `rotor_sheet` takes.
     """
@@ -50,14 +52,14 @@ def rotor_page(
         "parts.html",
         document,
         title=title,
-        warnings=every_warning(document),
+        warnings=[*every_warning(document), *notes],
         provenance=provenance,
         said=sentences,
         about=[("Rotor file", str(entry["file"])) for entry in provenance["inputs"][:1]],
         rotor=rotor_sheet(**rotor),
         parts=[
-            Part("Answer", (), tuple(first), drawings),
-            *(Part(capital(table.name), tables=_narrow(table)) for table in others),
+            Part("Result", (), tuple(first), drawings),
+            Part("Behind it", (), tuple(part for table in others for part in _narrow(table))),
         ],
     )
 

@@ -1,5 +1,7 @@
 """response: readings, orbits, forces, peaks, tables of unbalance, errors from a calibration."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,6 +12,7 @@ import fem
 from fem.parameter_bands import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands import ResponseOptions, response
+from rotorid.samples import sample_data
 from rotorid.tables import read_unbalance
 
 RPM = np.pi / 30
@@ -122,3 +125,40 @@ def test_amplitudes_have_their_errors(calibrated):
     std = spread(read_rotor(calibrated), amplitudes)
     np.testing.assert_allclose(found.document["amplitude_std_m"], std.T, rtol=1e-4)
     np.testing.assert_allclose(found.to_frame()["amplitude_std_m"], std.ravel(), rtol=1e-4)
+
+
+COMPRESSOR = sample_data() / "compressor"
+PROBES = (
+    "response", COMPRESSOR / "rotor.toml", "--unbalance", COMPRESSOR / "unbalance.csv", "--sensors",
+    "probe DE:45,probe NDE:45",
+)  # fmt: skip
+
+
+def test_one_row_for_each_critical_speed_and_the_limit_beside_the_readings(cli):
+    command = (*PROBES, "--speeds", "1000:10000:100rpm", "--operating", "5300:6500rpm")
+    text, document = cli(*command).out, cli(*command, "--json").json
+    assert len(document["peaks"]) == 4
+    table = text.split("\n  peak at")[1].split("\n\n")[0]
+    assert table.count("probe") == 2
+    assert text.startswith("2 critical speeds far enough")
+    speeds = np.array(document["speeds_rad_s"]) / RPM
+    inside = np.array(document["amplitude_m"])[:, (speeds >= 5299) & (speeds <= 6501)]
+    said = re.search(r"readings reach ([\d.]+) µm peak-to-peak; API 617 allows ([\d.]+) µm", text)
+    assert float(said[1]) == pytest.approx(2e6 * inside.max(), rel=2e-3)
+    assert float(said[2]) == pytest.approx(25.4 * np.sqrt(12000 / 6500), abs=0.05)
+
+
+def test_what_is_not_known_says_what_to_do(cli):
+    text = cli(*PROBES, "--speeds", "2000:6000:500rpm", "--operating", "5800:6500rpm").out
+    assert "--speeds must hold 4872 to 8190 rpm" in " ".join(text.split())
+
+
+def test_the_deflected_shape_is_that_of_all_nodes(cli, files, model, tmp_path):
+    command = ("response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10", "--sensors", "wheel")
+    shape = tmp_path / "shape.png"
+    text = cli(*command, "--table", "--view", "shape", "--at", "300", "--plot", shape).out
+    rows = [line.split() for line in text.split("Deflected shape at")[1].splitlines()[2:] if line]
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [300.0])
+    sizes = [float(row[2]) for row in rows[: model.n_nodes]]
+    np.testing.assert_allclose(sizes, 1e6 * expected.major[0], rtol=2e-3)
+    assert shape.read_bytes().startswith(b"\x89PNG")
