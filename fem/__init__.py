@@ -9,7 +9,17 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem.api684_peaks import Peak, Peaks, api617_limit, required_margin
+from fem.api684_peaks import (
+    Peak,
+    Peaks,
+    api617_limit,
+    api_unbalance,
+    critical_peaks,
+    open_question,
+    peak_columns,
+    required_margin,
+)
+from fem.api684_separation import Separation, unsearched
 from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
@@ -65,6 +75,7 @@ __all__ = [
     "Response",
     "Rotor",
     "Sensor",
+    "Separation",
     "SpeedMap",
     "SqueezeFilm",
     "Stability",
@@ -75,14 +86,18 @@ __all__ = [
     "WhirlModes",
     "Window",
     "api617_limit",
+    "api_unbalance",
     "campbell",
     "compliance",
+    "critical_peaks",
     "critical_speeds",
     "draw_rotor",
     "equations_of_motion",
     "influence",
     "mesh_check",
+    "open_question",
     "orbits",
+    "peak_columns",
     "probe",
     "refined",
     "required_margin",
@@ -93,6 +108,7 @@ __all__ = [
     "state_space",
     "static_deflection",
     "unbalance_response",
+    "unsearched",
     "whirl_direction",
     "whirl_modes",
 ]

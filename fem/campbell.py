@@ -74,6 +74,8 @@ class Campbell(Answered):
         What the list of critical speeds leaves out because only n modes were asked for; else empty.
     std
         Standard deviations of `frequencies`, from the calibration of the rotor; None without.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped.
     """
 
     speeds: FloatArray
@@ -240,6 +242,8 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         rad/s, ascending, shape (S,).
     n
         How many modes, by default 6; forward and backward whirl count apart. Where the model has fewer, all.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped.
 
     Raises
     ------

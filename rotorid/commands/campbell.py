@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, percent
@@ -78,7 +79,6 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         For a rotor or an option that cannot be.
     """
     import fem
-    from fem.api684_separation import Separation, unsearched
     from fem.campbell import HEAVY
     from fem.parameter_bands import band as error_band
     from fem.parameter_bands import nearest_modes
@@ -101,10 +101,10 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     log_rotor(model, speeds=len(speeds), estimated_relative_error=whirl.error)
     beside: dict[str, Any] = {}
     if operating:
-        doubt = unsearched(speeds[0], speeds[-1], operating)
+        doubt = fem.unsearched(speeds[0], speeds[-1], operating)
         doubt = doubt or ("the list may be cut, ask for more modes (-n)" if whirl.cut else "")
         peaks = [speed for speed, damping in whirl.criticals if damping <= HEAVY]
-        beside["operating"] = Separation(peaks, operating, doubt)
+        beside["operating"] = fem.Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]
     pictures: dict[str, Callable[[], Figure]] = {
         "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
@@ -121,7 +121,8 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     if options.mesh_check:
         with phase("mesh"):
             changes = whirl.mesh_change()
-        keys["mesh_check"] = {"frequencies_change": changes[0], "critical_speeds_change": changes[1]}
+        named = zip(("frequencies_change", "critical_speeds_change"), changes, strict=True)
+        keys["mesh_check"] = plain(dict(named))
         sentences.append(
             f"Elements cut in two change frequencies by at most {percent(changes[0])} %, damped critical "
             f"speeds by at most {percent(changes[1])} %."

@@ -66,7 +66,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         For a rotor or an option that cannot be.
     """
     import fem
-    from fem.api684_separation import Separation, unsearched
     from fem.critical import critical_speeds_near
     from fem.parameter_bands import band as error_band
 
@@ -90,8 +89,8 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     apart = None
     if operating:
         more = int((speeds > 0).sum()) >= (options.number or 3)
-        doubt = unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
-        apart = Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
+        doubt = fem.unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
+        apart = fem.Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
     table, shapes = modes.tables()
     map_tables = chart.tables() if chart else ()
     beside = {"operating": apart, "mesh_check": mesh, "map": chart}

@@ -131,7 +131,7 @@ def cross_coupling(
     """
     from scipy.optimize import brentq
 
-    node = rotor.node(_mid_span(rotor) if place is None else place)
+    node = rotor.node(mid_span(rotor) if place is None else place)
 
     def at(k: float) -> tuple[float, float, float]:
         seal = fem.Support(node, ((0.0, k), (-k, 0.0)), kind="seal")
@@ -156,7 +156,7 @@ def cross_coupling(
     return CrossCoupling(node, speed, added, smallest, frequencies, forward, threshold)
 
 
-def _mid_span(rotor: fem.Rotor) -> int:
+def mid_span(rotor: fem.Rotor) -> int:
     """The node next to the middle between the outer bearings."""
     ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"]
     ends = ends or [rotor.positions[-1]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ from rotorid.commands.quantities import (
     Sensor,
     Speeds,
     band,
+    nodes,
+    number,
     one_of,
     one_speed,
     rising_speeds,
@@ -33,11 +36,12 @@ if TYPE_CHECKING:
     from fem.response import Unbalance
     from rotorid.base.arrays import AnyArray, FloatArray
 
+STANDARD_GRAVITY = 9.80665  # m/s²
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
-_MOST_BELOW, _MOST_REQUIRED = 16.0, 26.0
-"""Percent: API 684 asks for no larger margin below and above the range, whatever the amplification."""
-_APART = 1.05  # ratio of neighbouring speeds from which peaks belong to different critical speeds
+_KEYS = ("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor")
+_KEYS += ("separation_margin_percent", "required_margin_percent", "")
+"""Of the columns of peaks, in the document."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ class Vibration:
         at_support = self._largest(self.finer.bearing_forces().largest)
         readings = self._largest(self.finer.readings(self.sensors))
         own = {} if self.std is None else {"amplitude_std_m": cell(self._asked(self.std).T)}
+        limit = self.limit()
         return {
             **document,
             **own,
@@ -115,47 +120,39 @@ class Vibration:
                 for name, found in zip(self.labels, self.peaks, strict=False)
                 for peak in found.to_dict()["peaks"]
             ],
+            **({"vibration_limit": limit} if limit else {}),
             "warnings": warnings,
         }
 
     def sentences(self, chief: Sequence[Peak]) -> list[str]:
         """Whether it runs steadily, whether the margins are as required, what is largest, and the limit."""
-        first = [*self._judgement(chief).splitlines(), self.finer.highest]
-        if self.operating is None or (largest := self.inside()) is None:
+        first, limit = [*self._judgement(chief).splitlines(), self.finer.highest], self.limit()
+        if not limit:
             return first
-        import fem
-
-        limit, high = 1e6 * fem.api617_limit(self.operating[1]), rpm_text(self.operating[1])
-        size = figures(2e6 * largest)
+        largest, allowed = (1e6 * limit[key] for key in ("largest_peak_to_peak_m", "allowed_peak_to_peak_m"))
         return [
             *first,
-            f"In the operating range readings reach {size} µm peak-to-peak; API 617 allows {limit:.3g} µm "
-            f"peak-to-peak at {high}.",
+            f"In the operating range readings reach {figures(largest)} µm peak-to-peak; API 617 allows "
+            f"{allowed:.3g} µm peak-to-peak at {rpm_text(limit['speed_rad_s'])}.",
         ]
 
-    def inside(self) -> float | None:
-        """The largest reading in the operating range, m; None where there is no steady response in it."""
+    def limit(self) -> dict[str, float]:
+        """The largest reading in the operating range beside the limit of API 617; empty without either."""
         import numpy as np
 
-        low, high = self.operating or (0.0, np.inf)
+        import fem
+
+        low, high = self.operating or (np.inf, np.inf)
         there = self.finer.steady & (self.finer.speeds >= low) & (self.finer.speeds <= high)
-        sizes = np.abs(self.finer.readings(self.sensors)[there])
-        return float(sizes.max()) if sizes.size else None
-
-    def chief(self) -> list[tuple[str, Peak]]:
-        """A peak of each critical speed: one whose margin is too small, or of known margin, or the highest.
-
-        Peaks of several readings within 5 % of the next are of one critical speed.
-        """
-        groups: list[list[tuple[str, Peak]]] = []
-        for one in sorted(self.named(), key=lambda one: one[1].speed):
-            if not groups or one[1].speed > _APART * groups[-1][-1][1].speed:
-                groups.append([])
-            groups[-1].append(one)
-        return [
-            min(group, key=lambda one: (one[1].enough is not False, one[1].enough is None, -one[1].amplitude))
-            for group in groups
-        ]
+        if not there.any():
+            return {}
+        largest = 2 * float(np.abs(self.finer.readings(self.sensors)[there]).max())
+        allowed = fem.api617_limit(high)
+        return {
+            "speed_rad_s": high,
+            "allowed_peak_to_peak_m": allowed,
+            "largest_peak_to_peak_m": largest,
+        }
 
     def named(self) -> list[tuple[str, Peak]]:
         """All peaks, each with its sensor."""
@@ -261,15 +258,14 @@ class Vibration:
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
-        from fem.api684_separation import unsearched
+        import fem
 
         unstable = listing([window.where() for window in self.response.windows], "and")
         first = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
-        known = [peak for peak in chief if peak.enough is not None]
-        close = [peak for peak in chief if peak.enough is None and _may_lack(peak)]
-        speeds = self.finer.speeds
-        doubt = unsearched(speeds[0], speeds[-1], self.operating)
-        if self.operating is None or not (known or close or doubt):
+        low, high = self.operating or (0.0, 0.0)
+        speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
+        question = fem.open_question(chief, speeds[0], speeds[-1], (low, high)) if self.operating else ""
+        if self.operating is None or not (chief or question):
             asked = (
                 f"at {counted(self.response.speeds.size, 'speed')} from {range_text(speeds[0], speeds[-1])}, "
                 f"{counted(len(self.sensors), 'reading')}"
@@ -277,32 +273,12 @@ class Vibration:
             few = "" if self.response.steady.any() else "No steady response"
             few = few or ("No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:")
             return f"{first}{counted(len(chief), 'critical speed') if chief else few} {asked}."
-        low, high = self.operating
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
-        near = [rpm_text(peak.speed) for peak in known if not peak.enough]
         if near:
-            return (
-                f"{first}NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} "
-                f"{listing(near, 'and')}."
-            )
-        doubts = []
-        if doubt:
-            least, most = (1 - _MOST_BELOW / 100) * low * RPM, rpm_text((1 + _MOST_REQUIRED / 100) * high)
-            doubts.append(f"{doubt}; --speeds must hold {least:.5g} to {most}")
-        if close:
-            where = listing([rpm_text(peak.speed) for peak in close], "and")
-            ends = all("outside the speeds" in peak.note for peak in close)
-            doubts.append(
-                f"no amplification factor at {where}; "
-                + (
-                    "widen --speeds until the reading has fallen to 0.707 on both sides"
-                    if ends
-                    else "another peak is too near: read it at another sensor, or keep it "
-                    f"{_MOST_BELOW:g} % below or {_MOST_REQUIRED:g} % above the range, enough for any factor"
-                )
-            )
-        if doubts:
-            return f"{first}NOT KNOWN whether all are far enough {beside}: {'; '.join(doubts)}."
+            many = "s" * (len(near) > 1)
+            return f"{first}NOT far enough {beside}: critical speed{many} {listing(near, 'and')}."
+        if question:
+            return f"{first}NOT KNOWN whether all are far enough {beside}: {question}."
         return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
 
     @property
@@ -354,34 +330,56 @@ class Vibration:
         }
 
 
-def _may_lack(peak: Peak) -> bool:
-    """Whether an amplification factor could make its margin too small: none asks for more than this."""
-    return peak.margin is None or peak.margin < _MOST_REQUIRED
-
-
 def _rpm(where: Iterable[tuple[float | None, float | None]]) -> list[float | None]:
     return [None if speed is None else speed * RPM for _, speed in where]
 
 
-def _peak_table(name: str, found: Sequence[tuple[str, Peak]], key: str = "") -> tuple[Table, ...]:
-    """The peaks; none without any."""
-    from fem.api684_peaks import peak_columns
+def _peak_table(name: str, found: Sequence[tuple[str, Peak]], place: str = "") -> tuple[Table, ...]:
+    """The peaks, at this place of the document; none without any."""
+    import fem
 
     if not found:
         return ()
     sensors, peaks = zip(*found, strict=True)
-    columns = [
-        Column(
-            one.name if one.title is None else one.title,
-            [*one.values],
-            one.shown,
-            f"{key}.*.{one.name}" if key and one.name != "enough" else "",
-            1e6 if one.name == "amplitude" else 1.0,
+    columns = (
+        dataclasses.replace(column, key=place and key and f"{place}.*.{key}", scale=scale)
+        for column, key, scale in zip(
+            fem.peak_columns(peaks, "µm", 1e6), _KEYS, (1, 1, 1e6, 1, 1, 1, 1), strict=True
         )
-        for one in peak_columns(peaks, "µm peak", 1e6)
-        if one.shown is not None
-    ]
+    )
     return (Table(name, (Column("peak at", sensors), *columns)),)
+
+
+def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: float) -> dict[int, complex]:
+    """Read "api", "api:2", "api:2@8,-16": planes (- for 180°) with 4 W / N each, rad/s.
+
+    W is the static load of the next journal; without planes that of all, at the mid span.
+    """
+    import numpy as np
+
+    import fem
+    from rotorid.commands.cross_coupling import mid_span
+
+    head, _, planes = given.partition("@")
+    times = number(head.partition(":")[2] or "1")
+    journals = [support.node for support in rotor.supports if support.kind == "bearing"]
+    if not times > 0 or not journals:
+        raise ValueError(f"--unbalance {given}: a number above 0 stands behind api:, and bearings are needed")
+    static = fem.static_deflection(rotor, speeds[0])
+    forces = np.hypot(static.reaction_x, static.reaction_y) / STANDARD_GRAVITY
+    loads = dict(zip([support.node for support in rotor.supports], forces.tolist(), strict=True))
+    if not planes:
+        total = sum(loads[node] for node in journals)
+        return {mid_span(rotor): times * fem.api_unbalance(total, highest)}
+    mounted: dict[int, complex] = {}
+    for plane in planes.split(","):
+        (name,) = nodes(plane.strip().removeprefix("-"), "--unbalance")
+        node = rotor.node(name)
+        apart = [abs(rotor.positions[node - 1] - rotor.positions[each - 1]) for each in journals]
+        sign = -1 if plane.strip().startswith("-") else 1
+        load = loads[journals[int(np.argmin(apart))]]
+        mounted[node] = sign * times * fem.api_unbalance(load, highest)
+    return mounted
 
 
 @command
@@ -398,8 +396,10 @@ def response(
     ----------
     rotor : ROTOR
         Rotor table (.csv, .xlsx) or rotor file (.toml).
-    unbalance : FILE
-        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg.
+    unbalance : FILE|api
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg. Or api: 4 W/N of API 617 (7th
+        edition, 2002), 6350 g·mm·rpm/kg, at the mid span, W the load of the journals, N the highest operating
+        speed (or speed); api:2 doubles it; api@8,-16 puts it at planes, - at 180°, W of the next journal.
     options
         The speeds, and what differs from the defaults.
 
@@ -410,7 +410,7 @@ def response(
     """
     import numpy as np
 
-    from fem import resolve_peaks
+    import fem
     from fem.model.sensors import as_sensor
     from fem.parameter_bands import band as error_band
     from fem.response import response_from_rest
@@ -420,21 +420,27 @@ def response(
     model, files = rotor_source(rotor)
     operating = band(options.operating)
     places = _places(model, options.sensors)
-    nodes = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
-    nodes |= dict.fromkeys(support.node for support in model.supports)
+    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
+    kept |= dict.fromkeys(support.node for support in model.supports)
     speeds = rising_speeds(options.speeds)
-    if not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
+    highest, asked, standard = operating[1] if operating else speeds[-1], {}, ""
+    if isinstance(unbalance, str) and re.match("api(:|@|$)", unbalance):
+        asked, standard = {"unbalance": unbalance}, f"Unbalance after API 617 ({unbalance}): "
+        unbalance = _api_unbalance(model, unbalance, speeds, highest)
+        each = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
+        standard += f"{listing(each, 'and')}, N = {rpm_text(highest)}."
+    elif not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
         table = file_of(unbalance, "unbalance by node or station,")
         files = (*files, table)
         unbalance = read_unbalance(table, model)
     with phase(f"response at {counted(len(speeds), 'speed')}"):
-        found = response_from_rest(model, unbalance, speeds, [*nodes])
+        found = response_from_rest(model, unbalance, speeds, [*kept])
     with phase("peaks"):
-        finer, peaks = resolve_peaks(found, places, operating=operating)
+        finer, peaks = fem.resolve_peaks(found, places, operating=operating)
 
     def amplitudes(other: Rotor) -> FloatArray:
         new = other is not model
-        found = response_from_rest(other, unbalance, finer.speeds, [*nodes]) if new else finer
+        found = response_from_rest(other, unbalance, finer.speeds, [*kept]) if new else finer
         return np.abs(found.readings(places))
 
     std, said = error_band(model, "the amplitudes", amplitudes)
@@ -449,17 +455,19 @@ def response(
         operating=operating,
     )
     at = None if options.at is None else _nearest(finer, options.at)
-    chief, every = result.chief(), result.named()
+    chief, every = fem.critical_peaks(result.labels, peaks), result.named()
+    mounted = unbalance_table(model, found.unbalance)
     return Outcome(
         result=result,
-        sentences=tuple(result.sentences([peak for _, peak in chief])),
+        sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
         tables=(*_peak_table("peaks", chief), result.largest()),
         more=(
+            mounted,
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
             *result.shape(at),
         ),
-        behind=(unbalance_table(model, found.unbalance), result.readings()),
+        behind=(result.readings(),),
         file=result.file(),
         keys=result.to_dict(),
         warnings=result.response.warnings,
@@ -469,7 +477,7 @@ def response(
         pictures=result.pictures(options.view, at),
         title="Unbalance response",
         rotor={"rotor": model, "planes": sorted(found.unbalance), "sensors": places, "meaning": "unbalance"},
-        provenance=provenance(files, options),
+        provenance=provenance(files, options, **asked),
     )
 
 
@@ -477,8 +485,8 @@ def _places(rotor: Rotor, given: str | Sequence[Sensor] | None) -> Sequence[Sens
     """Where to read the vibration."""
     if given is not None:
         return sensors(given)
-    nodes = dict.fromkeys(support.node for support in rotor.supports)
-    return [*rotor.stations] or [*nodes] or [*range(1, rotor.n_nodes + 1)]
+    held = dict.fromkeys(support.node for support in rotor.supports)
+    return [*rotor.stations] or [*held] or [*range(1, rotor.n_nodes + 1)]
 
 
 def _nearest(response: Response, at: str | float) -> int:

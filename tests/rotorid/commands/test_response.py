@@ -150,7 +150,34 @@ def test_one_row_for_each_critical_speed_and_the_limit_beside_the_readings(cli):
 
 def test_what_is_not_known_says_what_to_do(cli):
     text = cli(*PROBES, "--speeds", "2000:6000:500rpm", "--operating", "5800:6500rpm").out
-    assert "--speeds must hold 4872 to 8190 rpm" in " ".join(text.split())
+    assert "give speeds from 2000 to 8190 rpm" in " ".join(text.split())
+
+
+@pytest.mark.parametrize(
+    ("given", "times", "planes"),
+    [("api", 1, {13: (0, 1)}), ("api:2", 2, {13: (0, 1)}), ("api:0.5@8,-16", 0.5, {8: (0,), 16: (1,)})],
+)
+def test_the_unbalance_of_the_standard(cli, given, times, planes):
+    """4 W/N: 6350 g·mm·rpm/kg, W the static loads of the journals, N the highest operating speed."""
+    command = ("response", COMPRESSOR / "rotor.toml", "--unbalance", given, "--speeds", "5000:6000:500rpm")
+    text = cli(*command, "--operating", "5300:6500rpm", "--table").out
+    rotor = read_rotor(COMPRESSOR / "rotor.toml")
+    static = fem.static_deflection(rotor, 5000 * RPM)
+    loads = np.hypot(static.reaction_x, static.reaction_y)[:2] / 9.80665
+    rows = [line.split() for line in text.split("What is mounted:")[1].split("\n\n")[0].splitlines()[2:]]
+    assert [int(row[0]) for row in rows] == list(planes)
+    for k, (row, which) in enumerate(zip(rows, planes.values(), strict=True)):
+        load = sum(loads[i] for i in which)
+        assert float(row[-2]) == pytest.approx(times * 6350 * load / 6500, rel=1e-3)
+        assert float(row[-1]) == 180 * k
+    assert f"Unbalance after API 617 ({given})" in text
+
+
+@pytest.mark.parametrize("given", ["api:0", "api:x", "api@nowhere"])
+def test_no_unbalance_of_the_standard(cli, given):
+    found = cli("response", COMPRESSOR / "rotor.toml", "--unbalance", given, "--speeds", "5000:6000:500rpm")
+    assert found.code == 2
+    assert ("--unbalance" if ":" in given else "nowhere") in found.err
 
 
 def test_the_deflected_shape_is_that_of_all_nodes(cli, files, model, tmp_path):
