@@ -316,9 +316,9 @@ def open_question(peaks: Iterable[Peak], first: float, last: float, operating: t
 
 
 def _unsearched(first: float, last: float, operating: tuple[float, float]) -> str:
-    from fem.api684_separation import unsearched
-
-    return unsearched(first, last, operating)
+    if first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6):
+        return ""
+    return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"
 
 
 def _peak(

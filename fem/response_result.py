@@ -119,12 +119,6 @@ class Response(Answered):
         """`at` for each sensor, shape (S, C)."""
         return np.stack([self.at(sensor) for sensor in sensors], axis=1)
 
-    def deflected(self, speed: float) -> Response:
-        """The response of all nodes at one speed, rad/s: the shape of the shaft there, such as at a peak."""
-        from fem.response import unbalance_response
-
-        return unbalance_response(self.rotor, self.unbalance, speed)
-
     def bearing_forces(self) -> BearingForces:
         """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
         X, Y = self.x, self.y

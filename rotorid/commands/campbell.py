@@ -79,7 +79,6 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         For a rotor or an option that cannot be.
     """
     import fem
-    from fem.campbell import HEAVY
     from fem.parameter_bands import band as error_band
     from fem.parameter_bands import nearest_modes
     from fem.plots import campbell_figure
@@ -103,7 +102,8 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     if operating:
         doubt = fem.unsearched(speeds[0], speeds[-1], operating)
         doubt = doubt or ("the list may be cut, ask for more modes (-n)" if whirl.cut else "")
-        peaks = [speed for speed, damping in whirl.criticals if damping <= HEAVY]
+        rows = whirl.to_dict()["damped_critical_speeds"]
+        peaks = [row["speed_rad_s"] for row in rows if not row["heavily_damped"]]
         beside["operating"] = fem.Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]
     pictures: dict[str, Callable[[], Figure]] = {

@@ -39,8 +39,10 @@ if TYPE_CHECKING:
 STANDARD_GRAVITY = 9.80665  # m/s²
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
-_KEYS = ("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor")
-_KEYS += ("separation_margin_percent", "required_margin_percent", "")
+_KEYS = (
+    *("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor"),
+    *("separation_margin_percent", "required_margin_percent", ""),
+)
 """Of the columns of peaks, in the document."""
 
 
@@ -236,7 +238,7 @@ class Vibration:
         from fem.plots import draw_deflected_shape
         from rotorid.base.plot_style import on_figure
 
-        shape = self.finer.deflected(self.finer.speeds[self._speed_of(at)])
+        shape = self._deflected(at)
         return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
 
     def shape(self, at: int | None) -> tuple[Table, ...]:
@@ -245,8 +247,7 @@ class Vibration:
             return ()
         from rotorid.base.rpm import phase_deg
 
-        speed = float(self.finer.speeds[self._speed_of(at)])
-        shape = self.finer.deflected(speed)
+        shape = self._deflected(at)
         columns = (
             Column("node", shape.nodes),
             Column("position, m", shape.rotor.positions, "{:.4f}".format),
@@ -254,7 +255,7 @@ class Vibration:
             Column("minor axis", 1e6 * shape.minor[0], figures),
             Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
         )
-        return (Table(f"deflected shape at {rpm_text(speed)}", columns),)
+        return (Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns),)
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
@@ -301,6 +302,13 @@ class Vibration:
         return [
             (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
         ]
+
+    def _deflected(self, at: int | None) -> Response:
+        """The response of all nodes at a speed."""
+        import fem
+
+        finer = self.finer
+        return fem.unbalance_response(finer.rotor, finer.unbalance, finer.speeds[self._speed_of(at)])
 
     def _speed_of(self, at: int | None) -> int:
         steady = self.finer.steady
