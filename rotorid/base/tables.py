@@ -231,7 +231,7 @@ def html(table: Table) -> Markup:
 
     count = len(table.columns[0].values)
     rows = evenly(count, count if count <= LONG else THINNED)
-    said = [table.note, f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""]
+    notes = [table.note, f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""]
     shown = [[column.heading, *(text or NOTHING for text in column.texts)] for column in table.columns]
     wide = len(shown) > NARROW or sum(max(map(len, texts)) for texts in shown) > LETTERS
     numbers = [Markup("") if column.words else Markup(' class="n"') for column in table.columns]
@@ -249,7 +249,7 @@ def html(table: Table) -> Markup:
         Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*cells, strict=True)
     )
     kind = Markup(' class="blocks"') if wide else Markup("")
-    words = " ".join(filter(None, said))
+    words = " ".join(filter(None, notes))
     note = Markup('\n<p class="note">{}</p>').format(words) if words else Markup("")
     return Markup(
         "<table{}>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>{}"

@@ -105,7 +105,7 @@ class Destination:
         draw: Callable[[_R], Figure] | None = None,
         more: Sequence[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = (),
     ) -> _R:
-        """Do the work of a command, print what it found, and write its files, all of them or none.
+        """Do the work of a command, print what it result, and write its files, all of them or none.
 
         Parameters
         ----------
@@ -138,16 +138,16 @@ class Destination:
         ]
         check_targets([(path, endings) for path, endings, _ in files])
         with busy(what):
-            found = work()
-        equations = found.equations if self.show else None
-        document = found.document
+            result = work()
+        equations = result.equations if self.show else None
+        document = result.document
         if equations:
             document["equations"] = equations.to_dict()
         note(document)
         targets = {path: build for path, _, build in files if path is not None}
         built: dict[Path, bytes] = {}
         for path, build in targets.items():
-            made = build(found)
+            made = build(result)
             built |= made if isinstance(made, Mapping) else {path: made}
         check_inputs(built, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
         write_files(built)
@@ -155,10 +155,10 @@ class Destination:
             typer.echo(json_text(document))
         else:
             written = [f"written: {printable(str(path))}" for path in built]
-            answer = equations.answer(found.answer) if equations else found.answer
+            answer = equations.answer(result.answer) if equations else result.answer
             text = answer.whole() if self.table else answer.brief(LINES - len(written))
             typer.echo("\n".join([equations.latex() if equations and self.latex else text, *written]))
-        return found
+        return result
 
 
 def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
@@ -243,15 +243,15 @@ def command(
     to
         Which fields of `Destination` the command has.
     """
-    own = [] if options is None else [*_parameters(options, names or {}, least or {})]
+    fields = [] if options is None else [*_parameters(options, names or {}, least or {})]
     where = [one for one in _parameters(Destination, {}, {}) if one.name in to]
 
     def decorate(function: Command) -> Command:
         hints = get_type_hints(function, include_extras=True)
-        told: list[inspect.Parameter] = []
+        parameters: list[inspect.Parameter] = []
         for name, parameter in inspect.signature(function).parameters.items():
-            expanded = {"options": own, "to": where}.get(name)
-            told += [parameter.replace(annotation=hints[name])] if expanded is None else expanded
+            expanded = {"options": fields, "to": where}.get(name)
+            parameters += [parameter.replace(annotation=hints[name])] if expanded is None else expanded
 
         @functools.wraps(function)
         def wrapper(**given: Any) -> None:  # noqa: ANN401 - what typer has read
@@ -262,9 +262,9 @@ def command(
 
         wrapper.__doc__ = written_help(function)
         only = inspect.Parameter.KEYWORD_ONLY
-        told = _in_panels([parameter.replace(kind=only) for parameter in told], panels or {}, to)
-        wrapper.__signature__ = inspect.Signature(told)  # type: ignore[attr-defined]
-        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in told}
+        parameters = _in_panels([parameter.replace(kind=only) for parameter in parameters], panels or {}, to)
+        wrapper.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
         return wrapper
 
     return decorate
@@ -276,7 +276,7 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
     about = _documentation(work)
     first, *others = [name for name in inspect.signature(work).parameters if name != "options"]
 
-    def run(options: Any, to: Destination, **files: Any) -> None:  # noqa: ANN401 - of that kind
+    def deliver(options: Any, to: Destination, **files: Any) -> None:  # noqa: ANN401 - of that kind
         to.deliver(work.__name__, lambda: work(*(files[name] for name in (first, *others)), options))
 
     argument = typer.Argument(metavar=about[first].metavar, help=about[first].text)
@@ -286,36 +286,36 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
         hints[name] = Annotated[str, option]
     names = (*hints, "options", "to")
     parameters = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in names]
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = hints
-    made = command(kind, panels=getattr(kind, "panels", {}), to=WITH_REPORT)(run)
+    deliver.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    deliver.__annotations__ = hints
+    made = command(kind, panels=getattr(kind, "panels", {}), to=WITH_REPORT)(deliver)
     made.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
     return made
 
 
 def _in_panels(
-    told: Sequence[inspect.Parameter], panels: Mapping[str, str], to: Sequence[str]
+    parameters: Sequence[inspect.Parameter], panels: Mapping[str, str], to: Sequence[str]
 ) -> list[inspect.Parameter]:
     """Arguments, then options, panel by panel."""
     titles = {**panels, OUTPUT: " ".join((*to, panels.get(OUTPUT, "")))}
     panel_of = {name: title for title, names in titles.items() for name in names.split()}
     order = list(panel_of)
-    for parameter in told:
+    for parameter in parameters:
         declared = parameter.annotation.__metadata__[0]
         if isinstance(declared, OptionInfo):
             declared.rich_help_panel = panel_of.get(parameter.name, INPUT)
-    return sorted(told, key=lambda one: order.index(one.name) if one.name in panel_of else -1)
+    return sorted(parameters, key=lambda one: order.index(one.name) if one.name in panel_of else -1)
 
 
 def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind
     """The dataclass made of its fields among what typer has read; lists as tuples."""
-    found = {}
+    values = {}
     for field in dataclasses.fields(kind):
         value = given.pop(field.name, None)
-        found[field.name] = (
+        values[field.name] = (
             field.default if value is None else tuple(value) if isinstance(value, list) else value
         )
-    return kind(**found)
+    return kind(**values)
 
 
 def _parameters(
@@ -325,16 +325,16 @@ def _parameters(
     about = _documentation(kind)
     choices = getattr(sys.modules[kind.__module__], "choices", None)
     for field in dataclasses.fields(kind):
-        name, told = field.name, about[field.name]
-        found = _type(kind, str(field.type))
-        flag = (f"--{name.replace('_', '-')}",) if found is bool else ()  # without its --no-…
-        typed = names.get(name, told.flags or flag)
-        low = least.get(name, told.least)
-        option = typer.Option(*typed, metavar=told.metavar, help=told.text, min=low)
+        name, written = field.name, about[field.name]
+        taken = _type(kind, str(field.type))
+        flag = (f"--{name.replace('_', '-')}",) if taken is bool else ()  # without its --no-…
+        typed = names.get(name, written.flags or flag)
+        low = least.get(name, written.least)
+        option = typer.Option(*typed, metavar=written.metavar, help=written.text, min=low)
         default = None if field.default == () else field.default
         if field.default is dataclasses.MISSING:
             default = inspect.Parameter.empty
-        annotation: Any = Annotated[found if default is not None else found | None, option, choices]
+        annotation: Any = Annotated[taken if default is not None else taken | None, option, choices]
         yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
@@ -342,8 +342,8 @@ def _type(kind: type, annotation: str) -> Any:  # noqa: ANN401 - a type, for typ
     first = annotation.partition(" | ")[0]
     if first in _TYPES:
         return _TYPES[first]
-    known = getattr(sys.modules[kind.__module__], first, str)
-    return known if get_origin(known) is Literal else str
+    alias = getattr(sys.modules[kind.__module__], first, str)
+    return alias if get_origin(alias) is Literal else str
 
 
 def written_help(of: Any) -> str:  # noqa: ANN401 - a function or a class
@@ -365,11 +365,11 @@ class _Documented(NamedTuple):
 
 def _documentation(of: Any) -> dict[str, _Documented]:  # noqa: ANN401 - a function or a class
     """Of each parameter or attribute, from lines `name : FLAGS METAVAR from LEAST` and the indented below."""
-    found: dict[str, _Documented] = {}
+    entries: dict[str, _Documented] = {}
     name = ""
     for line in inspect.cleandoc(written_help(of)).partition("----------\n")[2].splitlines():
         if line.startswith(" "):
-            found[name] = found[name]._replace(text=f"{found[name].text} {line.strip()}".strip())
+            entries[name] = entries[name]._replace(text=f"{entries[name].text} {line.strip()}".strip())
         elif line:
             name, _, head = line.partition(" : ")
             typed, _, least = head.partition(" from ")
@@ -377,8 +377,8 @@ def _documentation(of: Any) -> dict[str, _Documented]:  # noqa: ANN401 - a funct
             if flags and not any(flag.startswith("--") for flag in flags):
                 flags.append(f"--{name.replace('_', '-')}")
             metavar = " ".join(word for word in typed.split() if not word.startswith("-"))
-            found[name] = _Documented(tuple(flags), metavar or None, float(least) if least else None, "")
-    return found
+            entries[name] = _Documented(tuple(flags), metavar or None, float(least) if least else None, "")
+    return entries
 
 
 def run(app: Callable[[], object]) -> None:

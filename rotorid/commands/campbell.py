@@ -95,8 +95,8 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     def frequencies(other: Rotor) -> FloatArray:
         return nearest_modes(whirl.frequencies, (whirl if other is model else solve(other)).frequencies)
 
-    std, said = error_band(model, "the frequencies", frequencies)
-    whirl = dataclasses.replace(whirl, std=std, warnings=(*whirl.warnings, *said))
+    std, doubts = error_band(model, "the frequencies", frequencies)
+    whirl = dataclasses.replace(whirl, std=std, warnings=(*whirl.warnings, *doubts))
     log_rotor(model, speeds=len(speeds), estimated_relative_error=whirl.error)
     beside: dict[str, Any] = {}
     if operating:

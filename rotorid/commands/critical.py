@@ -78,13 +78,13 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         n = options.number or int((speeds > 0).sum()) or 1
         mesh = fem.mesh_check(model, n) if options.mesh_check else None
         chart, left_out = _map(model, n) if options.speed_map else (None, [])
-    std, said = error_band(
+    std, doubts = error_band(
         model,
         "the critical speeds",
         lambda other: speeds if other is model else critical_speeds_near(other, speeds),
     )
     left_out += _stubby(model, modes)
-    modes = dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *said))
+    modes = dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *doubts))
     log_rotor(model)
     apart = None
     if operating:
@@ -174,27 +174,29 @@ def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
     import fem
 
     bearings = [support for support in model.supports if support.kind == "bearing"]
-    own = np.concatenate(
+    stiffnesses = np.concatenate(
         [np.zeros(1), *(b.at(b.speeds or 0.0)[0][..., [0, 1], [0, 1]].ravel() for b in bearings)]
     )
-    own = own[own > 0]
-    stiffness = np.geomspace(own.min() / 100, own.max() * 100, 49) if own.size else None
+    stiffnesses = stiffnesses[stiffnesses > 0]
+    stiffness = (
+        np.geomspace(stiffnesses.min() / 100, stiffnesses.max() * 100, 49) if stiffnesses.size else None
+    )
     chart = fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
     met = {item.support for item in chart.intersections}
-    said = []
+    remarks = []
     for i, support in enumerate(model.supports, start=1):
         name = repr(support.name) if support.name else f"{i} at node {support.node}"
         if support.kind == "seal":
-            said.append(f"map: seal {name} is left out, its stiffness is that of no bearing")
+            remarks.append(f"map: seal {name} is left out, its stiffness is that of no bearing")
         elif support.pedestal is not None:
-            said.append(
+            remarks.append(
                 f"map: bearing {name} stands on the ground there; of its pedestal the stiffness counts in "
                 "the bearing's own line, mass and damping are left out"
             )
     for i, bearing in enumerate(bearings, start=1):
         if (bearing.name or f"support {i}") not in met:
-            said.append(
+            remarks.append(
                 f"map: no critical speed meets the stiffness of bearing {bearing.name or i!r}: it has "
                 "none, or its table ends before"
             )
-    return chart, said
+    return chart, remarks

@@ -102,11 +102,11 @@ class Vibration:
         warnings = document.pop("warnings")
         at_support = self._largest(self.finer.bearing_forces().largest)
         readings = self._largest(self.finer.readings(self.sensors))
-        own = {} if self.std is None else {"amplitude_std_m": cell(self._asked(self.std).T)}
+        errors = {} if self.std is None else {"amplitude_std_m": cell(self._asked(self.std).T)}
         limit = self.limit()
         return {
             **document,
-            **own,
+            **errors,
             "orbits": self._orbits(),
             "largest": [
                 {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
@@ -119,8 +119,8 @@ class Vibration:
             },
             "peaks": [
                 {"sensor": name, **peak}
-                for name, found in zip(self.labels, self.peaks, strict=False)
-                for peak in found.to_dict()["peaks"]
+                for name, each in zip(self.labels, self.peaks, strict=False)
+                for peak in each.to_dict()["peaks"]
             ],
             **({"vibration_limit": limit} if limit else {}),
             "warnings": warnings,
@@ -342,13 +342,13 @@ def _rpm(where: Iterable[tuple[float | None, float | None]]) -> list[float | Non
     return [None if speed is None else speed * RPM for _, speed in where]
 
 
-def _peak_table(name: str, found: Sequence[tuple[str, Peak]], place: str = "") -> tuple[Table, ...]:
+def _peak_table(name: str, named: Sequence[tuple[str, Peak]], place: str = "") -> tuple[Table, ...]:
     """The peaks, at this place of the document; none without any."""
     import fem
 
-    if not found:
+    if not named:
         return ()
-    sensors, peaks = zip(*found, strict=True)
+    sensors, peaks = zip(*named, strict=True)
     columns = (
         dataclasses.replace(column, key=place and key and f"{place}.*.{key}", scale=scale)
         for column, key, scale in zip(
@@ -421,7 +421,6 @@ def response(
     import fem
     from fem.model.sensors import as_sensor
     from fem.parameter_bands import band as error_band
-    from fem.response import response_from_rest
     from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 
@@ -442,20 +441,20 @@ def response(
         files = (*files, table)
         unbalance = read_unbalance(table, model)
     with phase(f"response at {counted(len(speeds), 'speed')}"):
-        found = response_from_rest(model, unbalance, speeds, [*kept])
+        coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
     with phase("peaks"):
-        finer, peaks = fem.resolve_peaks(found, places, operating=operating)
+        finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
 
     def amplitudes(other: Rotor) -> FloatArray:
         new = other is not model
-        found = response_from_rest(other, unbalance, finer.speeds, [*kept]) if new else finer
-        return np.abs(found.readings(places))
+        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
+        return np.abs(again.readings(places))
 
-    std, said = error_band(model, "the amplitudes", amplitudes)
-    finer = dataclasses.replace(finer, warnings=(*finer.warnings, *said))
+    std, doubts = error_band(model, "the amplitudes", amplitudes)
+    finer = dataclasses.replace(finer, warnings=(*finer.warnings, *doubts))
     log_rotor(model, speeds=len(speeds))
     result = Vibration(
-        response=dataclasses.replace(found, windows=finer.windows, warnings=finer.warnings),
+        response=dataclasses.replace(coarse, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
         std=std,
         sensors=places,
@@ -464,7 +463,7 @@ def response(
     )
     at = None if options.at is None else _nearest(finer, options.at)
     chief, every = fem.critical_peaks(result.labels, peaks), result.named()
-    mounted = unbalance_table(model, found.unbalance)
+    mounted = unbalance_table(model, coarse.unbalance)
     return Outcome(
         result=result,
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
@@ -473,7 +472,7 @@ def response(
             mounted,
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
-            *result.shape(at),
+            *(result.shape(at) if options.view == "shape" else ()),
         ),
         behind=(result.readings(),),
         file=result.file(),
@@ -484,7 +483,7 @@ def response(
         ),
         pictures=result.pictures(options.view, at),
         title="Unbalance response",
-        rotor={"rotor": model, "planes": sorted(found.unbalance), "sensors": places, "meaning": "unbalance"},
+        rotor={"rotor": model, "planes": sorted(coarse.unbalance), "sensors": places, "meaning": "unbalance"},
         provenance=provenance(files, options, **asked),
     )
 

@@ -54,7 +54,7 @@ def rotor_page(
         title=title,
         warnings=[*every_warning(document), *notes],
         provenance=provenance,
-        said=sentences,
+        sentences=sentences,
         about=[("Rotor file", str(entry["file"])) for entry in provenance["inputs"][:1]],
         rotor=rotor_sheet(**rotor),
         parts=[
