@@ -143,12 +143,12 @@ class Campbell(Answered):
         at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
         ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
         criticals = (
-            Told("speed_rad_s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
-            Told("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
             Told("mode", self.critical_modes, key=at + "mode"),
-            Told("log_decrement", decrements, "{:.4f}".format, at + "log_decrement"),
-            Told("direction", ways),
-            Told("heavily_damped", decrements > HEAVY, _no_peak),
+            Told("whirl", ways, key=at + "direction"),
+            Told("rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Told("rad/s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Told("log dec", decrements, "{:z.4f}".format, at + "log_decrement"),
+            Told("", decrements > HEAVY, _no_peak),
         )
         S, n = self.frequencies.shape
         modes = (

@@ -128,18 +128,10 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
             f"speeds by at most {percent(changes[1])} %."
         )
     criticals, every = whirl.tables()
-    shown = {
-        "mode": "mode",
-        "direction": "whirl",
-        "speed_rpm": "rpm",
-        "speed_rad_s": "rad/s",
-        "log_decrement": "log dec",
-        "heavily_damped": "",
-    }
     return Outcome(
         result=whirl,
         sentences=tuple(sentences),
-        tables=(criticals.only(shown),) if whirl.critical_speeds.size else (),
+        tables=(criticals,) if whirl.critical_speeds.size else (),
         more=(
             *(table.under(key) for key, part in beside.items() for table in part.tables()),
             *(_at(whirl, s) for s in dict.fromkeys((0, len(speeds) - 1))),

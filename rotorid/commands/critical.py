@@ -92,24 +92,15 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         doubt = fem.unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
         apart = fem.Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
     table, shapes = modes.tables()
-    map_tables = chart.tables() if chart else ()
     beside = {"operating": apart, "mesh_check": mesh, "map": chart}
     asked = {key: result for key, result in beside.items() if result is not None}
     return Outcome(
         result=modes,
         sentences=(modes.sentence(), *(part.sentence() for part in asked.values())),
-        tables=(table, *map_tables[1:2]),
-        more=(
-            *(
-                one
-                for key, part in asked.items()
-                if key != "map"
-                for one in (table.under(key) for table in part.tables())
-            ),
-            *map_tables[2:],
-        ),
+        tables=(table,),
+        more=tuple(one.under(key) for key, part in asked.items() for one in part.tables()[:1]),
         behind=(shapes.only({name: _plain(name) for name in shapes.headings}),),
-        file=map_tables[0] if chart else shapes,
+        file=chart.tables()[-1] if chart else shapes,
         keys={**modes.to_dict(), **{key: part.to_dict() for key, part in asked.items()}},
         warnings=modes.warnings,
         notes=(modes.cut,) if modes.cut else (),
@@ -182,7 +173,6 @@ def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
         np.geomspace(stiffnesses.min() / 100, stiffnesses.max() * 100, 49) if stiffnesses.size else None
     )
     chart = fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
-    met = {item.support for item in chart.intersections}
     remarks = []
     for i, support in enumerate(model.supports, start=1):
         name = repr(support.name) if support.name else f"{i} at node {support.node}"
@@ -192,11 +182,5 @@ def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
             remarks.append(
                 f"map: bearing {name} stands on the ground there; of its pedestal the stiffness counts in "
                 "the bearing's own line, mass and damping are left out"
-            )
-    for i, bearing in enumerate(bearings, start=1):
-        if (bearing.name or f"support {i}") not in met:
-            remarks.append(
-                f"map: no critical speed meets the stiffness of bearing {bearing.name or i!r}: it has "
-                "none, or its table ends before"
             )
     return chart, remarks

@@ -230,8 +230,8 @@ class Vibration:
             "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
             "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
         }
-        asked = dict([draw[view]])
-        return asked if view == "shape" or not finer.steady.any() else asked | dict([draw["shape"]])
+        others = ("bode", "shape") if finer.steady.any() else ("bode",)
+        return dict(draw[name] for name in (view, *others))
 
     def shape_figure(self, at: int | None) -> Figure:
         """The deflected rotor at a speed."""

@@ -59,7 +59,7 @@ def rotor_page(
         rotor=rotor_sheet(**rotor),
         parts=[
             Part("Result", (), tuple(first), drawings),
-            Part("Behind it", (), tuple(part for table in others for part in _narrow(table))),
+            *(Part("" if k else "Behind it", (), _narrow(table)) for k, table in enumerate(others)),
         ],
     )
 
