@@ -243,7 +243,19 @@ def api_unbalance(load: float, speed: float) -> float:
 
 
 def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Told, ...]:
-    """The table of peaks, amplitudes times `scale` with the name of their unit."""
+    """The table of peaks: speed, amplitude, amplification factor, margins, verdict.
+
+    Parameters
+    ----------
+    peaks
+        One a row.
+    unit, scale
+        Of the amplitudes: its name, and what one of the curve's is in it.
+
+    Returns
+    -------
+    Columns of a `rotorid.base.tables.Table`.
+    """
     one = "{:.1f}".format
     sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
     words = {True: "enough", False: "NOT ENOUGH", None: None}
@@ -263,6 +275,15 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
 
     Peaks of different readings belong to one critical speed where each lies in the half-power band of the
     other. Shown is one that is not far enough, if any, else the largest with an amplification factor.
+
+    Parameters
+    ----------
+    names, peaks
+        Of each reading: its name and its peaks.
+
+    Returns
+    -------
+    Name of the reading and peak, by rising speed.
     """
     groups: list[list[tuple[str, Peak]]] = []
     every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
@@ -291,7 +312,18 @@ def _one_critical(one: Peak, other: Peak) -> bool:
 def open_question(peaks: Iterable[Peak], first: float, last: float, operating: tuple[float, float]) -> str:
     """Why one cannot say that all critical speeds are far enough from the operating range, and what to do.
 
-    Empty where one can. Speeds were searched from `first` to `last`; all in rad/s.
+    Parameters
+    ----------
+    peaks
+        One of each critical speed.
+    first, last
+        Between which speeds was searched, rad/s.
+    operating
+        Operating range, rad/s.
+
+    Returns
+    -------
+    Clauses; empty where one can say it.
     """
     uncertain = [peak for peak in peaks if peak.open]
     reasons = [_unsearched(first, last, operating)]

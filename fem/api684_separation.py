@@ -14,7 +14,17 @@ from rotorid.base.text import listing, table
 
 @dataclass(frozen=True)
 class Separation(Answered):
-    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
+    """Critical speeds beside the operating range, and why more may lie in it.
+
+    Attributes
+    ----------
+    speeds
+        Critical speeds, rad/s.
+    operating
+        Lowest and highest operating speed, rad/s.
+    doubt
+        Why more may lie in the range; else empty.
+    """
 
     speeds: Iterable[float]
     operating: tuple[float, float]
@@ -68,7 +78,19 @@ class Separation(Answered):
 
 
 def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:
-    """What keeps one from saying that nothing is in an operating range: speeds that were not searched."""
+    """What keeps one from saying that nothing is in an operating range: speeds that were not searched.
+
+    Parameters
+    ----------
+    first, last
+        Between which speeds was searched, rad/s.
+    operating
+        Operating range, rad/s; None: there is none.
+
+    Returns
+    -------
+    A clause; empty where all of the range was searched.
+    """
     if operating is None or (first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6)):
         return ""
     return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"
