@@ -11,7 +11,8 @@ separation margin, in percent of the nearest operating speed, must be at least
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,11 +21,14 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import RPM
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.tables import Column as Told
+from rotorid.base.text import listing
 
 if TYPE_CHECKING:
     import pandas as pd
 
+LARGEST = (16.0, 26.0)  # percent: margins that are enough whatever the amplification, below and above
 HALF_POWER = float(np.sqrt(0.5))
 _UNDAMPED = 1e5  # an AF beyond which damping is none
 UNLIMITED = 1e300  # amplitude of what nothing limits; infinities have no differences
@@ -72,6 +76,11 @@ class Peak:
             return None
         return self.required == 0 or self.margin >= self.required
 
+    @property
+    def open(self) -> bool:
+        """Whether the margin may be too small although its amplification factor is not known."""
+        return self.enough is None and (self.margin is None or self.margin < LARGEST[1])
+
 
 @dataclass(frozen=True)
 class Peaks:
@@ -97,7 +106,7 @@ class Peaks:
         return frame(self._columns())
 
     def _columns(self) -> tuple[Column, ...]:
-        rpm, speed, *rest = peak_columns(self.peaks)
+        rpm, speed, *rest = _columns_of(self.peaks)
         return (speed, rpm, *rest)
 
     def summary(self, unit: str = "", scale: float = 1.0) -> str:
@@ -105,10 +114,10 @@ class Peaks:
         if not self.peaks:
             return "no peak in this range of speeds"
         notes = [f"    {p.speed * RPM:.2f} rpm: {p.note}" for p in self.peaks if p.note]
-        return "\n".join([text(peak_columns(self.peaks, unit, scale)), *notes])
+        return "\n".join([text(_columns_of(self.peaks, unit, scale)), *notes])
 
 
-def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
+def _columns_of(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
     """The table of peaks, amplitudes times `scale` with the name of their unit."""
     one = "{:.1f}".format
     sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
@@ -186,6 +195,162 @@ def required_margin(amplification: float, *, above: bool) -> float:
         return 0.0
     margin = 17 * (1 - 1 / (AF - 1.5))
     return min(26.0, 10 + margin) if above else min(16.0, margin)
+
+
+def api617_limit(speed: float) -> float:
+    """Limit of shaft vibration by API 617 (7th edition, 2002), 25.4 √(12,000 / N) µm with N in rpm.
+
+    Parameters
+    ----------
+    speed
+        Highest continuous speed, rad/s, above 0.
+
+    Returns
+    -------
+    Displacement, m peak to peak: twice the amplitudes of a `Response`. In the shop test the standard allows
+    no more than 25.4 µm at lower speeds either; this is not part of the number.
+
+    Examples
+    --------
+    >>> round(1e6 * api617_limit(12000 / RPM), 9)
+    25.4
+    """
+    return 25.4e-6 * math.sqrt(12000.0 / (speed * RPM))
+
+
+def api_unbalance(load: float, speed: float) -> float:
+    """Unbalance for a damped response analysis, 4 W / N oz·in with W in lb: 6,350 W / N g·mm with W in kg.
+
+    As in API 617 (7th edition, 2002) and API 684 (2nd edition, 2005), which put it at each plane of the mode.
+
+    Parameters
+    ----------
+    load
+        Static load of the journal next to the plane, or the mass of an overhang, W, kg.
+    speed
+        Highest continuous speed, rad/s, above 0.
+
+    Returns
+    -------
+    kg·m in one plane.
+
+    Examples
+    --------
+    >>> round(1e6 * api_unbalance(200.0, 6350 / RPM), 9)  # g·mm
+    200.0
+    """
+    return 6350e-6 * load / (speed * RPM)
+
+
+def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Told, ...]:
+    """The table of peaks: speed, amplitude, amplification factor, margins, verdict.
+
+    Parameters
+    ----------
+    peaks
+        One a row.
+    unit, scale
+        Of the amplitudes: its name, and what one of the curve's is in it.
+
+    Returns
+    -------
+    Columns of a `rotorid.base.tables.Table`.
+    """
+    one = "{:.1f}".format
+    sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
+    words = {True: "enough", False: "NOT ENOUGH", None: None}
+    return (
+        Told("rpm", [p.speed * RPM for p in peaks], "{:.2f}".format),
+        Told("rad/s", [p.speed for p in peaks], "{:.4f}".format),
+        Told(f"amplitude, {unit} peak" if unit else "amplitude", sizes, "{:.4g}".format),
+        Told("AF", [p.amplification for p in peaks], "{:.2f}".format),
+        Told("margin, %", [p.margin for p in peaks], one),
+        Told("required, %", [p.required for p in peaks], one),
+        Told("", [words[p.enough] for p in peaks]),
+    )
+
+
+def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[str, Peak]]:
+    """One peak of each critical speed, ascending, with the name of the reading that shows it.
+
+    Peaks of different readings belong to one critical speed where each lies in the half-power band of the
+    other. Shown is one that is not far enough, if any, else the largest with an amplification factor.
+
+    Parameters
+    ----------
+    names, peaks
+        Of each reading: its name and its peaks.
+
+    Returns
+    -------
+    Name of the reading and peak, by rising speed.
+    """
+    groups: list[list[tuple[str, Peak]]] = []
+    every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
+    for name, peak in sorted(every, key=lambda one: one[1].speed):
+        last = groups[-1] if groups else []
+        if last and name not in dict(last) and _one_critical(last[-1][1], peak):
+            last.append((name, peak))
+        else:
+            groups.append([(name, peak)])
+
+    def rank(one: tuple[str, Peak]) -> tuple[bool, bool, float]:
+        peak = one[1]
+        return peak.enough is not False, peak.amplification is None, -peak.amplitude
+
+    return [min(group, key=rank) for group in groups]
+
+
+def _one_critical(one: Peak, other: Peak) -> bool:
+    widths = (
+        max([1e-3 * peak.speed, *(abs(end - peak.speed) for end in (peak.below, peak.above) if end)])
+        for peak in (one, other)
+    )
+    return abs(one.speed - other.speed) <= min(widths)
+
+
+def open_question(peaks: Iterable[Peak], first: float, last: float, operating: tuple[float, float]) -> str:
+    """Why one cannot say that all critical speeds are far enough from the operating range, and what to do.
+
+    Parameters
+    ----------
+    peaks
+        One of each critical speed.
+    first, last
+        Between which speeds was searched, rad/s.
+    operating
+        Operating range, rad/s.
+
+    Returns
+    -------
+    Clauses; empty where one can say it.
+    """
+    uncertain = [peak for peak in peaks if peak.open]
+    reasons = [_unsearched(first, last, operating)]
+    if uncertain:
+        where = listing([rpm_text(peak.speed) for peak in uncertain], "and")
+        reasons.insert(0, f"no amplification factor at {where}")
+    # A half-power band that is wider than this is critically damped.
+    share = 1 / 2.5
+    low = min(
+        [operating[0] * (1 - LARGEST[0] / 100), *((1 - share) * p.speed for p in uncertain if not p.below)]
+    )
+    high = max(
+        [operating[1] * (1 + LARGEST[1] / 100), *((1 + share) * p.speed for p in uncertain if not p.above)]
+    )
+    if not any(reasons):
+        return ""
+    if low < first or last < high:
+        what = f"give speeds from {min(low, first) * RPM:.0f} to {max(high, last) * RPM:.0f} rpm"
+    else:
+        what = "judge it by a sensor that shows the peak alone"
+    return "; ".join(filter(None, [*reasons, what]))
+
+
+def _unsearched(first: float, last: float, operating: tuple[float, float]) -> str:
+    if first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6):
+        return ""
+    return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"
 
 
 def _peak(

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 from fem.campbell_modes import followed_closely, runs_away, swings, went_above
 from fem.growth import Growing, growing, joined
 from fem.growth_check import growth_bound, judge
+from fem.mesh import refined
 from fem.model.rotor import Rotor, whole
 from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.parameter_bands import nearest_modes
 from fem.solvers.crossing import crossings, off_synchronous
 from fem.solvers.mode_tracking import Followed
 from fem.solvers.reduced_whirl import Whirl
@@ -25,6 +27,8 @@ from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.tables import Column as Told
+from rotorid.base.tables import Table
 from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
@@ -70,6 +74,8 @@ class Campbell(Answered):
         What the list of critical speeds leaves out because only n modes were asked for; else empty.
     std
         Standard deviations of `frequencies`, from the calibration of the rotor; None without.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped.
     """
 
     speeds: FloatArray
@@ -87,6 +93,7 @@ class Campbell(Answered):
     windows: tuple[Window, ...] = ()
     cut: str = ""
     std: FloatArray | None = None
+    heavy: float = 6.0
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -130,6 +137,42 @@ class Campbell(Answered):
                 Column("direction", self._ways().ravel()),
             )
         )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The damped critical speeds; and the modes at each speed."""
+        at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
+        ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
+        criticals = (
+            Told("mode", self.critical_modes, key=at + "mode"),
+            Told("whirl", ways, key=at + "direction"),
+            Told("rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Told("rad/s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Told("log dec", decrements, "{:z.4f}".format, at + "log_decrement"),
+            Told("", decrements > HEAVY, _no_peak),
+        )
+        S, n = self.frequencies.shape
+        modes = (
+            Told("speed_rad_s", np.repeat(self.speeds, n)),
+            Told("mode", np.tile(np.arange(1, n + 1), S)),
+            Told("frequency_rad_s", self.frequencies.ravel()),
+            *(Told("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
+            Told("log_decrement", self.log_decrements.ravel()),
+            Told("direction", self._ways().ravel()),
+        )
+        return (Table("damped critical speeds", criticals), Table("modes", modes))
+
+    def mesh_change(self) -> tuple[float, float]:
+        """Largest relative change of frequencies and of damped critical speeds on elements cut in two."""
+        halved = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1])
+        other = nearest_modes(self.frequencies, halved.frequencies)
+        light = self.log_decrements <= self.heavy
+        change = np.abs(other / self.frequencies - 1)[light]
+        apart = np.abs(halved.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
+        return float(np.nanmax(change, initial=0.0)), float(apart.max(initial=0.0))
+
+    def sentence(self) -> str:
+        """Whether it is stable, and how many damped critical speeds there are."""
+        return self.answer.judgement
 
     @property
     def answer(self) -> Answer:
@@ -181,7 +224,7 @@ class Campbell(Answered):
         return words
 
 
-def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
+def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: float = 6.0) -> Campbell:
     """Compute whirl frequencies, logarithmic decrements and directions over speed.
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
@@ -199,6 +242,8 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
         rad/s, ascending, shape (S,).
     n
         How many modes, by default 6; forward and backward whirl count apart. Where the model has fewer, all.
+    heavy
+        Logarithmic decrement above which a mode is heavily damped.
 
     Raises
     ------
@@ -265,6 +310,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
         unstable=unstable,
         windows=windows,
         cut=_cut(whirl, paths, columns),
+        heavy=heavy,
     )
 
 

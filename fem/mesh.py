@@ -14,6 +14,8 @@ from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column as Told
+from rotorid.base.tables import Table
 from rotorid.base.text import counted, percent, sentence
 
 if TYPE_CHECKING:
@@ -64,6 +66,20 @@ class MeshCheck(Answered):
             Column("relative_error", self.errors, "{:.1e}".format, "error of the mesh"),
             Column("rate", self.rates, "{:.2f}".format, "rate (none: rounding)"),
         )
+
+    def tables(self) -> tuple[Table, ...]:
+        """The errors, a row for each critical speed."""
+        columns = (
+            Told("mode", range(1, self.rates.size + 1)),
+            Told("rpm", self.frequencies * RPM, "{:.2f}".format, "frequencies_rad_s.*", RPM),
+            Told("error of the mesh", self.errors, "{:.1e}".format, "relative_error.*"),
+            Told("rate (none: rounding)", self.rates, "{:.2f}".format, "rate.*"),
+        )
+        return (Table("errors of the mesh", columns),)
+
+    def sentence(self) -> str:
+        """Whether the mesh is fine enough."""
+        return self.answer.judgement
 
     @property
     def answer(self) -> Answer:

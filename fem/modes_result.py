@@ -117,6 +117,10 @@ class Modes(Answered):
         """One row per node: number, position and the deflection in each mode."""
         return frame(self.tables()[1])
 
+    def sentence(self) -> str:
+        """How many there are, and the first."""
+        return self.answer.judgement
+
     @property
     def answer(self) -> Answer:
         """The critical speeds, in rpm, Hz and rad/s."""

@@ -58,6 +58,11 @@ def unbalance_response(
         bearing table, or for a mesh too fine for float64.
     """
     speeds = checked_speeds(speeds)
+    if speeds.size > 1 and speeds[0] == 0 and (np.diff(speeds) > 0).all():
+        rest = all(not support.speeds or support.speeds[0] == 0 for support in rotor.supports)
+        if rest:
+            every = range(1, rotor.n_nodes + 1) if nodes is None else nodes
+            return response_from_rest(rotor, unbalance, speeds, every)
     kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
     masses: dict[int, complex] = {}
     for key, value in dict(unbalance).items():

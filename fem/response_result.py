@@ -16,6 +16,8 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray,
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
+from rotorid.base.tables import Column as Told
+from rotorid.base.tables import Table
 from rotorid.base.text import counted, figures
 
 if TYPE_CHECKING:
@@ -173,7 +175,7 @@ class Response(Answered):
         if k is None:
             return "No steady response at any of these speeds."
         size, node = 1e6 * self.largest[k], self.largest_node[k]
-        return f"Largest amplitude {size:.4g} µm at node {node}, {rpm_text(self.speeds[k])}."
+        return f"Largest amplitude {size:.4g} µm peak at node {node}, {rpm_text(self.speeds[k])}."
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,6 +282,41 @@ class InfluenceCoefficients(Answered):
             Column("plane", list(self.planes) * (S * C)),
             *polar(influence, phase, self.W),
         )
+
+    def tables(self) -> tuple[Table, ...]:
+        """Where the coefficients are largest, if there is a steady response; and all of them."""
+        _, C, P = self.W.shape
+        steady = ~within(self.windows, self.speeds)
+        one = (
+            Told("speed_rad_s", np.repeat(self.speeds, C * P), "{:.6g}".format, "rows.*.speed"),
+            Told(
+                "sensor", [label(sensor) for sensor in self.sensors for _ in self.planes] * self.speeds.size
+            ),
+            Told("plane", list(self.planes) * (self.speeds.size * C)),
+            Told("influence_m_per_kg_m", np.abs(self.W).ravel(), "{:.4g}".format, "rows.*.influence"),
+            Told("phase_deg", phase_deg(self.W).ravel(), "{:.2f}".format, "rows.*.phase"),
+        )
+        every = Table("influence coefficients", one)
+        if not steady.any():
+            return (every,)
+        sizes, speeds = np.abs(self.W[steady]).reshape(-1, C * P), self.speeds[steady]
+        largest = sizes.argmax(axis=0)
+        columns = [
+            Told("sensor", [str(label(sensor)) for sensor in self.sensors for _ in self.planes]),
+            Told("plane", [str(plane) for plane in self.planes] * C),
+            Told("µm per g·mm", sizes.max(axis=0), "{:.4g}".format),
+        ]
+        if speeds.size == 1:
+            columns.append(Told("phase lead, deg", phase_deg(self.W[steady].ravel()), "{:.2f}".format))
+        else:
+            columns.append(Told("at rpm", speeds[largest] * RPM, "{:.6g}".format))
+            columns.append(Told("rad/s", speeds[largest], "{:.6g}".format))
+            columns.append(Told("least", sizes.min(axis=0), "{:.4g}".format))
+        return (Table("largest influence coefficients", tuple(columns)), every)
+
+    def sentence(self) -> str:
+        """Of what they are, and the largest."""
+        return self.answer.judgement
 
     @property
     def answer(self) -> Answer:

@@ -101,7 +101,7 @@ class SpeedMap(Answered):
             }
         )
 
-    def tables(self) -> tuple[Table, ...]:
+    def _tables(self) -> tuple[Table, ...]:
         """The map, a row for each stiffness; where the supports' own stiffness meets it; its limits."""
         met, rpm = self.intersections, "{:.2f}".format
         chart = (
@@ -118,8 +118,8 @@ class SpeedMap(Answered):
         )
         limits = (
             Column("mode", range(1, self.free.size + 1)),
-            Column("free supports, rpm", self.free * RPM, rpm),
-            Column("pinned, rpm", self.pinned * RPM, rpm),
+            Column("free supports, rpm", self.free * RPM, rpm, "free_rad_s.*", RPM),
+            Column("pinned, rpm", self.pinned * RPM, rpm, "pinned_rad_s.*", RPM),
         )
         return (
             Table("map", chart),
@@ -127,15 +127,24 @@ class SpeedMap(Answered):
             Table("limits of soft and of stiff supports", limits),
         )
 
+    def tables(self) -> tuple[Table, ...]:
+        """The limits of the critical speeds; and the map, a row for each stiffness."""
+        chart, _, limits = self._tables()
+        return limits, chart
+
     def to_frame(self) -> pd.DataFrame:
         """One row per stiffness, one column per critical speed."""
-        return frame(self.tables()[0])
+        return frame(self.tables()[1])
+
+    def sentence(self) -> str:
+        """What the map is of."""
+        return self.answer.judgement
 
     @property
     def answer(self) -> Answer:
         """Where the supports' own stiffness meets the map; behind it the limits of each critical speed."""
         low, high = self.stiffness[0], self.stiffness[-1]
-        _, meetings, limits = self.tables()
+        _, meetings, limits = self._tables()
         return Answer(
             f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each.",
             terminal(meetings),

@@ -14,10 +14,21 @@ from fem.plots.bode import draw_bode, draw_polar
 from fem.plots.drawing import draw_rotor
 from fem.plots.orbit_paths import MOST_ORBITS, draw_orbits
 from rotorid.base.arrays import FloatArray
-from rotorid.base.plot_style import COLORS, MARKERS, QUIET, look, new_figure, on_figure, shade_bands
+from rotorid.base.plot_style import (
+    COLORS,
+    MARKERS,
+    QUIET,
+    legend_above,
+    look,
+    new_axes,
+    new_figure,
+    on_figure,
+    shade_bands,
+)
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from fem.api684_peaks import Peaks
@@ -100,6 +111,30 @@ def orbits_figure(response: Response, sensors: Sequence[SensorLike], k: int) -> 
     labels = [f"node {name}" if isinstance(name, int) else name for name in names]
     draw_orbits(response.x[k, index], response.y[k, index], labels, below, title=title)
     return figure
+
+
+def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> Axes:
+    """Draw the deflected shape of the rotor at speed k, from 0, of a response of all nodes.
+
+    The larger half axis of each node's orbit, µm peak, with the sign of its motion in the phase of the node
+    that moves most, over the rotor.
+    """
+    ax = new_axes() if ax is None else ax
+    amplitude, phase = response.major[k], np.angle(response.amplitudes[k])
+    shape = 1e6 * amplitude * np.where(np.cos(phase - phase[np.argmax(amplitude)]) < 0, -1.0, 1.0)
+    largest = float(np.abs(shape).max())
+    draw_rotor(response.rotor, ax, height=0.22 * largest)
+    ax.plot(response.rotor.positions[response.nodes - 1], shape, color=COLORS[0], linewidth=2.2, marker="o",
+            markersize=4, zorder=5)  # fmt: skip
+    ax.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
+    omega = response.speeds[k]
+    ax.set(
+        xlabel="position, m",
+        ylabel=f"deflection at {omega * RPM:.0f} rpm, µm peak",
+        ylim=(-1.12 * largest, 1.12 * largest),
+    )
+    legend_above(ax, 2, marker_scale=0.6)
+    return ax
 
 
 def _labels(sensors: Sequence[SensorLike]) -> list[str]:

@@ -23,8 +23,8 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,6 +44,8 @@ LONGEST_TITLE = 31
 """Characters of the name of a sheet in a workbook."""
 NARROW, LETTERS = 6, 50
 """Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
+LONG, THINNED = 60, 13
+"""Rows of a table that a page shows whole, and of a longer one so many."""
 NOTHING = "\N{EN DASH}"
 """In HTML, where nothing is known."""
 
@@ -121,6 +123,17 @@ class Table:
         if len({len(column.values) for column in self.columns}) != 1:
             raise ValueError(f"the table {self.name!r} must have columns of one length")
 
+    def under(self, place: str) -> Table:
+        """The same, of a result that stands at this place of a document."""
+        moved = (replace(each, key=each.key and f"{place}.{each.key}") for each in self.columns)
+        return replace(self, columns=tuple(moved))
+
+    def only(self, headings: Mapping[str, str]) -> Table:
+        """Some of the columns, in this order, with other headings."""
+        columns = {each.heading: each for each in self.columns}
+        some = (replace(columns[name], heading=shown) for name, shown in headings.items())
+        return replace(self, columns=tuple(some))
+
     @property
     def headings(self) -> list[str]:
         """Of the columns."""
@@ -133,9 +146,12 @@ class Table:
 
 
 def terminal(table: Table, width: int = WIDTH) -> str:
-    """Aligned text: numbers to the right, but for those before a column of words."""
+    """Aligned text: words and the first column to the left, other numbers to the right."""
     left = max([1, *(k for k, column in enumerate(table.columns, start=1) if column.words)])
     texts = [[column.heading, *column.texts] for column in table.columns]
+    for column, cells in list(zip(table.columns, texts, strict=True))[1:left]:
+        wide = 0 if column.words else max(map(len, cells))
+        cells[:] = [cell.rjust(wide) for cell in cells]
     return aligned([list(row) for row in zip(*texts, strict=True)], left, width)
 
 
@@ -207,9 +223,15 @@ class _Archive(zipfile.ZipFile):
 
 
 def html(table: Table) -> Markup:
-    """A table of HTML: numbers with their place in the JSON document as `data-key`; `blocks` if wide."""
+    """A table of HTML: numbers with their place in the JSON document as `data-key`; `blocks` if wide.
+
+    Of a long one some rows, evenly spread.
+    """
     from markupsafe import Markup
 
+    count = len(table.columns[0].values)
+    rows = evenly(count, count if count <= LONG else THINNED)
+    notes = [table.note, f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""]
     shown = [[column.heading, *(text or NOTHING for text in column.texts)] for column in table.columns]
     wide = len(shown) > NARROW or sum(max(map(len, texts)) for texts in shown) > LETTERS
     numbers = [Markup("") if column.words else Markup(' class="n"') for column in table.columns]
@@ -219,7 +241,7 @@ def html(table: Table) -> Markup:
     cells = [
         [
             Markup('<td{} data-label="{}">{}</td>').format(number, column.heading, text)
-            for text in _cells(column)
+            for text in _cells(column, rows)
         ]
         for number, column in zip(numbers, table.columns, strict=True)
     ]
@@ -227,22 +249,25 @@ def html(table: Table) -> Markup:
         Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*cells, strict=True)
     )
     kind = Markup(' class="blocks"') if wide else Markup("")
-    note = Markup('\n<p class="note">{}</p>').format(table.note) if table.note else Markup("")
+    words = " ".join(filter(None, notes))
+    note = Markup('\n<p class="note">{}</p>').format(words) if words else Markup("")
     return Markup(
         "<table{}>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>{}"
     ).format(kind, table.name, heads, body, note)
 
 
-def _cells(column: Column) -> list[Markup]:
+def _cells(column: Column, rows: Sequence[int]) -> list[Markup]:
     from markupsafe import Markup, escape
 
+    shown = column.texts
+    texts = [shown[row] or NOTHING for row in rows]
     if column.words:
-        return [escape(text or NOTHING) for text in column.texts]
-    texts = [text.replace("-", "\N{MINUS SIGN}") or NOTHING for text in column.texts]
+        return [escape(text) for text in texts]
+    texts = [text.replace("-", "\N{MINUS SIGN}") for text in texts]
     if not column.key:
         return [escape(text) for text in texts]
     factor = Markup("") if column.scale == 1.0 else Markup(' data-scale="{}"').format(repr(column.scale))
-    places = [column.key.replace("*", str(row)) for row in range(len(texts))]
+    places = [column.key.replace("*", str(row)) for row in rows]
     return [
         Markup('<span data-key="{}"{}>{}</span>').format(place, factor, text)
         for place, text in zip(places, texts, strict=True)
@@ -296,3 +321,16 @@ def one_line(text: str) -> str:
     if re.search(r"[\x00-\x1f\x7f]", line):
         raise ValueError(f"text with control characters cannot be written to a table: {text!r}")
     return line
+
+
+def evenly(n: int, most: int) -> list[int]:
+    """At most so many of n indices, evenly spread, the first and the last among them.
+
+    Examples
+    --------
+    >>> evenly(4, 12), evenly(281, 6)
+    ([0, 1, 2, 3], [0, 56, 112, 168, 224, 280])
+    """
+    if n <= most:
+        return list(range(n))
+    return [round(i * (n - 1) / (most - 1)) for i in range(most)]

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import os
-import sys
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import typer
 
-from rotorid.base.answer import COLUMNS, kinds
+from rotorid.base.answer import COLUMNS
 from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
     bearings,
     calibrate,
-    campbell,
-    critical,
     demo,
     fit,
     identify,
-    influence,
     modes,
     motion,
     periodic,
     reduce,
-    response,
     runup,
     schema,
     simulate,
@@ -37,12 +28,13 @@ from rotorid.cli.commands import (
     unbalance,
     vectors,
 )
-from rotorid.cli.common_options import written_help
 from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
-from rotorid.cli.terminal import markup_mode
-from rotorid.cli.verbose import verbosely
 from rotorid.cli.worksheet import worksheet
+from rotorid.commands import campbell, critical, influence, response
+from rotorid.commands.app import run, typer_command, written_help
+from rotorid.commands.terminal import markup_mode
+from rotorid.commands.verbose import verbosely
 
 app = typer.Typer(
     name="rotorid",
@@ -64,10 +56,10 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "fleet": fleet,
     },
     "Compute rotors": {
-        "critical": critical.critical,
-        "campbell": campbell.campbell,
-        "response": response.response,
-        "influence": influence.influence,
+        "critical": typer_command(critical),
+        "campbell": typer_command(campbell),
+        "response": typer_command(response),
+        "influence": typer_command(influence),
         "study": study,
     },
     "Reduce rotors, let them move": {
@@ -146,62 +138,5 @@ def _overview() -> str:
 
 
 def main() -> None:
-    """Run the command line; the exit status is 2 for bad input or usage, with one message, no traceback."""
-    if sys.stderr is None:  # print would take standard output instead
-        sys.stderr = io.StringIO()
-    if sys.stdout is None:  # the caller closed it: a result that nobody can read is no success
-        sys.exit(_complain(OSError("standard output is closed: there is nowhere to print the result")))
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # an old code page has no arrows or signs of degrees
-            stream.reconfigure(errors="replace")
-    try:
-        with _warnings_last():
-            app()
-    except (ArithmeticError, MemoryError) as problem:
-        reason = f"numbers too large or too small to compute with: {problem}"
-        sys.exit(
-            _complain(ValueError(reason if isinstance(problem, ArithmeticError) else "not enough memory"))
-        )
-    except (ValueError, OSError) as problem:
-        # ValueError covers InputError (files) and everything the library refuses with one clear sentence
-        if isinstance(problem, BrokenPipeError):
-            _forget_output()
-            sys.exit(0)
-        if isinstance(problem, OSError) and not problem.filename:
-            _forget_output()
-        sys.exit(_complain(problem))
-
-
-def _forget_output() -> None:
-    """Let the interpreter flush what is left of standard output into nothing, without a complaint."""
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextlib.contextmanager
-def _warnings_last() -> Iterator[None]:
-    """Print what was warned of when all else is printed: one of each kind, numerical trouble first."""
-    with warnings.catch_warnings(record=True) as caught:
-        try:
-            yield
-        finally:
-            try:
-                sys.stdout.flush()
-            finally:
-                caught.sort(key=lambda one: issubclass(one.category, UserWarning))
-                for text in kinds(_safe(str(one.message)) for one in caught):
-                    print(f"rotorid: Warning: {text}", file=sys.stderr)
-
-
-def _complain(problem: Exception) -> int:
-    text = str(problem)
-    if isinstance(problem, OSError) and problem.strerror:
-        text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
-    with contextlib.suppress(OSError):  # nobody can read it
-        print(f"rotorid: {_safe(text)}", file=sys.stderr)
-    return 2
-
-
-def _safe(text: str) -> str:
-    """Text without control characters: names of files may hold any."""
-    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+    """Run the command line."""
+    run(app)

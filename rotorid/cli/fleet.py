@@ -8,9 +8,8 @@ from typing import Annotated
 import typer
 
 from rotorid.cli.choices import Command
-from rotorid.cli.common_options import command
-from rotorid.cli.output import Destination
-from rotorid.cli.verbose import verbosely
+from rotorid.commands.app import Destination, command
+from rotorid.commands.verbose import verbosely
 from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import FloatArray
+from rotorid.base.tables import evenly
 from rotorid.base.text import counted, listing, sentence
 from rotorid.base.unit_words import Shown
 from rotorid.regression.estimate import value_digits
 from rotorid.regression.undetermined_combinations import FoundCombination
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.number_tables import Grid, Part, evenly, every_warning, shown, words
+from rotorid.report.number_tables import Grid, Part, every_warning, shown, words
 from rotorid.report.page import inline_svg, render_report
 from rotorid.report.rotor_figures import Drawing
 

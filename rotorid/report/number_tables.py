@@ -133,16 +133,3 @@ def every_warning(document: Mapping[str, Any]) -> list[str]:
         elif isinstance(value, Mapping):
             found += every_warning(value)
     return list(dict.fromkeys(found))
-
-
-def evenly(n: int, most: int) -> list[int]:
-    """At most so many of n indices, evenly spread, the first and the last among them.
-
-    Examples
-    --------
-    >>> evenly(4, 12), evenly(281, 6)
-    ([0, 1, 2, 3], [0, 56, 112, 168, 224, 280])
-    """
-    if n <= most:
-        return list(range(n))
-    return [round(i * (n - 1) / (most - 1)) for i in range(most)]

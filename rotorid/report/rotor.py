@@ -1,144 +1,81 @@
-"""Sheets of `rotorid critical` and `rotorid response`."""
+"""The page of a command on a rotor: its sentences, tables and pictures, and what the rotor is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from fem.model.rotor import Rotor
-from fem.plots.mode_shapes import smooth_shapes
-from rotorid.base.arrays import FloatArray
-from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.tables import Column, Table
-from rotorid.report.document import NOTHING, Document
-from rotorid.report.number_tables import Grid, Part, evenly, every_warning, words
-from rotorid.report.page import render_report
-from rotorid.report.rotor_description import place, rotor_sheet, unbalance_table
-from rotorid.report.rotor_figures import bode_picture, map_picture, modes_picture
+from rotorid.base.tables import Table
+from rotorid.report.number_tables import Part, every_warning
+from rotorid.report.page import inline_svg, render_report
+from rotorid.report.rotor_description import rotor_sheet
+from rotorid.report.rotor_figures import LETTERS, WIDTH, Drawing
 
 if TYPE_CHECKING:
-    from fem import Modes, Peaks, Response, SpeedMap
-    from fem.model.sensors import SensorLike
+    from matplotlib.figure import Figure
 
-MICRO = 1e6
-READINGS = 12
-"""Speeds of the printed readings."""
-ABREAST, MODES_ABREAST = 2, 4
-"""Sensors, and modes, that stand side by side in a table."""
-
-Band = tuple[float, float] | None
+ABREAST = 9
+"""Columns of a table that stand side by side."""
 
 
-def critical_report(
+def rotor_page(
     document: Mapping[str, Any],
-    modes: Modes,
-    *,
     provenance: Mapping[str, Any],
-    chart: SpeedMap | None = None,
-    operating: Band = None,
+    *,
+    title: str,
+    sentences: Sequence[str],
+    notes: Sequence[str],
+    tables: tuple[Sequence[Table], Sequence[Table]],
+    pictures: Mapping[str, Callable[[], Figure]],
+    rotor: Mapping[str, Any],
 ) -> bytes:
-    """Make the sheet of critical speeds, HTML in UTF-8.
+    """Make the page, HTML in UTF-8.
 
     Parameters
     ----------
     document
-        What `rotorid critical --json` prints, without the provenance.
-    modes
-        The result it is from.
+        What `--json` prints, without the provenance.
     provenance
         Program version, input files, date and options.
-    chart
-        The critical speed map, if the document has one.
-    operating
-        Range of operating speeds, rad/s.
+    title
+        Of the page.
+    sentences, notes
+        The answer, and what a reader must know besides the warnings of the document.
+    tables, pictures
+        Those of the answer and the further ones; what draws each picture, by its caption.
+    rotor
+        What `rotor_sheet` takes.
     """
-    document = Document(document)
-    parts = [
-        Part(
-            "Critical speeds",
-            tables=(_criticals(document, modes),),
-            drawings=(modes_picture(modes),),
-        ),
-        *_map(document, chart, operating),
-        Part("Mode shapes", tables=_shapes(modes)),
-    ]
+    first, others = tables
+    drawings = tuple(_drawing(draw, caption) for caption, draw in pictures.items())
     return render_report(
         "parts.html",
         document,
-        title="Critical speeds",
-        warnings=[*_inside(document), *every_warning(document)],
+        title=title,
+        warnings=[*every_warning(document), *notes],
         provenance=provenance,
-        about=[*_files(provenance), *_operating(operating)],
-        rotor=rotor_sheet(modes.rotor, conservative=True),
-        parts=parts,
+        sentences=sentences,
+        about=[("Rotor file", str(entry["file"])) for entry in provenance["inputs"][:1]],
+        rotor=rotor_sheet(**rotor),
+        parts=[
+            Part("Result", (), tuple(first), drawings),
+            *(Part("" if k else "Behind it", (), _narrow(table)) for k, table in enumerate(others)),
+        ],
     )
 
 
-def response_report(
-    document: Mapping[str, Any],
-    response: Response,
-    places: Sequence[SensorLike],
-    peaks: Sequence[Peaks],
-    *,
-    provenance: Mapping[str, Any],
-    operating: Band = None,
-    std: FloatArray | None = None,
-) -> bytes:
-    """Make the sheet of an unbalance response, HTML in UTF-8.
+def _drawing(draw: Callable[[], Figure], caption: str) -> Drawing:
+    """A picture as wide as a telephone."""
+    import matplotlib as mpl
 
-    Parameters
-    ----------
-    document
-        What `rotorid response --json` prints, without the provenance.
-    response
-        The response with the speeds between those asked for, as it is drawn.
-    places
-        Where vibration is read.
-    peaks
-        Of each place; empty where too few speeds were asked for.
-    provenance
-        Program version, input files, date and options.
-    operating
-        Range of operating speeds, rad/s.
-    std
-        Of the amplitudes, as `bode_figure` takes them.
-    """
-    document = Document(document)
-    rotor = response.rotor
-    low, high = document["speeds_rad_s"][0], document["speeds_rad_s"][-1]
-    about = [
-        *_files(provenance),
-        (
-            "Speeds",
-            f"{len(document['speeds_rad_s'])}, from {low * RPM:.6g} to {rpm_text(high)} "
-            f"({low:.6g} to {high:.6g} rad/s)",
-        ),
-        *_operating(operating),
-    ]
-    parts = [
-        Part("Unbalance", tables=(unbalance_table(rotor, response.unbalance),)),
-        Part(
-            "Vibration",
-            tables=(_largest(document), *_peaks(document, operating)),
-            drawings=(bode_picture(response, places, peaks, operating, std),),
-        ),
-        *_forces(document, rotor),
-        Part("Readings", tables=_readings(document)),
-    ]
-    return render_report(
-        "parts.html",
-        document,
-        title="Unbalance response",
-        warnings=[*_margins(document), *every_warning(document)],
-        provenance=provenance,
-        about=about,
-        rotor=rotor_sheet(rotor, planes=sorted(response.unbalance), sensors=places, meaning="unbalance"),
-        parts=parts,
-    )
+    with mpl.rc_context({"font.size": LETTERS, "hatch.linewidth": 0.6}):
+        figure = draw()
+        wide, high = figure.get_size_inches()
+        figure.set_size_inches(WIDTH, high * min(1.0, WIDTH / wide))
+        return Drawing(inline_svg(figure, caption), caption)
 
 
+<<<<<<< HEAD
 def _files(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [("Rotor file", str(entry["file"])) for entry in provenance["inputs"][:1]]
 
@@ -212,88 +149,13 @@ def _shapes(modes: Modes) -> tuple[Table, ...]:
         for k, (shape, size) in enumerate(zip(shapes, largest, strict=True), start=1)
     ]
     caption = "Deflection at the nodes, in the scale of the picture: the largest between the ends is 1"
+=======
+def _narrow(table: Table) -> tuple[Table, ...]:
+    """The table, or several that repeat its first two columns."""
+    first, others = table.columns[:2], table.columns[2:]
+    step = ABREAST - 2
+>>>>>>> cmd
     return tuple(
-        Table(caption, (node, position, *scaled[first : first + MODES_ABREAST]))
-        for first in range(0, len(scaled), MODES_ABREAST)
-    )
-
-
-def _margins(document: Mapping[str, Any]) -> list[str]:
-    """Peaks whose separation from the operating range is not as required, as warnings."""
-    return [
-        f"peak at {peak['speed_rpm']:.6g} rpm, {peak['sensor']}: {peak['separation_margin_percent']:.1f} % "
-        f"from the operating range; API 684 requires {peak['required_margin_percent']:.1f} %"
-        for peak in document["peaks"]
-        if peak["enough"] is False
-    ]
-
-
-def _largest(document: Document) -> Grid:
-    sensors = [item["sensor"] for item in document["largest"]]
-    return Grid(
-        "Largest readings",
-        (
-            words("sensor", (name if isinstance(name, str) else f"node {name}" for name in sensors)),
-            document.column("amplitude, µm peak", "largest.*.amplitude_m", 4, scale=MICRO),
-            document.column("rpm", "largest.*.speed_rad_s", decimals=1, scale=RPM),
-            document.column("rad/s", "largest.*.speed_rad_s"),
-        ),
-    )
-
-
-def _peaks(document: Document, operating: Band) -> tuple[Grid, ...]:
-    """Peaks with amplification factors, and with margins where there is a range; nothing without peaks."""
-    peaks = document["peaks"]
-    if not peaks:
-        return ()
-    columns = [
-        words("sensor", (peak["sensor"] for peak in peaks)),
-        document.column("rpm", "peaks.*.speed_rpm", decimals=1),
-        document.column("amplitude, µm peak", "peaks.*.amplitude", 4, scale=MICRO),
-        document.column("AF", "peaks.*.amplification_factor", decimals=2),
-    ]
-    if operating is not None:
-        verdicts = {True: "enough", False: "NOT ENOUGH", None: NOTHING}
-        columns += [
-            document.column("margin, %", "peaks.*.separation_margin_percent", decimals=1),
-            document.column("required, %", "peaks.*.required_margin_percent", decimals=1),
-            words("margin is", (verdicts[peak["enough"]] for peak in peaks)),
-        ]
-    notes: dict[str, list[str]] = {}
-    for peak in peaks:
-        if peak["note"]:
-            notes.setdefault(peak["note"], []).append(f"{peak['sensor']} {peak['speed_rpm']:.0f} rpm")
-    said = [f"No AF, for {text}: {', '.join(where)}." for text, where in notes.items()]
-    note = " ".join(["AF: amplification factor after API 684.", *said])
-    return (Grid("Peaks", tuple(columns), note),)
-
-
-def _forces(document: Document, rotor: Rotor) -> list[Part]:
-    supports = rotor.supports
-    if not supports:
-        return []
-    columns = (
-        words("support", (each.name or f"support {k}" for k, each in enumerate(supports, start=1))),
-        words("node", (place(rotor, each.node) for each in supports)),
-        document.column("largest force, N", "bearing_forces.largest_N.*", 4),
-        document.column("rpm", "bearing_forces.largest_at_rad_s.*", decimals=1, scale=RPM),
-    )
-    return [Part("Forces on the supports", tables=(Grid("", columns),))]
-
-
-def _readings(document: Document) -> tuple[Grid, ...]:
-    """Amplitude and phase at some of the speeds asked for, a few sensors abreast."""
-    sensors, count = document["sensors"], len(document["speeds_rad_s"])
-    picked = evenly(count, READINGS)
-    note = (
-        f"{len(picked)} of the {count} speeds asked for; --output writes all." if len(picked) < count else ""
-    )
-    speeds = document.column("rpm", "speeds_rad_s.*", rows=picked, decimals=1, scale=RPM)
-    readings = []
-    for k, sensor in enumerate(sensors):
-        size = document.column(f"{sensor}: µm peak", f"amplitude_m.{k}.*", 4, rows=picked, scale=MICRO)
-        readings += [size, document.column("phase, °", f"phase_deg.{k}.*", rows=picked, decimals=1)]
-    return tuple(
-        Grid("Amplitude and phase (lead)", (speeds, *readings[first : first + 2 * ABREAST]), note)
-        for first in range(0, len(readings), 2 * ABREAST)
+        Table(table.name, (*first, *others[k : k + step]), table.note)
+        for k in range(0, max(len(others), 1), step)
     )

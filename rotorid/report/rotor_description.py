@@ -10,6 +10,7 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from rotorid.base.rpm import RPM, phase_deg
+from rotorid.base.tables import Column, Table
 from rotorid.report.document import Cells
 from rotorid.report.number_tables import Grid, figures, numbered, words
 from rotorid.report.rotor_figures import Drawing, rotor_picture
@@ -83,18 +84,16 @@ def place(rotor: Rotor, node: int) -> str:
     return f"{node} ({', '.join(names)})" if names else str(node)
 
 
-def unbalance_table(rotor: Rotor, unbalance: Mapping[int, complex]) -> Grid:
+def unbalance_table(rotor: Rotor, unbalance: Mapping[int, complex]) -> Table:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
     mounted = sorted(unbalance.items())
-    return Grid(
-        "What is mounted",
-        (
-            words("node", (place(rotor, node) for node, _ in mounted)),
-            figures("position, m", (float(rotor.positions[node - 1]) for node, _ in mounted)),
-            figures("unbalance, g·mm", (1e6 * float(abs(u)) for _, u in mounted)),
-            figures("angle, ° with the rotation", (float(phase_deg(u)) for _, u in mounted)),
-        ),
+    columns = (
+        Column("node", [place(rotor, node) for node, _ in mounted]),
+        Column("position, m", [rotor.positions[node - 1] for node, _ in mounted], "{:.6g}".format),
+        Column("unbalance, g·mm", [1e6 * abs(u) for _, u in mounted], "{:.6g}".format),
+        Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in mounted], "{:.6g}".format),
     )
+    return Table("what is mounted", columns)
 
 
 def _facts(rotor: Rotor, *, conservative: bool, at_rest: bool) -> tuple[tuple[str, str], ...]:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import legend_above
 from rotorid.plots import plot
 from rotorid.report.page import inline_svg
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fem import Modes, Peaks, Response, Rotor, SpeedMap
+    from fem import Rotor
     from fem.model.sensors import SensorLike
     from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost
 
@@ -66,45 +65,6 @@ def rotor_picture(
                 text.set_text(meaning)
 
     return sketch(2.9, draw, "The rotor, lengths and radii to scale (the two axes differ).")
-
-
-def modes_picture(modes: Modes) -> Drawing:
-    """Mode shapes over the rotor."""
-
-    def draw(figure: Figure) -> None:
-        _curves_only(plot(modes, figure.add_subplot()), 2)
-
-    return sketch(3.7, draw, "Mode shapes, each to its largest value 1, over the rotor.")
-
-
-def map_picture(chart: SpeedMap, operating: tuple[float, float] | None) -> Drawing:
-    """Critical speeds over the stiffness of the supports."""
-
-    def draw(figure: Figure) -> None:
-        from fem.plots import draw_speed_map
-
-        draw_speed_map(chart, figure.add_subplot(), operating)
-
-    caption = "Critical speeds over the stiffness of the supports; dotted: what the supports have."
-    return sketch(4.2, draw, caption)
-
-
-def bode_picture(
-    response: Response,
-    places: Sequence[SensorLike],
-    peaks: Sequence[Peaks],
-    operating: tuple[float, float] | None,
-    std: FloatArray | None = None,
-) -> Drawing:
-    """Amplitude and phase over speed, marked where each sensor has its peaks."""
-
-    def draw(figure: Figure) -> None:
-        from fem.plots import bode_figure
-
-        bode_figure(response, places, peaks, operating=operating, factors=False, figure=figure, std=std)
-
-    caption = "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading."
-    return sketch(5.0, draw, caption)
 
 
 def reduction_picture(result: Reduction, words: str) -> Drawing:

@@ -3,23 +3,29 @@
 Nothing here prints; the command line, reports, the demo, a notebook and a worksheet call it.
 """
 
+from rotorid.commands import (
+    CampbellOptions,
+    CriticalOptions,
+    InfluenceOptions,
+    ResponseOptions,
+    campbell,
+    critical,
+    influence,
+    response,
+)
+from rotorid.commands.outcome import Delivered
 from rotorid.workflows.balance import Balance, BalanceOptions, balance
 from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
-from rotorid.workflows.campbell import CampbellDiagram, CampbellOptions, campbell
-from rotorid.workflows.critical import CriticalOptions, CriticalSpeeds, critical
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
-from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
-from rotorid.workflows.response import ResponseOptions, RotorResponse, response
-from rotorid.workflows.result_provenance import Outcome
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.split import SplitOptions, SplitWeight, split
 from rotorid.workflows.studies.study import StudyOptions, study
@@ -40,11 +46,10 @@ __all__ = [
     "BearingsOptions",
     "CalibrateOptions",
     "Calibrated",
-    "CampbellDiagram",
     "CampbellOptions",
     "Coefficients",
     "CriticalOptions",
-    "CriticalSpeeds",
+    "Delivered",
     "Demo",
     "DemoOptions",
     "FitOptions",
@@ -58,7 +63,6 @@ __all__ = [
     "ModesOptions",
     "Motion",
     "MotionOptions",
-    "Outcome",
     "PeriodicMotions",
     "PeriodicOptions",
     "PermissibleUnbalance",
@@ -66,8 +70,6 @@ __all__ = [
     "ReduceOptions",
     "ReducedRotor",
     "ResponseOptions",
-    "RotorInfluence",
-    "RotorResponse",
     "RunUp",
     "RunUpOptions",
     "SimulateOptions",

@@ -13,11 +13,12 @@ from warnings import catch_warnings
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import sentence
+from rotorid.commands.input_checks import check_choices, file_of
+from rotorid.commands.outcome import command, provenance
+from rotorid.commands.quantities import Names, Speeds, names, number, one_of, speeds
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
-from rotorid.workflows.input_checks import check_choices, file_of
-from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
 from rotorid.workflows.other_conventions import with_contradiction, with_other_readings
-from rotorid.workflows.result_provenance import Parts, provenance, workflow
+from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -309,7 +310,7 @@ class Balance(Parts):
         return influence_bytes(Path(path), self.influence)
 
 
-@workflow
+@command
 def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     """Correction weights that minimise the vibration, with predicted residuals and uncertainty.
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.suggestions import one_of
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.outcome import Delivered, command, provenance
 from rotorid.workflows.demo_samples import SAMPLES, Sample
-from rotorid.workflows.input_checks import file_of
-from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +37,7 @@ class DemoOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Samples(Outcome):
+class Samples(Delivered):
     """What the samples are."""
 
     samples: Mapping[str, Sample]
@@ -61,7 +61,7 @@ class Samples(Outcome):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Demo(Outcome):
+class Demo(Delivered):
     """A sample in its folder.
 
     Attributes
@@ -99,8 +99,8 @@ class Demo(Outcome):
     def told(self) -> Iterator[tuple[str, list[str]]]:
         """The heading of each command, and the command."""
         both = zip(self.sample.steps, self.commands, strict=True)
-        for number, (step, command) in enumerate(both, start=1):
-            yield f"{number}. {step.title}\n{_typed(command)}", command
+        for number, (step, one) in enumerate(both, start=1):
+            yield f"{number}. {step.title}\n{_typed(one)}", one
 
     def run(self, command: Callable[[list[str]], Mapping[str, Any]]) -> Demo:
         """The same with the documents that a function gives of the commands, without their provenance."""
@@ -139,7 +139,7 @@ def samples() -> Samples:
     return Samples(samples=SAMPLES, provenance=provenance([], DemoOptions()))
 
 
-@workflow
+@command
 def demo(folder: Path | str, options: DemoOptions | None = None) -> Demo:
     """Write the files of a sample; its commands are run by who wants to see them.
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.logs import workflows as log
 from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
-from rotorid.workflows.input_checks import check_choices, file_of, refuse
-from rotorid.workflows.option_values import Times, check_names, number, pairs, times
-from rotorid.workflows.result_provenance import Parts, phase, provenance, text_of, workflow
+from rotorid.commands.input_checks import check_choices, file_of, refuse
+from rotorid.commands.outcome import command, phase, provenance, text_of
+from rotorid.commands.quantities import Times, check_names, number, pairs, times
+from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -142,7 +143,7 @@ class RecordFit(Parts):
         return fit_report(self.to_dict(), self.fit, provenance=self.provenance, model=self.model)
 
 
-@workflow
+@command
 def fit(
     model: OdeModel | Path | str,
     records: Sequence[Record | Path | str] | Path | str = (),

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.logs import workflows as log
-from rotorid.workflows.input_checks import check_choices, file_of, refuse
-from rotorid.workflows.option_values import Speeds, speeds
-from rotorid.workflows.result_provenance import Found, Parts, phase, provenance, text_of, workflow
+from rotorid.commands.input_checks import check_choices, file_of, refuse
+from rotorid.commands.outcome import command, phase, provenance, text_of
+from rotorid.commands.quantities import Speeds, speeds
+from rotorid.workflows.result_provenance import Found, Parts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,7 +101,7 @@ class Coefficients(Parts):
         )
 
 
-@workflow
+@command
 def identify(
     model: HarmonicModel | HarmonicFile | Path | str,
     data: Experiments | Path | str | None = None,
@@ -171,7 +172,7 @@ class TwoStructures(Found):
         raise ValueError("two models beside each other have no sheet: --report belongs to one model")
 
 
-@workflow
+@command
 def compare(
     models: Sequence[Path | str], data: Path | str, options: IdentifyOptions | None = None
 ) -> TwoStructures:

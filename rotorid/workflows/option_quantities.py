@@ -14,6 +14,7 @@ import numpy as np
 from balancing.data.conventions import Labels
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.commands.quantities import degrees, one_of, one_speed, pairs
 from rotorid.tables.job.job_limits import with_limits
 from rotorid.tables.reader import units
 from rotorid.tables.reader.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
@@ -21,7 +22,6 @@ from rotorid.tables.reader.settings_keys import Quantity
 from rotorid.tables.reader.units import Unit, UnitError, spelt
 from rotorid.tables.reader.weights_with_units import in_job_units
 from rotorid.tables.runs.stated_conventions import ANGLES, as_angles
-from rotorid.workflows.option_values import degrees, one_of, one_speed, pairs
 
 if TYPE_CHECKING:
     from rotorid.tables import Job

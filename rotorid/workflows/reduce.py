@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from rotorid.base.logs import workflows as log
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
-from rotorid.workflows.input_checks import rotor_source
-from rotorid.workflows.option_values import (
+from rotorid.commands.input_checks import rotor_source
+from rotorid.commands.outcome import command, provenance
+from rotorid.commands.quantities import (
     Band,
     Nodes,
     Speeds,
@@ -26,7 +27,6 @@ from rotorid.workflows.option_values import (
     option_name,
     rising_speeds,
 )
-from rotorid.workflows.result_provenance import provenance, workflow
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -139,7 +139,7 @@ class ReduceOptions:
     keep_supports: bool = False
 
 
-@workflow
+@command
 def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> ReducedRotor:
     """Find equivalent masses at chosen nodes (formula 50), how good they are, and the small model.
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
-from rotorid.workflows.option_values import one_of
+from rotorid.commands.quantities import one_of
 from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:

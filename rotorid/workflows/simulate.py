@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, counted, listing
-from rotorid.workflows.fit import Values, sigmas
-from rotorid.workflows.identify import amplitude_errors
-from rotorid.workflows.input_checks import file_of, refuse
-from rotorid.workflows.option_values import (
+from rotorid.commands.input_checks import file_of, refuse
+from rotorid.commands.outcome import Delivered, command, phase, provenance
+from rotorid.commands.quantities import (
     Speeds,
     Times,
     check_names,
@@ -26,7 +25,8 @@ from rotorid.workflows.option_values import (
     speeds,
     times,
 )
-from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
+from rotorid.workflows.fit import Values, sigmas
+from rotorid.workflows.identify import amplitude_errors
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,7 +94,7 @@ class SimulateOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Simulation(Outcome):
+class Simulation(Delivered):
     """A measurement table or a record, and what it is in words."""
 
     parameters: Mapping[str, float]
@@ -127,7 +127,7 @@ _Simulated = tuple[dict[str, float], tuple[Column, ...], str, tuple[str, ...]]
 """Parameters, table, what it is, notes."""
 
 
-@workflow
+@command
 def simulate(
     model: HarmonicModel | HarmonicFile | OdeModel | Path | str, options: SimulateOptions | None = None
 ) -> Simulation:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.input_checks import changed, refuse
-from rotorid.workflows.option_values import degrees, option_name, pairs
-from rotorid.workflows.result_provenance import Outcome, provenance, workflow
+from rotorid.commands.input_checks import changed, refuse
+from rotorid.commands.outcome import Delivered, command, provenance
+from rotorid.commands.quantities import degrees, option_name, pairs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,7 +131,7 @@ class SplitOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SplitWeight(Outcome):
+class SplitWeight(Delivered):
     """How a weight is mounted: the weight, kg or kg·m with the rotation, and how weights are printed."""
 
     target: complex
@@ -174,7 +174,7 @@ class SplitWeight(Outcome):
         return placed(labels, target, holes, remove=True, words=words)
 
 
-@workflow
+@command
 def split(weight: Vector, options: SplitOptions | None = None) -> SplitWeight:
     """Mount one given weight: in holes (exactly the nearest), at two angles, or by drilling or grinding.
 

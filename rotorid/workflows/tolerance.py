@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotorid.workflows.result_provenance import Found, provenance, workflow
+from rotorid.commands.outcome import command, provenance
+from rotorid.workflows.result_provenance import Found
 
 if TYPE_CHECKING:
     from balancing.iso21940 import Tolerance
@@ -47,7 +48,7 @@ class PermissibleUnbalance(Found):
     found: Tolerance
 
 
-@workflow
+@command
 def tolerance(options: ToleranceOptions) -> PermissibleUnbalance:
     """Compute the permissible residual unbalance of a rigid rotor, and the share of each plane.
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.logs import workflows as log
-from rotorid.workflows.input_checks import job_source, refuse
-from rotorid.workflows.option_values import Names, degrees, names, number, one_of
-from rotorid.workflows.result_provenance import Outcome, provenance, workflow
+from rotorid.commands.input_checks import job_source, refuse
+from rotorid.commands.outcome import Delivered, command, provenance
+from rotorid.commands.quantities import Names, degrees, names, number, one_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,7 +101,7 @@ class TrialWeightOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TrialWeights(Outcome):
+class TrialWeights(Delivered):
     """A trial weight for each plane."""
 
     weights: tuple[TrialWeight, ...]
@@ -131,7 +131,7 @@ class TrialWeights(Outcome):
         return trial_figure(self.weights)
 
 
-@workflow
+@command
 def trial_weight(
     job: Job | Path | str | None = None, options: TrialWeightOptions | None = None
 ) -> TrialWeights:

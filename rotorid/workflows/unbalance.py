@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.input_checks import check_choices, job_source, refuse
-from rotorid.workflows.option_values import Nodes, nodes
-from rotorid.workflows.result_provenance import Found, provenance, workflow
+from rotorid.commands.input_checks import check_choices, job_source, refuse
+from rotorid.commands.outcome import command, provenance
+from rotorid.commands.quantities import Nodes, nodes
+from rotorid.workflows.result_provenance import Found
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance
@@ -56,7 +57,7 @@ class UnbalanceAtStations(Found):
     found: Unbalance
 
 
-@workflow
+@command
 def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtStations:
     """Find unbalance at any stations of a rotor model that explains the readings of one run.
 

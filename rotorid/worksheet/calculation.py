@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotorid.commands.outcome import Delivered
     from rotorid.tables import Job
     from rotorid.workflows.balance import Balance
-    from rotorid.workflows.result_provenance import Outcome
 
 KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
 """Balances of one job, by the options of `rotorid balance`."""
@@ -100,7 +100,7 @@ def _without_check(path: Path) -> Job:
     return job_of(path, written.top(problems), written.tables, Overrides(), problems)
 
 
-def told(outcome: Outcome) -> dict[str, Any]:
+def told(outcome: Delivered) -> dict[str, Any]:
     """The document of `--json`, and what a person reads."""
     answer = outcome.answer
     words = {"judgement": answer.judgement, "found": answer.found}

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
-from rotorid.cli.output import TABLES, Destination, check_targets
+from rotorid.commands.app import EQUATIONS, OUTPUT, TABLES, WITH_REPORT, Destination, check_targets, command
 from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work
 

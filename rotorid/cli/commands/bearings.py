@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from rotorid.cli.common_options import RotorArgument, command
-from rotorid.cli.output import TABLES, Destination
+from rotorid.commands.app import TABLES, Destination, RotorArgument, command
 from rotorid.workflows.motion.bearings import BearingsOptions
 from rotorid.workflows.motion.bearings import bearings as work
 

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import RotorArgument, command
-from rotorid.cli.output import TABLES, Destination
+from rotorid.commands.app import TABLES, Destination, RotorArgument, command
 from rotorid.workflows.calibration.calibrate import CalibrateOptions
 from rotorid.workflows.calibration.calibrate import calibrate as work
 

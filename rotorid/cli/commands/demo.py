@@ -10,8 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from rotorid.base.answer import LINES
-from rotorid.cli.common_options import command
-from rotorid.cli.output import Destination, json_text
+from rotorid.commands.app import Destination, command, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES

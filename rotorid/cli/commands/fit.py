@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import EQUATIONS, OUTPUT, WITH_REPORT, Destination, command
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import EQUATIONS, WITH_REPORT, command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import EQUATIONS, WITH_REPORT, Destination, command
 from rotorid.workflows.identify import IdentifyOptions, compare
 from rotorid.workflows.identify import identify as work
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import OUTPUT, Destination, command
 from rotorid.workflows.motion.motion import MotionOptions, View
 from rotorid.workflows.motion.motion import motion as work
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import Destination, command
 from rotorid.workflows.motion.periodic import PeriodicOptions
 from rotorid.workflows.motion.periodic import periodic as work
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
-from rotorid.cli.output import STATE_SPACES, Destination
+from rotorid.commands.app import EQUATIONS, OUTPUT, STATE_SPACES, WITH_REPORT, Destination, command
 from rotorid.workflows.reduce import ReduceOptions, View
 from rotorid.workflows.reduce import reduce as work
 

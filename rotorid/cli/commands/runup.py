@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, command
-from rotorid.cli.output import TABLES, Destination
+from rotorid.commands.app import OUTPUT, TABLES, Destination, command
 from rotorid.workflows.vibration.runup import RunUpOptions
 from rotorid.workflows.vibration.runup import runup as work
 from rotorid.workflows.vibration.runup_result import View

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import command
-from rotorid.cli.output import Destination, json_text
+from rotorid.commands.app import Destination, command, json_text
 
 
 @command(to=("json",))

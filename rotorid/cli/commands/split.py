@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import Destination, command
 from rotorid.workflows.split import SplitOptions
 from rotorid.workflows.split import split as work
 

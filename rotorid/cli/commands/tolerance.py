@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from rotorid.cli.common_options import command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import Destination, command
 from rotorid.workflows.tolerance import ToleranceOptions
 from rotorid.workflows.tolerance import tolerance as work
 

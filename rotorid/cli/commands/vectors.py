@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, command
-from rotorid.cli.output import Destination
+from rotorid.commands.app import OUTPUT, Destination, command
 from rotorid.workflows.vibration.vectors import VectorsOptions
 from rotorid.workflows.vibration.vectors import vectors as work
 

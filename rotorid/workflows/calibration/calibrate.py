@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotorid.base.answer import Answer
-from rotorid.workflows.input_checks import file_of, rotor_source
-from rotorid.workflows.option_values import Names, Nodes, Speeds, nodes, rising_speeds
-from rotorid.workflows.result_provenance import Found, log_rotor, phase, provenance, workflow
+from rotorid.commands.input_checks import file_of, rotor_source
+from rotorid.commands.outcome import command, log_rotor, phase, provenance
+from rotorid.commands.quantities import Names, Nodes, Speeds, nodes, rising_speeds
+from rotorid.workflows.result_provenance import Found
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,7 +108,7 @@ class Calibrated(Found):
         return calibration_figure(self.found)
 
 
-@workflow
+@command
 def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Calibrated:
     """Estimate numbers of a rotor from data of any mixture, with errors, and what the data do not determine.
 

@@ -21,7 +21,7 @@ from balancing.data.reading_errors import error_model
 from balancing.data.trials import Trials
 from fem.model.rotor_parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
-from rotorid.workflows.result_provenance import hash_of
+from rotorid.commands.outcome import hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

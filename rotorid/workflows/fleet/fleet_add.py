@@ -16,7 +16,7 @@ from rotorid.base.logs import progress
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
 from rotorid.base.worker_processes import single_threads, worker_pool
-from rotorid.workflows.result_provenance import Outcome, provenance, workflow
+from rotorid.commands.outcome import Delivered, command, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +49,7 @@ class FleetAddOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FleetAdded(Outcome):
+class FleetAdded(Delivered):
     """How many jobs and vectors were added, how many jobs were known; files that cannot be read, and why."""
 
     store: FleetStore
@@ -95,7 +95,7 @@ class FleetAdded(Outcome):
         return Answer(head, "\n".join(told), notes=(untyped,) if self.untyped else ())
 
 
-@workflow
+@command
 def fleet_add(
     fleet: Path | str, trees: Sequence[Path | str], options: FleetAddOptions | None = None
 ) -> FleetAdded:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, figures
-from rotorid.workflows.result_provenance import Outcome, provenance, workflow
+from rotorid.commands.outcome import Delivered, command, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,7 +36,7 @@ class FleetFitOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TypeFound(Outcome):
+class TypeFound(Delivered):
     """Coefficients of a type, and of each odd record what would make it fit ("": not found)."""
 
     known: KnownType
@@ -133,7 +133,7 @@ def _typical(along: FloatArray, across: FloatArray) -> str:
     return f"by {figures(float(percent), 2)} % and {figures(float(degrees), 2)}°"
 
 
-@workflow
+@command
 def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
     """Coefficients of a type: their mean, how machines and runs differ, and the machines that are odd.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted
-from rotorid.workflows.result_provenance import Outcome, provenance, workflow
+from rotorid.commands.outcome import Delivered, command, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +34,7 @@ class FleetShowOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FleetShown(Outcome):
+class FleetShown(Delivered):
     """Machines and jobs of a fleet.
 
     Attributes
@@ -102,7 +102,7 @@ class FleetShown(Outcome):
         )
 
 
-@workflow
+@command
 def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> FleetShown:
     """Tell what a store holds.
 

@@ -15,9 +15,9 @@ from balancing.correction.refine_coefficients import together
 from balancing.correction.update_coefficients import update
 from balancing.data.trials import Trials
 from rotorid.base.text import counted
+from rotorid.commands.outcome import hash_of
 from rotorid.workflows.coefficients import proposed
 from rotorid.workflows.fleet.type_records import Grid, KnownType, known_type
-from rotorid.workflows.result_provenance import hash_of
 
 if TYPE_CHECKING:
     from balancing.coefficients.machine_type import MachineType

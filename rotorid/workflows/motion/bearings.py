@@ -12,9 +12,9 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import capital, counted, figures
-from rotorid.workflows.input_checks import rotor_source
-from rotorid.workflows.option_values import Speeds, degrees, rising_speeds
-from rotorid.workflows.result_provenance import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.commands.input_checks import rotor_source
+from rotorid.commands.outcome import Delivered, command, log_rotor, phase, provenance
+from rotorid.commands.quantities import Speeds, degrees, rising_speeds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +45,7 @@ class BearingsOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BearingEquilibria(Outcome):
+class BearingEquilibria(Delivered):
     """Equilibria at ascending speeds, the linear rotor with their coefficients, and where it loses stability.
 
     Attributes
@@ -152,7 +152,7 @@ class BearingEquilibria(Outcome):
         return rotor_file_bytes(path, self.linear)
 
 
-@workflow
+@command
 def bearings(rotor: Rotor | Path | str, options: BearingsOptions) -> BearingEquilibria:
     """Find where the rotor rests in its journal bearings at each speed, and what is linear about it.
 

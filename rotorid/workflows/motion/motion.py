@@ -13,8 +13,8 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
-from rotorid.workflows.motion.moving_system import moving
-from rotorid.workflows.option_values import (
+from rotorid.commands.outcome import Delivered, command, phase, provenance
+from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
     Speeds,
@@ -26,7 +26,7 @@ from rotorid.workflows.option_values import (
     pairs,
     speeds,
 )
-from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
+from rotorid.workflows.motion.moving_system import moving
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,7 +102,7 @@ class MotionOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Motion(Outcome):
+class Motion(Delivered):
     """Motion in time, what it comes to, and how sure it is.
 
     Attributes
@@ -281,7 +281,7 @@ class Motion(Outcome):
         return FIGURES[view](self.motion)
 
 
-@workflow
+@command
 def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Motion:
     """Follow the motion of a rotor or a small model in time.
 

@@ -12,9 +12,9 @@ from rotorid.base.json import cell
 from rotorid.base.result import frame, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
+from rotorid.commands.outcome import Delivered, command, phase, provenance
+from rotorid.commands.quantities import Band, Sensor, band, degrees, sensors
 from rotorid.workflows.motion.moving_system import Moving, moving
-from rotorid.workflows.option_values import Band, Sensor, band, degrees, sensors
-from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +71,7 @@ class PeriodicOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PeriodicMotions(Outcome):
+class PeriodicMotions(Delivered):
     """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced."""
 
     readings: Readings
@@ -143,7 +143,7 @@ def _stable_ranges(branch: Branch) -> list[tuple[float, float]]:
     return [(min(speeds), max(speeds)) for speeds in found]
 
 
-@workflow
+@command
 def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -> PeriodicMotions:
     """Find periodic motions of a rotor over a range of speeds, their stability and bifurcations.
 

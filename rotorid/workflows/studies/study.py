@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.workflows.input_checks import file_of
-from rotorid.workflows.result_provenance import hash_of, phase, provenance, workflow
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.outcome import command, hash_of, phase, provenance
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class StudyOptions:
     results: Path | str | None = None
 
 
-@workflow
+@command
 def study(
     file: Path | str, options: StudyOptions | None = None, executor: Executor | None = None
 ) -> StudiedMachines | StudiedStarts:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, figures
-from rotorid.workflows.result_provenance import Outcome
+from rotorid.commands.outcome import Delivered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +27,7 @@ def interval(k: int, n: int) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StudiedMachines(Outcome):
+class StudiedMachines(Delivered):
     """What became of all drawn machines.
 
     Attributes
@@ -115,7 +115,7 @@ class StudiedMachines(Outcome):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StudiedStarts(Outcome):
+class StudiedStarts(Delivered):
     """Minima by their χ² (m,), how many starts end there, and the numbers (m, n) by their names.
 
     Attributes

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.outcome import command, phase, provenance
+from rotorid.commands.quantities import Band, band, one_of
 from rotorid.workflows.identify import amplitude_errors
-from rotorid.workflows.input_checks import file_of
-from rotorid.workflows.option_values import Band, band, one_of
-from rotorid.workflows.result_provenance import Found, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Found
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +59,7 @@ class ModesOfReadings(Found):
         return figure_modes(self.found)
 
 
-@workflow
+@command
 def modes(data: Path | str, options: ModesOptions) -> ModesOfReadings:
     """Fit natural frequencies, damping and shapes to amplitudes measured around resonances.
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.workflows.input_checks import file_of
-from rotorid.workflows.option_values import Band, Names, Speeds, band, names, number, one_of, one_speed
-from rotorid.workflows.option_values import speeds as read_speeds
-from rotorid.workflows.result_provenance import phase as timed
-from rotorid.workflows.result_provenance import provenance, workflow
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.outcome import command, provenance
+from rotorid.commands.outcome import phase as timed
+from rotorid.commands.quantities import Band, Names, Speeds, band, names, number, one_of, one_speed
+from rotorid.commands.quantities import speeds as read_speeds
 from rotorid.workflows.vibration.runup_result import RunUp, SlowRollVectors
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class RunUpOptions:
     speeds: Speeds | None = None
 
 
-@workflow
+@command
 def runup(data: Path | str | Sequence[SweepVectors], options: RunUpOptions | None = None) -> RunUp:
     """Fit critical speeds and damping to vectors of a run-up or run-down, the acceleration in the model.
 

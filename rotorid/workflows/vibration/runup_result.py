@@ -11,7 +11,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, error_figures, figures, listing
-from rotorid.workflows.result_provenance import Outcome
+from rotorid.commands.outcome import Delivered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +39,7 @@ class SlowRollVectors(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RunUp(Outcome):
+class RunUp(Delivered):
     """What the vectors of a sweep tell.
 
     Attributes

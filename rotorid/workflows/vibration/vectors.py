@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from rotorid.workflows.option_values import Names, Speeds, names, one_of, speeds
-from rotorid.workflows.result_provenance import phase, provenance, workflow
+from rotorid.commands.outcome import command, phase, provenance
+from rotorid.commands.quantities import Names, Speeds, names, one_of, speeds
 from rotorid.workflows.vibration.vectors_result import Picture, VectorsOfRecords
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class VectorsOptions:
     picture: Picture = "tacho"
 
 
-@workflow
+@command
 def vectors(records: Sequence[Path | str], options: VectorsOptions) -> VectorsOfRecords:
     """Find vectors of orders in records of a tacho and sensors.
 

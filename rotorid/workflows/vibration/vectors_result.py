@@ -9,7 +9,7 @@ from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, listing
-from rotorid.workflows.result_provenance import Outcome
+from rotorid.commands.outcome import Delivered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,7 +22,7 @@ Picture = Literal["tacho", "orbit", "waterfall"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class VectorsOfRecords(Outcome):
+class VectorsOfRecords(Delivered):
     """Vectors of records, and these."""
 
     found: tuple[Vectors, ...]

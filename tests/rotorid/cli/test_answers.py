@@ -43,7 +43,7 @@ def test_warnings_come_last_one_of_each_kind_and_numerical_ones_first(cli, monke
         warnings.warn("an overflow", RuntimeWarning, stacklevel=1)
         raise ValueError("nothing can be done")
 
-    monkeypatch.setattr("rotorid.cli.commands.critical.work", work)
+    monkeypatch.setattr("fem.critical_speeds", work)
     monkeypatch.setattr(warnings, "filters", [])
     found = cli("critical", ROTOR)
     assert found.code == 2

@@ -9,7 +9,7 @@ import pytest
 import typer
 from cases import each_of
 
-from rotorid.cli import progress, terminal, verbose
+from rotorid.commands import progress, terminal, verbose
 from rotorid.samples import sample_data
 
 JOB = sample_data() / "turbo_job" / "job.toml"

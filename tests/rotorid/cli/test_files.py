@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 
+from rotorid.commands.quantities import speeds
 from rotorid.samples import sample_data
-from rotorid.workflows.option_values import speeds
 
 ROTOR = sample_data() / "rotor23.csv"
 BK = sample_data() / "bk_two_plane"

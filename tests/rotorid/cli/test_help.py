@@ -13,7 +13,7 @@ from typer.core import TyperOption
 
 from rotorid.base.answer import COLUMNS
 from rotorid.cli import app
-from rotorid.cli.common_options import INPUT, command
+from rotorid.commands.app import INPUT, command
 from rotorid.samples import sample_data
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "docs" / "_ext"))

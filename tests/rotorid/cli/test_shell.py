@@ -199,7 +199,7 @@ def test_extreme_options_are_answered_or_refused(cli):
 
 
 def test_speeds_are_bounded():
-    from rotorid.workflows.option_values import FASTEST, band, speeds
+    from rotorid.commands.quantities import FASTEST, band, speeds
 
     for text, unit in itertools.product(("1e9", "9e9", "1e300"), ("rpm", "Hz", "")):
         if float(text) * {"rpm": 0.105, "Hz": 6.28, "": 1.0}[unit] > FASTEST:

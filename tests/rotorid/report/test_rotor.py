@@ -5,14 +5,14 @@ import pytest
 from sheets import COMMANDS, ESTIMATES, Shown, disagreement, disagreements, make, read_sheet, rows_of, run
 
 import fem
-from rotorid.report.number_tables import evenly, every_warning
-from rotorid.report.rotor import critical_report
+from rotorid.base.tables import evenly
+from rotorid.commands import CriticalOptions, critical
+from rotorid.report.number_tables import every_warning
 from rotorid.report.rotor_description import rotor_sheet, unbalance_table
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 
 MINE = [name for name in COMMANDS if not name.startswith("balance") and name not in ESTIMATES]
-PROVENANCE = {"program": "rotorid", "version": "1", "date": "2026-01-01", "inputs": [], "options": {}}
 
 
 @pytest.mark.parametrize("name", MINE)
@@ -89,8 +89,9 @@ def test_bores_materials_and_springs_that_differ_get_their_columns():
 
 def test_unbalance_is_printed_in_gram_millimetres_with_the_rotation():
     rotor = fem.Rotor([0.2, 0.3], 0.05, stations={"fan": 2})
-    grid = unbalance_table(rotor, {3: -2e-5j, 2: 1e-4})
-    assert grid.rows == (("2 (fan)", "0.2", "100", "0"), ("3", "0.5", "20", "270"))
+    table = unbalance_table(rotor, {3: -2e-5j, 2: 1e-4})
+    texts = zip(*(column.texts for column in table.columns), strict=True)
+    assert list(texts) == [("2 (fan)", "0.2", "100", "0"), ("3", "0.5", "20", "270")]
 
 
 def test_the_response_shows_peaks_margins_and_forces():
@@ -100,7 +101,8 @@ def test_the_response_shows_peaks_margins_and_forces():
     for key in ("speed_rpm", "amplification_factor", "separation_margin_percent", "required_margin_percent"):
         assert {f"peaks.{k}.{key}" for k in range(6)} <= sheet.keys
     words = {True: "enough", False: "NOT ENOUGH", None: "–"}
-    assert [row[-1] for row in rows_of(sheet, "Peaks")] == [words[p["enough"]] for p in peaks]
+    shown = [row[-1] for row in rows_of(sheet, "peaks of every reading")]
+    assert shown == [words[p["enough"]] for p in peaks]
     assert {f"bearing_forces.largest_N.{k}" for k in range(3)} <= sheet.keys
     micro = next(s for s in sheet.shown if s.key == "largest.0.amplitude_m")
     assert float(micro.text) == pytest.approx(1e6 * sheet.document["largest"][0]["amplitude_m"], rel=1e-3)
@@ -114,17 +116,17 @@ def test_a_margin_that_is_too_small_is_a_warning(tmp_path):
         report=tmp_path / "sheet.html",
     )  # fmt: skip
     short = [peak for peak in made.document["peaks"] if peak["enough"] is False]
-    listed = read_sheet(made.html).text.split("<main>")[0]
+    first = read_sheet(made.html).text.split("<main>")[1].split("<svg")[0]
     assert short
+    assert "NOT far enough" in first
     for peak in short:
-        assert f"peak at {peak['speed_rpm']:.6g} rpm" in listed
-        assert f"API 684 requires {peak['required_margin_percent']:.1f} %" in listed
+        assert f"{peak['speed_rpm']:.6g} rpm" in first
 
 
 def test_a_free_rotor_has_rigid_body_modes_and_no_supports():
-    modes = fem.critical_speeds(fem.Rotor([0.3, 0.3], 0.05, discs=[fem.Disc(2, 3.0)]), 1)
-    sheet = read_sheet(critical_report(modes.to_dict(), modes, provenance=PROVENANCE))
-    table = rows_of(sheet, "Where the frequency of free whirl")
+    rotor = fem.Rotor([0.3, 0.3], 0.05, discs=[fem.Disc(2, 3.0)])
+    sheet = read_sheet(critical(rotor, CriticalOptions(number=1)).sheet())
+    table = rows_of(sheet, "critical speeds")
     assert [row[1] for row in table] == ["rigid body", "rigid body", "forward"]
     assert "<caption>Supports" not in sheet.text
 
@@ -135,8 +137,7 @@ def test_names_are_text_not_markup():
         [0.3, 0.3], 0.05, discs=[fem.Disc(2, 3.0, name=name)], stations={name: 2},
         supports=[fem.Support(1, 1e7, name=name), fem.Support(3, 1e7)],
     )  # fmt: skip
-    modes = fem.critical_speeds(rotor, 1)
-    sheet = read_sheet(critical_report(modes.to_dict(), modes, provenance=PROVENANCE))
+    sheet = read_sheet(critical(rotor, CriticalOptions(number=1)).sheet())
     assert "img" not in [tag for tag, *_ in sheet.order]
     assert sheet.text.count("&lt;img src=x onerror=&#34;alert(1)&#34;&gt;&amp;") >= 3
 

@@ -2,34 +2,25 @@
 
 import matplotlib as mpl
 import numpy as np
-import pytest
 from fem_rotors import rotor23
 
 import fem
-from rotorid.report import rotor_figures
+from fem.plots import bode_figure
 
 mpl.use("Agg")
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """Figures that were drawn, in order."""
-    figures = []
-    monkeypatch.setattr(rotor_figures, "inline_svg", lambda figure, _: figures.append(figure) or "")
-    return figures
 
 
 def legend(axes):
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
-def test_the_response_is_marked_at_the_peaks_of_every_reading(drawn):
+def test_the_response_is_marked_at_the_peaks_of_every_reading():
     rotor, speeds = rotor23(2e4), np.linspace(50.0, 700.0, 400)
     response = fem.unbalance_response(rotor, {12: 1e-3}, speeds)
     places = [2, 12]
     peaks = [fem.response_peaks(response, place) for place in places]
-    rotor_figures.bode_picture(response, places, peaks, (200.0, 250.0))
-    above, below = drawn[0].axes[:2]
+    figure = bode_figure(response, places, peaks, operating=(200.0, 250.0), factors=False)
+    above, below = figure.axes[:2]
     for line, place in zip(above.get_lines(), places, strict=False):
         np.testing.assert_allclose(line.get_ydata(), 1e6 * np.abs(response.at(place)))
     for line, found in zip(above.get_lines(), peaks, strict=False):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import rotorid.workflows as workflows
+from rotorid.commands.input_checks import changed, checked, plain
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.tables.reader.input_file import each_file_once
@@ -39,7 +40,6 @@ from rotorid.workflows import (
     trial_weight,
     unbalance,
 )
-from rotorid.workflows.input_checks import changed, checked, plain
 
 SAMPLES = sample_data()
 ROTOR = SAMPLES / "rotor23.csv"
@@ -211,7 +211,7 @@ def test_a_file_is_read_anew_by_the_next_call_and_once_inside_another_one(tmp_pa
         same(critical(file), first)
     changed_since = critical(file)
     assert changed_since.provenance["inputs"] != first.provenance["inputs"]
-    assert changed_since.modes.frequencies[0] != first.modes.frequencies[0]
+    assert changed_since.result.frequencies[0] != first.result.frequencies[0]
 
 
 def test_threads_do_not_meet():

@@ -94,7 +94,7 @@ def test_on_linear_supports_it_is_the_response():
     speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
     options = ResponseOptions(speeds=speeds, sensors="2,12:30")
     steady = response(folder / "rotor.toml", folder / "unbalance.csv", options)
-    size = abs(steady.response.readings(steady.sensors))
+    size = abs(steady.result.response.readings(steady.result.sensors))
     np.testing.assert_allclose(found.along[0][[0, -1]], size, rtol=1e-3)
     assert branch.stable.all()
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rotorid.base.logs import progress as log
-from rotorid.cli.terminal import dumb
+from rotorid.commands.terminal import dumb
 
 PATIENCE = 1.0
 """Seconds without a sign, on a terminal."""

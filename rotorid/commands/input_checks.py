@@ -10,7 +10,7 @@ from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.registry import Method, find
-from rotorid.workflows.option_values import option_name
+from rotorid.commands.quantities import option_name
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

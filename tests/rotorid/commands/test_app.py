@@ -1,0 +1,77 @@
+"""The frame: options read once, exit status, what every command on a rotor shares."""
+
+import numpy as np
+import pytest
+
+from rotorid.commands import CampbellOptions, ResponseOptions, campbell, critical, response
+from rotorid.commands.quantities import band, nodes, sensors
+from rotorid.samples import sample_data
+
+
+def test_speeds_in_any_order_and_more_than_once(cli, files):
+    for command in (
+        ("campbell",),
+        ("influence", "--planes", "wheel", "--sensors", "probe"),
+        ("response", "--unbalance", files[1]),
+    ):
+        mixed, sorted_ = (
+            cli(command[0], files[0], *command[1:], "--speeds", text, "--json").json
+            for text in ("300,100,100,200", "100,200,300")
+        )
+        del mixed["provenance"], sorted_["provenance"]
+        assert mixed == sorted_
+
+
+def test_reduce_takes_stations_and_one_speed(cli, files):
+    nodes = ("reduce", files[0], "--nodes", "probe,wheel,6")
+    by_name = cli(*nodes, "--modes", 2, "--json").json
+    assert by_name["nodes"] == [2, 4, 6]
+    assert "--speed takes one speed" in cli(*nodes, "--speed", "100,200").err
+    at = cli(*nodes, "--speed", "2000", "--json").json
+    assert at["rotor_frequencies_rad_s"][0] > by_name["rotor_frequencies_rad_s"][0]
+
+
+OK_SPEEDS = ("--speeds", "100:200:50")
+BAD = [
+    (("campbell", "R", "--speeds", "100:3000:100"), "'rear' at node 7: its table holds 50 to 2000 rad/s"),
+    (("campbell", "R", *OK_SPEEDS, "-n", "0"), "-n"),
+    (("campbell", "R", *OK_SPEEDS, "--operating", "9:5"), "--operating '9:5' is not a range"),
+    (("reduce", "R", "--nodes", "2,4", "--speed", "20"), "'rear' at node 7: its table holds 50 to 2000"),
+    (("response", "R", "--unbalance", "U", "--speeds", "100:2500:100"), "'rear' at node 7"),
+    (("response", "R", "--unbalance", "none.csv", *OK_SPEEDS), "none.csv"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "prope"), "no station is called 'prope'"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "probe:400"), "-360 to 360"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "1,,2"), "with commas"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--at", "300"), "asked for from 100 to 200 rad/s"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--at", "100,110"), "--at takes one speed"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--view", "3d"), "--view"),
+    (("influence", "R", "--planes", "wheel", "--sensors", "99:45", *OK_SPEEDS), "node 99 does not exist"),
+]
+
+
+@pytest.mark.parametrize(("args", "message"), BAD)
+def test_bad_input_ends_with_status_2_and_one_message(cli, files, args, message):
+    outcome = cli(*({"R": files[0], "U": files[1]}.get(arg, arg) for arg in args))
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert outcome.out == ""
+
+
+def test_nodes_sensors_and_ranges_of_the_command_line():
+    assert nodes("7, impeller 3,12", "--planes") == [7, "impeller 3", 12]
+    assert sensors("2:45,probe DE:-30.5,22") == [(2, 45.0), ("probe DE", -30.5), 22]
+    with pytest.raises(ValueError, match=r"--sensors: 'abc' is no angle"):
+        sensors("disc:abc")
+    assert band("60:120rpm") == pytest.approx((2 * np.pi, 4 * np.pi))
+    assert band(None) is None
+
+
+def test_without_a_calibration_nothing_is_there():
+    plain = sample_data() / "rotor23.csv"
+    found = critical(plain)
+    assert "critical_speeds_std_rad_s" not in found.document
+    assert "±" not in found.answer.found
+    assert "frequencies_std_rad_s" not in campbell(plain, CampbellOptions(speeds="50,100")).document
+    answer = response(plain, {12: 1e-3}, ResponseOptions(speeds="50,100"))
+    assert "amplitude_std_m" not in answer.document

@@ -1,0 +1,97 @@
+"""critical: directions, mesh, map, operating range, errors from a calibration, what is left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from tables_data import write_csv
+
+import fem
+from fem.parameter_bands import spread
+from rotorid import read_rotor, write_rotor
+from rotorid.commands import CriticalOptions, critical
+
+
+def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):
+    document = cli("critical", files[0], "-n", 1, "--map", "--json").json["map"]
+    stiffness = document["stiffness_N_per_m"]
+    assert (stiffness[0], stiffness[-1]) == pytest.approx((2e7 / 100, 5e7 * 100))
+    np.testing.assert_allclose(np.diff(np.log(stiffness)), np.log(250 * 100) / (len(stiffness) - 1))
+
+
+def test_critical_with_directions_mesh_check_and_map(cli, files, tmp_path):
+    document = cli("critical", files[0], "-n", 2, "--mesh-check", "--map", "--json").json
+    assert len(document["direction"]) == 2
+    assert np.abs(document["mesh_check"]["relative_error"]).max() < 1e-3
+    curves = np.array(document["map"]["critical_speeds_rad_s"])
+    assert curves.shape == (2, len(document["map"]["stiffness_N_per_m"]))
+    assert (np.diff(curves[0]) > 0).all()
+    outcome = cli(
+        "critical", files[0], "-n", 2, "--map", "--plot", tmp_path / "m.png", "--output", tmp_path / "m.csv"
+    )
+    assert outcome.code == 0, outcome.err
+    assert len(pd.read_csv(tmp_path / "m.csv")) == curves.shape[1]
+
+
+def test_criticals_in_the_operating_range_are_listed(cli, files):
+    first, second = cli("critical", files[0], "-n", 2, "--json").json["critical_speeds_rad_s"]
+    band = f"{0.9 * first}:{first + 0.5 * (second - first)}"
+    command = ("critical", files[0], "-n", 2, "--operating", band)
+    operating = cli(*command, "--json").json["operating"]
+    assert operating["range_rad_s"] == pytest.approx([0.9 * first, (first + second) / 2])
+    inside, outside = operating["critical_speeds"]
+    assert (inside["inside"], inside["separation_percent"]) == (True, 0.0)
+    assert outside["inside"] is False
+    assert outside["separation_percent"] == pytest.approx(100 * (second / ((first + second) / 2) - 1))
+    command = ("campbell", files[0], "--speeds", "50:800:50", "--operating", "50:800")
+    document = cli(*command, "--json").json
+    assert len(document["operating"]["critical_speeds"]) == len(document["damped_critical_speeds"]) > 0
+    assert all(item["inside"] for item in document["operating"]["critical_speeds"])
+
+
+def test_the_map_says_what_it_leaves_out(cli, tmp_path):
+    rotor = fem.Rotor(
+        [0.1] * 8,
+        0.05,
+        supports=[
+            fem.Support(1, 5e7, name="front"),
+            fem.Support(9, 5e7, name="rear", pedestal=fem.Pedestal(50.0, 2e8)),
+            fem.Support(5, -1e4, kind="seal", name="labyrinth"),
+        ],
+    )
+    write_rotor(tmp_path / "r.toml", rotor)
+    said = " ".join(cli("critical", tmp_path / "r.toml", "-n", 1, "--map", "--json").json["warnings"])
+    assert "'labyrinth' is left out" in said
+    assert "'rear'" in said
+    assert "pedestal" in said
+    assert "front" not in said
+
+
+@pytest.mark.parametrize(("model", "named"), [("", 3), ("shear = true\nrotary_inertia = true", 0)])
+def test_what_a_stubby_shaft_lacks_is_one_warning(cli, tmp_path, model, named):
+    columns = ["length_m", "diameter_m", "inner_diameter_m", "support_stiffness_N_per_m"]
+    shaft = [[0.06, 0.05, "", 1e8], [0.06, 0.05, 0.02, ""], [0.06, 0.05, "", ""], [0, 0.05, "", 1e8]]
+    write_csv(tmp_path / "shaft.csv", [columns, *shaft])
+    file = tmp_path / "rotor.toml"
+    file.write_text(f'shaft = "shaft.csv"\n[model]\n{model}\n')
+    document = cli("critical", file, "-n", 3, "--json").json
+    said = [text for text in document["warnings"] if "too high" in text]
+    assert sum(text.count("mode ") for text in said) == named
+    assert len(said) == (named > 0)
+
+
+def test_critical_speeds_have_their_errors(calibrated):
+    found = critical(calibrated, CriticalOptions(number=3))
+    rotor = read_rotor(calibrated)
+    std = spread(rotor, lambda other: fem.critical_speeds(other, 3).frequencies)
+    assert (std > 0).all()
+    np.testing.assert_allclose(found.document["critical_speeds_std_rad_s"], std, rtol=1e-9)
+
+
+def test_a_band_that_cannot_be_given_is_a_warning(calibrated):
+    rotor = read_rotor(calibrated)
+    wild = fem.Calibration(("bearing[1].stiffness.scale",), [1.0], [[4.0]])
+    found = critical(replace(rotor, calibration=wild))
+    assert "critical_speeds_std_rad_s" not in found.document
+    assert any("no error bands of the critical speeds: within" in text for text in found.document["warnings"])
