@@ -115,14 +115,13 @@ def module_name(path: str) -> str:
 def order(mutation: mutations.Mutation, suite: Suite, imports: dict[str, set[str]]) -> list[str]:
     """Tests for a mutation, those first that are most likely and quickest to find it.
 
-    At module level, where everything runs on import, all tests of files that are named after the module or
-    import it, then those that run any function of it.
+    At module level, where everything runs on import, and for what is compiled and tells nothing, all tests of
+    files that are named after the module or import it, then those that run any function of it.
     """
     module = module_name(mutation.path)
     own = {name: tests for name, tests in suite.runs.items() if name.startswith(f"{mutation.path}::")}
-    if mutation.function:
-        direct = own.get(f"{mutation.path}::{mutation.function}", set())
-    else:
+    direct = own.get(f"{mutation.path}::{mutation.function}", set())
+    if not direct:
         direct = set().union(*own.values())
         direct |= {t for t in suite.seconds if module in imports[t.partition("::")[0]]}
     # values kept by a cache were computed in one test only: the others of its file come last
