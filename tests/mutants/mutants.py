@@ -1,10 +1,10 @@
 """Do tests find one-line defects? Run by `make mutants`; options: `python tests/mutants/mutants.py --help`.
 
-First the whole suite runs once in a copy of the tree and writes down which test runs which function (kept in
-`.mutants/` until a file changes; tests that fail without any mutation are named and left out). Then every
-mutation is applied in a copy of its own, and the tests that run the mutated function are run until one fails:
-first those whose file is named after the module, then those whose file imports it, then the others; short
-ones first. All mutants have their first turn, then those that are alive get the rest, as time allows.
+First the suite of `make test` runs once in a copy of the tree and writes down which test runs which function
+(kept in `.mutants/` until a file changes; tests that fail without any mutation are named and left out). Then
+every mutation is applied in a copy of its own, and the tests that run the mutated function are run until one
+fails: first those whose file is named after the module, then those whose file imports it, then the others;
+short ones first. All mutants have their first turn, then those that are alive get the rest, as time allows.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ STORE = ROOT / ".mutants"
 LEFT_OUT = shutil.ignore_patterns(
     ".git", ".venv*", ".mutants", ".hypothesis", ".*_cache", "_build", "dist", "build", "demo", "*.egg-info"
 )
+SUITE = ("-m", "not full")
+"""What `make test` runs."""
 TURNS = (15.0, 60.0, 1e9)
 """Seconds of tests, as measured without mutation, that a mutant meets in its first, second and last turn."""
 
@@ -113,14 +115,13 @@ def module_name(path: str) -> str:
 def order(mutation: mutations.Mutation, suite: Suite, imports: dict[str, set[str]]) -> list[str]:
     """Tests for a mutation, those first that are most likely and quickest to find it.
 
-    At module level, where everything runs on import, all tests of files that are named after the module or
-    import it, then those that run any function of it.
+    At module level, where everything runs on import, and for what is compiled and tells nothing, all tests of
+    files that are named after the module or import it, then those that run any function of it.
     """
     module = module_name(mutation.path)
     own = {name: tests for name, tests in suite.runs.items() if name.startswith(f"{mutation.path}::")}
-    if mutation.function:
-        direct = own.get(f"{mutation.path}::{mutation.function}", set())
-    else:
+    direct = own.get(f"{mutation.path}::{mutation.function}", set())
+    if not direct:
         direct = set().union(*own.values())
         direct |= {t for t in suite.seconds if module in imports[t.partition("::")[0]]}
     # values kept by a cache were computed in one test only: the others of its file come last
@@ -155,8 +156,8 @@ def environment(tree: Path, **more: str) -> dict[str, str]:
 
 
 def pytest_in(tree: Path, arguments: list[str], limit: float, **more: str) -> int | None:
-    """Exit status, None where the time was over; nothing that was started stays behind."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "mutants_plugin", "-p", "no:cacheprovider"]
+    """Exit status of the tests of `make test`, None where the time was over; nothing started stays behind."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "mutants_plugin", "-p", "no:cacheprovider", *SUITE]
     with (tree / "mutants.log").open("w") as log:
         process = subprocess.Popen(
             [*command, *arguments],

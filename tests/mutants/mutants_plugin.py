@@ -23,7 +23,7 @@ MEMORY = 6 * 2**30
 
 
 class _Marks(ast.NodeTransformer):
-    """A call of `_ran_` at the beginning of every function, which tells its name."""
+    """A call of `_ran_` at the beginning of every function, which tells its name; numba compiles none."""
 
     def __init__(self, path):
         self.path, self.where, self.depth = path, [], 0
@@ -35,6 +35,8 @@ class _Marks(ast.NodeTransformer):
         return node
 
     def visit_FunctionDef(self, node):
+        if any(ast.unparse(each).startswith("compiled") for each in node.decorator_list):
+            return node
         before = list(self.where)
         self.where += ["<locals>", node.name] if self.depth else [node.name]
         self.depth += 1

@@ -147,6 +147,7 @@ def test_tables_speak_the_units_of_the_job():
     assert len(frame) == 7
     np.testing.assert_allclose(frame["total"], found.totals * 1e3, rtol=1e-12)
     np.testing.assert_allclose(frame[["A_mass", "B_mass", "C_mass"]].sum(axis=1), frame["total"], rtol=1e-12)
+    np.testing.assert_allclose(frame["rms_after"], found.rms * 2e6, rtol=1e-12)
     np.testing.assert_allclose(frame["max_after"], found.largest * 2e6, rtol=1e-12)
     assert frame.index[frame["knee"]].tolist() == [found.knee]
     data = json.loads(json.dumps(found.to_dict()))

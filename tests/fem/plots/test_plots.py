@@ -146,6 +146,7 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     np.testing.assert_allclose(np.diff(lines[4].get_data(), axis=0), 0.0)
     marks = next(line for line in lines if line.get_linestyle() == "None")
     np.testing.assert_allclose(marks.get_xdata(), RPM * np.array([380.95, 421.05]))
+    assert [text.get_ha() for text in above.texts if "δ" in text.get_text()] == ["left", "right"]
     assert above.get_ylabel() == "whirl frequency, rpm"
     assert below.get_xlabel() == "speed, rpm"
     assert below.get_ylabel() == "logarithmic decrement"

@@ -189,12 +189,14 @@ def test_notes_are_kept_only_for_those_who_ask(capsys):
     def command(n: int = 1) -> None:
         """Count."""
         verbose.note({"rank": n, "provenance": {"rank": 9}, "masses": [1.0], "deep": {"mac": [0.5] * 20}})
+        verbose.note({"history": [{"cost": 9.0}, {"cost": 2.5}]})
 
     verbose.verbosely(command)(4)
     assert capsys.readouterr() == ("", "")
     verbose.verbosely(command)(4, verbose=True)
     shown = numbers(capsys.readouterr().err)
-    assert shown == {"rank": "4", "deep.mac": ", ".join(["0.5"] * 12) + ", … (20 in all)"}
+    many = ", ".join(["0.5"] * 12) + ", … (20 in all)"
+    assert shown == {"rank": "4", "deep.mac": many, "history.cost": "9 … 2.5 in 2 entries"}
     assert not verbose.log.handlers
 
 

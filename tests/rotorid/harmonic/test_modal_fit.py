@@ -257,9 +257,11 @@ def test_a_node_of_a_mode_stays_readable(tmp_path):
     omega = around(omega0[:2], 2e-4 * omega0[:2])
     Z = amplitudes(omega, M3, 4e-4 * K3, K3, [1.0, 0.2, 0.0])
     result = fitted(omega, measured(omega, Z, AmplitudeErrors(0.02, 0.02), (np.random.default_rng(4), 0.02)))
-    path = tmp_path / "modes.csv"
-    result.to_frame().to_csv(path, index=False)
+    path, frame = tmp_path / "modes.csv", result.to_frame()
+    frame.to_csv(path, index=False)
     read = read_modes(path)
+    of_frequency = result.fit.std[:2] / result.fit.estimate.solution[:2]
+    np.testing.assert_allclose(frame["frequency_std_percent"][::3], 100 * of_frequency)
     assert 0.3 < read.shape_std[1, 1] <= 10
     assert abs(read.shapes[1, 1]) < 4 * read.shape_std[1, 1] * abs(read.shapes[1, 1])
     assert read.shape_std[1, 1] * abs(read.shapes[1, 1]) > 1e-3  # of 2 % of noise

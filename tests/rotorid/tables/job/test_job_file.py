@@ -254,8 +254,9 @@ def test_bad_sheets_of_a_workbook(book, tmp_path):
     the_only(found, "job.xlsx", 2, "available_g", "20", "the holes of the plane too")
     found = complaints(book, planes=[["plane"], ["1"], ["1"]])
     the_only(found, "job.xlsx", 3, "plane", "1", "each plane once (row 2 has it too)")
-    found = complaints(book, sensors=[["name"], ["A"]])
-    the_only(found, "job.xlsx", 1, "sensor", None, "a column sensor; the columns are name")
+    for sensors in ([["name"], ["A"]], [["name"]]):
+        found = complaints(book, sensors=sensors)
+        the_only(found, "job.xlsx", 1, "sensor", None, "a column sensor; the columns are name")
     path = write_book(tmp_path / "none.xlsx", {"weights": WEIGHTS})
     the_only(complaints(read_job, path), "none.xlsx", None, None, None, "a sheet 'runs'")
     found = complaints(book, settings=[["key", "value"], ["planes", 3]], planes=[["plane"], ["1"]])
