@@ -75,86 +75,10 @@ def _drawing(draw: Callable[[], Figure], caption: str) -> Drawing:
         return Drawing(inline_svg(figure, caption), caption)
 
 
-<<<<<<< HEAD
-def _files(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [("Rotor file", str(entry["file"])) for entry in provenance["inputs"][:1]]
-
-
-def _operating(operating: Band) -> list[tuple[str, str]]:
-    if operating is None:
-        return []
-    low, high = operating
-    return [("Operating", f"{low * RPM:.6g} to {rpm_text(high)} ({low:.6g} to {high:.6g} rad/s)")]
-
-
-def _inside(document: Mapping[str, Any]) -> list[str]:
-    """Critical speeds in the operating range, as warnings."""
-    rows = document.get("operating", {}).get("critical_speeds", [])
-    return [
-        f"critical speed {k}, {row['speed_rad_s'] * RPM:.6g} rpm, lies inside the operating range"
-        for k, row in enumerate(rows, start=1)
-        if row["inside"]
-    ]
-
-
-def _criticals(document: Document, modes: Modes) -> Table:
-    """The critical speeds, with their distance from the operating range and the error of the mesh."""
-    speeds, _ = modes.tables()
-    columns = [column for column in speeds.columns if column.key or column.heading in ("mode", "whirl")]
-    operating, notes = document.get("operating"), []
-    if operating:
-        rows = operating["critical_speeds"]
-        path = "operating.critical_speeds.*.separation_percent"
-        distance = [row["separation_percent"] for row in rows]
-        columns.append(Column("operating range", ["INSIDE" if row["inside"] else "outside" for row in rows]))
-        columns.append(Column("from operating range, %", distance, "{:.1f}".format, path))
-        notes.append("The distance is in percent of the nearest end of the operating range.")
-    if document.get("mesh_check"):
-        errors = [100.0 * error for error in document["mesh_check"]["relative_error"]]
-        path = "mesh_check.relative_error.*"
-        columns.append(Column("error of the mesh, %", errors, "{:.2g}".format, path, 100.0))
-    if document.get("critical_speeds_cut"):
-        notes.append(document["critical_speeds_cut"])
-    caption = "Where the frequency of free whirl equals the speed of rotation"
-    return Table(caption, tuple(columns), " ".join(notes))
-
-
-def _map(document: Document, chart: SpeedMap | None, operating: Band) -> list[Part]:
-    if chart is None:
-        return []
-    found = document["map"]
-    modes = Column("mode", range(1, len(found["free_rad_s"]) + 1))
-    limits = [
-        Column(
-            f"{name}, rpm",
-            [None if speed is None else RPM * speed for speed in found[f"{name}_rad_s"]],
-            "{:.1f}".format,
-            f"map.{name}_rad_s.*",
-            RPM,
-        )
-        for name in ("free", "pinned")
-    ]
-    table = Table("Limits of soft and of stiff supports", (modes, *limits))
-    sentence = "Undamped, every support of the same stiffness in x and y."
-    return [Part("Critical speed map", (sentence,), (table,), (map_picture(chart, operating),))]
-
-
-def _shapes(modes: Modes) -> tuple[Table, ...]:
-    """Deflections at the nodes, some modes abreast, each in the scale of the picture."""
-    largest = np.abs(smooth_shapes(modes)[1]).max(axis=0)
-    _, (node, position, *shapes) = (table.columns for table in modes.tables())
-    position = Column("position, m", position.values, "{:.4f}".format, position.key)
-    scaled = [
-        Column(f"mode {k}", np.array(shape.values) / size, shape.shown, shape.key, 1 / float(size))
-        for k, (shape, size) in enumerate(zip(shapes, largest, strict=True), start=1)
-    ]
-    caption = "Deflection at the nodes, in the scale of the picture: the largest between the ends is 1"
-=======
 def _narrow(table: Table) -> tuple[Table, ...]:
     """The table, or several that repeat its first two columns."""
     first, others = table.columns[:2], table.columns[2:]
     step = ABREAST - 2
->>>>>>> cmd
     return tuple(
         Table(table.name, (*first, *others[k : k + step]), table.note)
         for k in range(0, max(len(others), 1), step)
