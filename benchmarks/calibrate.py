@@ -22,7 +22,7 @@ import fem
 from balancing import ReadingErrors, Trials
 from benchmarks.rotors import ROSS, Bearing, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, once, relative_difference
-from fem.model.rotor_parameters import parameter_value
+from fem.parameters import parameter_value
 from rotorid.calibration import RunReadings, Unknown, calibrate
 
 BEARING = Bearing(damping=2e4, vertical=0.6, vertical_damping=3e4)

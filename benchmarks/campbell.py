@@ -19,7 +19,7 @@ import numpy as np
 import fem
 from benchmarks.rotors import ANISOTROPIC, ROSS, SIZES, judge, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, once, scaling
-from fem.campbell import campbell
+from fem import campbell
 
 SPEEDS = np.linspace(20.0, 1000.0, 50)
 JUDGED = 25  # index of the speed in higher precision

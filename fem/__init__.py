@@ -1,6 +1,7 @@
 """The direct problem: a rotor in, critical speeds, mode shapes, amplitudes and compliance out.
 
-Everything is in SI units, nodes are numbered from 1, a positive phase is a lead.
+Everything is in SI units, nodes are numbered from 1, a positive phase is a lead. What other programs use
+stands here and in `fem.assembly`, `fem.parameters`, `fem.forces` and `fem.plots`.
 
 >>> import fem
 >>> supports = [fem.Support(1, 1e8), fem.Support(11, 1e8)]
@@ -9,7 +10,10 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem._new.forces import (
+from fem import plots
+from fem.campbell import Campbell, campbell
+from fem.derivatives import MatrixChange, matrix_change, receptance_with_derivatives
+from fem.forces import (
     CubicSpring,
     InternalDamping,
     JournalBearing,
@@ -18,50 +22,104 @@ from fem._new.forces import (
     SqueezeFilm,
     Stop,
 )
-from fem._new.rotor import (
+from fem.orbits import DIRECTION_NAMES, Orbits, orbits, probe, whirl_direction
+from fem.peaks import (
+    Peak,
+    Peaks,
+    Separation,
+    api617_limit,
+    api_unbalance,
+    critical_peaks,
+    open_question,
+    peak_columns,
+    required_margin,
+    resolve_peaks,
+    response_peaks,
+    unsearched,
+)
+from fem.plots import draw_rotor
+from fem.response import (
+    BearingForces,
+    InfluenceCoefficients,
+    Response,
+    Unbalance,
+    influence,
+    polar,
+    unbalance_response,
+    unit_loads,
+)
+from fem.rotor import (
+    KINDS,
+    SHORTEST,
     STEEL_DENSITY,
     STEEL_MODULUS,
     STEEL_POISSON,
     Calibration,
+    Coefficient,
     Disc,
     Model,
+    Pair,
     Pedestal,
     Rotor,
     Sensor,
+    SensorLike,
     Support,
+    as_sensor,
+    is_reading,
+    label,
     refined,
+    too_short,
 )
-from fem.api684_peaks import Peak, Peaks, required_margin
-from fem.campbell import Campbell, campbell
-from fem.critical import critical_speeds
-from fem.matrices.equations_of_motion import Motion, equations_of_motion
-from fem.mesh import MeshCheck, mesh_check
-from fem.modes_result import Modes
-from fem.orbits import Orbits, orbits, probe, whirl_direction
-from fem.peak_refinement import resolve_peaks
-from fem.plots import draw_rotor
-from fem.response import influence, response_peaks, unbalance_response
-from fem.response_result import BearingForces, InfluenceCoefficients, Response
-from fem.speed_map import Intersection, SpeedMap, speed_map
-from fem.stability import Stability, stability_threshold
-from fem.state_space import StateSpace, state_space
-from fem.static import StaticDeflection, compliance, static_deflection
-from fem.whirl import WhirlModes, whirl_modes
-from fem.windows import Window
+from fem.speed_map import SpeedMap, speed_map
+from fem.stability import Stability, Window, range_of_speeds, runs_away, stability_threshold, threshold_of
+from fem.state_space import Motion, StateSpace, equations_of_motion, state_space
+from fem.static import GRAVITY, StaticDeflection, compliance, static_deflection
+from fem.undamped import (
+    NOT_COUNTED,
+    MeshCheck,
+    Modes,
+    Pencil,
+    Spectrum,
+    critical_speeds,
+    critical_speeds_below,
+    critical_speeds_near,
+    finite_modes,
+    lowest_critical_speeds,
+    lowest_modes,
+    mesh_check,
+    one_plane,
+    whole_rotor,
+)
+from fem.whirl import (
+    Whirl,
+    WhirlModes,
+    available_modes,
+    checked_number,
+    reference,
+    solve,
+    solve_whirl,
+    whirl_modes,
+)
 
 __all__ = [
+    "DIRECTION_NAMES",
+    "GRAVITY",
+    "KINDS",
+    "NOT_COUNTED",
+    "SHORTEST",
     "STEEL_DENSITY",
     "STEEL_MODULUS",
     "STEEL_POISSON",
     "BearingForces",
     "Calibration",
     "Campbell",
+    "Coefficient",
     "CubicSpring",
     "Disc",
     "InfluenceCoefficients",
     "InternalDamping",
-    "Intersection",
     "JournalBearing",
+    "MatrixChange",
     "MeshCheck",
     "Model",
     "Modes",
@@ -69,12 +127,17 @@ __all__ = [
     "MuszynskaSeal",
     "NodeForce",
     "Orbits",
+    "Pair",
     "Peak",
     "Peaks",
     "Pedestal",
+    "Pencil",
     "Response",
     "Rotor",
     "Sensor",
+    "SensorLike",
+    "Separation",
+    "Spectrum",
     "SpeedMap",
     "SqueezeFilm",
     "Stability",
@@ -82,26 +145,62 @@ __all__ = [
     "StaticDeflection",
     "Stop",
     "Support",
+    "Unbalance",
+    "Whirl",
     "WhirlModes",
     "Window",
+    "api617_limit",
+    "api_unbalance",
+    "as_sensor",
+    "available_modes",
     "campbell",
+    "checked_number",
     "compliance",
+    "critical_peaks",
     "critical_speeds",
+    "critical_speeds_below",
+    "critical_speeds_near",
     "draw_rotor",
     "equations_of_motion",
+    "finite_modes",
     "influence",
+    "is_reading",
+    "label",
+    "lowest_critical_speeds",
+    "lowest_modes",
+    "matrix_change",
     "mesh_check",
+    "one_plane",
+    "open_question",
     "orbits",
+    "peak_columns",
+    "plots",
+    "polar",
     "probe",
+    "range_of_speeds",
+    "receptance_with_derivatives",
+    "reference",
     "refined",
     "required_margin",
     "resolve_peaks",
     "response_peaks",
+    "runs_away",
+    "solve",
+    "solve_whirl",
     "speed_map",
     "stability_threshold",
     "state_space",
     "static_deflection",
+    "threshold_of",
+    "too_short",
     "unbalance_response",
+    "unit_loads",
+    "unsearched",
     "whirl_direction",
     "whirl_modes",
+    "whole_rotor",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,46 +1,73 @@
-"""Campbell diagram: whirl frequencies and decrements over speed, and the damped critical speeds."""
+"""Campbell diagram: whirl frequencies and decrements over speed, and the damped critical speeds.
+
+Modes of neighbouring speeds are the same where their states (u, λ u / |λ|) are alike: MAC in the energy of
+the basis, in which vectors have length 1, and the best assignment of all (`linear_sum_assignment`).
+Velocities tell apart forward and backward whirl of one shape. A step in which a mode is hardly like itself
+is halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
+Crossings are roots (`brentq`) on the mode itself, which inverse iteration follows from the nearer end of the
+step; where it slips to another mode the step is halved, too.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.campbell_modes import followed_closely, runs_away, swings, went_above
-from fem.growth import Growing, growing, joined
-from fem.growth_check import growth_bound, judge
-from fem.mesh import refined
-from fem.model.rotor import Rotor, whole
+from fem.assembly import both_planes
 from fem.orbits import DIRECTION_NAMES, whirl_direction
-from fem.parameter_bands import nearest_modes
-from fem.solvers.crossing import crossings, off_synchronous
-from fem.solvers.mode_tracking import Followed
-from fem.solvers.reduced_whirl import Whirl
-from fem.solvers.stable_speeds import GROWTH
-from fem.whirl import available_modes, checked_number, in_both_planes
-from fem.windows import Window, within
-from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds
+from fem.parameters import nearest_modes
+from fem.rotor import Rotor, refined
+from fem.stability import (
+    Window,
+    covering,
+    grid_of,
+    holding,
+    near_level,
+    runs_away,
+    windows_of,
+    within,
+)
+from fem.undamped import Result
+from fem.whirl import (
+    GROWTH,
+    NONE,
+    Whirl,
+    available_modes,
+    checked_number,
+    in_both_planes,
+    polish,
+    solve,
+    solve_whirl,
+)
+from rotorid.base.answer import Answer
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.tables import Column as Told
-from rotorid.base.tables import Table
+from rotorid.base.rpm import RPM, range_text
+from rotorid.base.tables import Column, Table, frame, terminal
 from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
 
-HEAVY = 1.28  # log decrement at an amplification factor of 2.5: critically damped after API 684
-_EQUAL = 1e-10  # relative difference of speeds below which rounding alone would sort two modes
-_NAMED = 5  # critical speeds that a warning names
+HEAVY = 1.28
+"""Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
+_ALIKE = 0.8  # MAC of a mode with itself a step further
+_HARDLY = 0.3  # MAC below which two modes are not one
+_NARROW = 1e-4  # of the highest speed: steps that are not halved
+_DENSE = 8  # times the speeds asked for: so many are computed at most
+_SWINGS = 14.0  # log decrement above which a critical speed has no meaning
+_VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
+_PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
+_SPARE, _MOST = 2, 3  # modes above those asked for, which may come down; computed for one asked for, at most
 
 
-@dataclass(frozen=True, eq=False)
-class Campbell(Answered):
+@dataclass(frozen=True, eq=False, repr=False)
+class Campbell(Result):
     """Whirl over speed; each column is one mode, followed through crossings.
 
     Attributes
@@ -67,7 +94,7 @@ class Campbell(Answered):
     warnings
         What the reader must know.
     unstable
-        Modes that grow at some of the speeds, and from which speed on, by that speed.
+        Those of `windows` in which a mode that is listed grows first, with its number in the list.
     windows
         Ranges of speed in which any mode grows, listed or not.
     cut
@@ -75,7 +102,8 @@ class Campbell(Answered):
     std
         Standard deviations of `frequencies`, from the calibration of the rotor; None without.
     heavy
-        Logarithmic decrement above which a mode is heavily damped.
+        Logarithmic decrement above which a mode is heavily damped: such modes are listed only where there are
+        fewer others, and drawn pale.
     """
 
     speeds: FloatArray
@@ -89,7 +117,7 @@ class Campbell(Answered):
     error: float
     rotor: Rotor
     warnings: tuple[str, ...] = ()
-    unstable: tuple[Growing, ...] = ()
+    unstable: tuple[Window, ...] = ()
     windows: tuple[Window, ...] = ()
     cut: str = ""
     std: FloatArray | None = None
@@ -107,132 +135,106 @@ class Campbell(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
-        own = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
+        errors = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
+        whole = self.tables()[0]
+        keys = [column.key.rpartition(".")[2] for column in whole.columns]
+        rows = [dict(zip(keys, row, strict=True)) for row in whole.rows]
         return plain(
             {
                 "speeds_rad_s": self.speeds,
                 "frequencies_rad_s": self.frequencies.T,
-                **own,
+                **errors,
                 "log_decrements": self.log_decrements.T,
-                "direction": self._ways().T,
+                "direction": _words(self.direction, self.frequencies).T,
                 "damped_critical_speeds_rad_s": self.critical_speeds,
-                "damped_critical_speeds": rows(self._criticals()),
+                "damped_critical_speeds": rows,
                 "damped_critical_speeds_cut": self.cut or None,
-                "unstable": [mode.to_dict() for mode in self.unstable],
+                "unstable": [self._growing(window) for window in self.unstable],
                 "unstable_speeds": [window.to_dict() for window in self.windows],
                 "warnings": self.warnings,
             }
         )
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed and mode."""
-        S, n = self.frequencies.shape
-        return frame(
-            (
-                Column("speed_rad_s", np.repeat(self.speeds, n)),
-                Column("mode", np.tile(np.arange(1, n + 1), S)),
-                Column("frequency_rad_s", self.frequencies.ravel()),
-                *(Column("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
-                Column("log_decrement", self.log_decrements.ravel()),
-                Column("direction", self._ways().ravel()),
-            )
-        )
+    def _growing(self, window: Window) -> dict[str, Any]:
+        inside = within((window,), self.speeds)
+        return {
+            "mode": window.mode,
+            "speed_rad_s": window.first,
+            "speed_rpm": window.first * RPM,
+            "from_start": not window.begins,
+            "last_speed_rad_s": self.speeds[inside][-1],
+            "end_rad_s": window.last if window.ends else None,
+            "frequency_rad_s": window.frequency,
+            "direction": window.way,
+            "lowest_log_decrement": np.nanmin(self.log_decrements[inside]),
+        }
 
     def tables(self) -> tuple[Table, ...]:
         """The damped critical speeds; and the modes at each speed."""
         at, decrements = "damped_critical_speeds.*.", self.critical_log_decrements
-        ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
         criticals = (
-            Told("mode", self.critical_modes, key=at + "mode"),
-            Told("whirl", ways, key=at + "direction"),
-            Told("rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
-            Told("rad/s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
-            Told("log dec", decrements, "{:z.4f}".format, at + "log_decrement"),
-            Told("", decrements > HEAVY, _no_peak),
+            Column("mode", self.critical_modes, key=at + "mode"),
+            Column("whirl", _words(self.critical_direction, self.critical_speeds), key=at + "direction"),
+            Column("rpm", self.critical_speeds * RPM, "{:.2f}".format, at + "speed_rpm"),
+            Column("rad/s", self.critical_speeds, "{:.4f}".format, at + "speed_rad_s"),
+            Column("log dec", decrements, "{:z.4f}".format, at + "log_decrement"),
+            Column("", decrements > HEAVY, f"no peak: above {HEAVY}".__mul__, at + "heavily_damped"),
         )
         S, n = self.frequencies.shape
         modes = (
-            Told("speed_rad_s", np.repeat(self.speeds, n)),
-            Told("mode", np.tile(np.arange(1, n + 1), S)),
-            Told("frequency_rad_s", self.frequencies.ravel()),
-            *(Told("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
-            Told("log_decrement", self.log_decrements.ravel()),
-            Told("direction", self._ways().ravel()),
+            Column("speed_rad_s", np.repeat(self.speeds, n), "{:.4f}".format),
+            Column("mode", np.tile(np.arange(1, n + 1), S)),
+            Column("frequency_rad_s", self.frequencies.ravel(), "{:.4f}".format),
+            *(Column("frequency_std_rad_s", std.ravel()) for std in (self.std,) if std is not None),
+            Column("log_decrement", self.log_decrements.ravel(), "{:z.4f}".format),
+            Column("direction", _words(self.direction, self.frequencies).ravel()),
         )
         return (Table("damped critical speeds", criticals), Table("modes", modes))
 
-    def mesh_change(self) -> tuple[float, float]:
-        """Largest relative change of frequencies and of damped critical speeds on elements cut in two."""
-        halved = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1])
-        other = nearest_modes(self.frequencies, halved.frequencies)
-        light = self.log_decrements <= self.heavy
-        change = np.abs(other / self.frequencies - 1)[light]
-        apart = np.abs(halved.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
-        return float(np.nanmax(change, initial=0.0)), float(apart.max(initial=0.0))
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and mode."""
+        return frame(self.tables()[1])
 
     def sentence(self) -> str:
         """Whether it is stable, and how many damped critical speeds there are."""
-        return self.answer.judgement
+        unstable = listing([window.where() for window in self.windows], "and")
+        text = f"UNSTABLE {unstable}: a motion grows there" if unstable else "Stable: no motion grows"
+        heavy = int((self.critical_log_decrements > HEAVY).sum())
+        light = self.critical_speeds.size - heavy
+        count = counted(light, "damped critical speed") if light else "No damped critical speed"
+        more = f", {heavy} more without a peak" if heavy else ""
+        return f"{text}. {count}{more} from {range_text(self.speeds[0], self.speeds[-1])}."
 
     @property
     def answer(self) -> Answer:
-        """Whether it is stable, and the damped critical speeds that show a peak."""
-        unstable = listing([window.where() for window in self.windows], "and")
-        said = f"UNSTABLE {unstable}: a motion grows there." if unstable else "Stable: no motion grows."
-        speed, rpm, mode, decrement, whirl, mark = self._criticals()
-        heavy = int((self.critical_log_decrements > HEAVY).sum())
-        light = self.critical_speeds.size - heavy
-        count = counted(light, "damped critical speed") if light else "no damped critical speed"
-        if heavy:
-            count += f", {heavy} more without a peak"
-        return Answer(
-            f"{said}\nFrom {range_text(self.speeds[0], self.speeds[-1])}: {count}.",
-            text((mode, whirl, rpm, speed, decrement, mark), left=2) if self.critical_speeds.size else "",
-            self.warnings,
-            (self.cut,) if self.cut else (),
-            (self._at(0), self._at(-1)),
-            "whirl at both ends of the range",
-        )
+        """The sentence, the damped critical speeds, the warnings, and the modes at every speed."""
+        criticals, modes = map(terminal, self.tables())
+        text = criticals if self.critical_speeds.size else ""
+        cut = (self.cut,) if self.cut else ()
+        return Answer(self.sentence(), text, self.warnings, cut, (modes,), "the modes at every speed")
 
-    def _at(self, s: int) -> str:
-        """Whirl at one of the speeds."""
-        columns = (
-            Column("mode", range(1, self.frequencies.shape[1] + 1), str),
-            Column("whirl", [word or "none" for word in self._ways()[s]], str),
-            Column("rpm", self.frequencies[s] * RPM, "{:.2f}".format),
-            Column("rad/s", self.frequencies[s], "{:.4f}".format),
-            Column("log dec", self.log_decrements[s], _rounded),
-        )
-        return f"Whirl at {rpm_text(self.speeds[s])}:\n{text(columns, left=2)}"
+    def mesh_change(self) -> tuple[float, float]:
+        """Largest relative change of frequencies and of damped critical speeds on elements cut in two.
 
-    def _criticals(self) -> tuple[Column, ...]:
-        ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
-        return (
-            Column("speed_rad_s", self.critical_speeds, "{:.4f}".format, "rad/s"),
-            Column("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, "rpm"),
-            Column("mode", self.critical_modes, str),
-            Column("log_decrement", self.critical_log_decrements, _rounded, "log dec"),
-            Column("direction", ways, str, "whirl"),
-            Column("heavily_damped", self.critical_log_decrements > HEAVY, _no_peak, ""),
-        )
-
-    def _ways(self) -> AnyArray:
-        """Directions in words, None where a mode does not oscillate, shape (S, n)."""
-        words = np.full(self.direction.shape, None, dtype=object)
-        for number, word in DIRECTION_NAMES.items():
-            words[np.isfinite(self.frequencies) & (self.direction == number)] = word
-        return words
+        Of frequencies with decrements up to `heavy`. Elements converge as h⁴: 16/15 of it is the error of the
+        mesh.
+        """
+        fine = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1], heavy=self.heavy)
+        frequencies = nearest_modes(self.frequencies, fine.frequencies)
+        change = np.where(self.log_decrements <= self.heavy, np.abs(frequencies / self.frequencies - 1), 0.0)
+        apart = np.abs(fine.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
+        return float(np.nanmax(change)), float(apart.max(initial=0.0))
 
 
 def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: float = 6.0) -> Campbell:
     """Compute whirl frequencies, logarithmic decrements and directions over speed.
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
-    between the given speeds where it leaves a doubt; on rotationally symmetric supports forward and backward
-    whirl are kept apart exactly. The n modes are those that meet the 1× line first, then those that are most
-    often among the n of lowest frequency; they are numbered by frequency at the first speed, backward before
-    forward where a pair coincides. Where a curve crosses the 1× line between two speeds, the crossing is
-    found by iteration on the model.
+    between the given speeds where it leaves a doubt. The n modes are those that meet the 1× line first, then
+    those of the lowest frequency on the whole; they are numbered by frequency at the first speed, backward
+    before forward where a pair coincides. Modes that are heavily damped at more than half of the speeds come
+    last. Where a curve crosses the 1× line between two speeds, the crossing is found by iteration on the
+    model.
 
     Parameters
     ----------
@@ -252,142 +254,252 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         rotor is pushed aside by negative stiffness at every speed.
     """
     speeds = checked_speeds(speeds, ascending=True)
-    available = available_modes(rotor)
-    said_of_number: tuple[str, ...] = ()
-    if n is not None and whole(n, "the number of modes") > available:
-        said_of_number, n = (f"the model has only {available} of {n} modes",), available
-    n = checked_number(rotor, n)
-    whirl, paths, columns = followed_closely(rotor, speeds, n)
-    asked = np.searchsorted(whirl.speeds, speeds)
+    asked_for = checked_number(rotor, None) if n is None else whole(n, "the number of modes")
+    n = checked_number(rotor, min(asked_for, available_modes(rotor)))
+    paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
+    columns, whirl = paths.columns, paths.whirl
     if not columns.size:
         raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
-    values, X = paths.values[:, columns], paths.vectors[:, columns]
     if all(runs_away(whirl)):
         raise ValueError(
             "the rotor on its supports is statically unstable at these speeds: a support has negative "
             "stiffness; check its sign and size"
         )
-    lam, x, y = in_both_planes(values[asked], whirl.Q.nodes(X[asked]))
-    gone = ~np.isfinite(lam)
-    direction = np.where(gone, 0.0, whirl_direction(np.nan_to_num(x), np.nan_to_num(y)))
-    frequencies = np.where(gone, np.nan, lam.imag)
-    log_decrements = -2 * np.pi * lam.real / frequencies
-    met = crossings(whirl, values, X, off_synchronous)
-    met = met.only(swings(met.values))
-    apart = np.diff(met.speeds, prepend=0.0) > _EQUAL * met.speeds
-    met = met.only(np.lexsort((met.modes, np.cumsum(apart))))
-    at, cx, cy = in_both_planes(met.values, met.shapes)
-    unstable = growing(whirl, values, X)
-    windows, said = _windows(whirl, asked, values, unstable) or judge(rotor, speeds)
-    shown = np.zeros(speeds.size, dtype=bool)
-    for mode in unstable:
-        shown |= (speeds >= mode.speed) & (speeds <= mode.last)
-    hidden = [
-        text if window.mode is None else f"{text} (a mode that is not listed: ask for more)"
-        for window, text in zip(windows, said, strict=False)
-        if window.mode is None or (within((window,), speeds) & ~shown).any()
-    ]
-    hidden += said[len(windows) :]
-    for array in (frequencies, log_decrements, direction, met.speeds):
-        array.flags.writeable = False
-    return Campbell(
+    asked = np.searchsorted(paths.speeds, speeds)
+    lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
+    roots = [root for root in paths.crossings if _light(root.value, _SWINGS)]
+    roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
+    vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
+    there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
+    unstable, texts, decrements = [], [], _decrements(lam)
+    windows = holding(windows_of(covering(whirl)), speeds)
+    for window in windows:
+        k = int(np.searchsorted(speeds, window.first))
+        apart = np.where(decrements[k] < 0, np.abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
+        if np.isfinite(apart).any():
+            unstable.append(replace(window, mode=int(np.nanargmin(apart)) + 1))
+            texts.append(unstable[-1].sentence())
+        else:
+            texts.append(f"{window.sentence()} (not listed: ask for more modes)")
+    result = Campbell(
         speeds=speeds,
-        frequencies=frequencies,
-        log_decrements=log_decrements,
+        frequencies=lam.imag,
+        log_decrements=decrements,
         direction=direction,
-        critical_speeds=met.speeds,
-        critical_modes=met.modes + 1,
-        critical_log_decrements=-2 * np.pi * at.real / at.imag,
-        critical_direction=whirl_direction(cx, cy),
+        critical_speeds=np.array([root.speed for root in roots]),
+        critical_modes=np.array([root.mode + 1 for root in roots], dtype=np.intp),
+        critical_log_decrements=_decrements(there),
+        critical_direction=ways,
         error=whirl.error,
         rotor=rotor,
-        warnings=(
-            *(mode.said() for mode in unstable),
-            *hidden,
-            *_warnings(whirl, paths, columns, n, asked),
-            *said_of_number,
-        ),
-        unstable=unstable,
+        warnings=(*texts, *_warnings(paths, asked_for, asked)),
+        unstable=tuple(unstable),
         windows=windows,
-        cut=_cut(whirl, paths, columns),
+        cut=_cut(paths),
         heavy=heavy,
     )
+    read_only(result.frequencies, result.log_decrements, direction, result.critical_speeds)
+    return result
 
 
-def _windows(
-    whirl: Whirl, asked: IndexArray, values: ComplexArray, listed: tuple[Growing, ...]
-) -> tuple[tuple[Window, ...], tuple[str, ...]] | None:
-    """As `judge`, where every mode that may grow is known and those that do are listed; else None."""
-    found = whirl.found.values[asked]
-    numbers = [
-        np.count_nonzero(np.nan_to_num(lam.real / np.abs(lam), nan=-1.0) > GROWTH, axis=1)
-        for lam in (found, values[asked])
+class _Root(NamedTuple):
+    """A mode (column, from 0) at a speed, rad/s, where it crosses the 1× line: eigenvalue, vector (R,)."""
+
+    speed: float
+    mode: int
+    value: complex
+    vector: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """Modes over speeds (S,) in the basis of `whirl`, the columns of those asked for, and their crossings.
+
+    λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in
+    which steps shapes do not tell a mode apart from others.
+    """
+
+    whirl: Whirl
+    speeds: FloatArray
+    values: ComplexArray
+    vectors: ComplexArray
+    doubtful: BoolArray
+    columns: IndexArray
+    crossings: list[_Root]
+
+    def roots(self) -> tuple[list[_Root], list[int]]:
+        """Crossings of the 1× line, and steps in which a mode was lost."""
+        f = off_synchronous(self.values[:, self.columns], self.speeds[:, None])
+        change = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
+        steps = np.argwhere(change).tolist()
+        roots = [self._root(k, mode, f[k : k + 2, mode]) for k, mode in steps]
+        lost = [k for (k, _), root in zip(steps, roots, strict=True) if root is None]
+        return [root for root in roots if root], lost
+
+    def _root(self, k: int, mode: int, f: FloatArray) -> _Root | None:
+        """The crossing of a mode in a step, followed from the nearer end; None if it was lost."""
+        from scipy.optimize import brentq
+
+        column, ends = self.columns[mode], [k, k + 1]
+        at = self.speeds[ends].tolist()
+        states = list(zip(f, self.values[ends, column], self.vectors[ends, column], strict=True))
+        there, last = dict(zip(at, states, strict=True)), states[int(np.abs(f).argmin())]
+
+        def excess(speed: float) -> float:
+            nonlocal last
+            if speed not in there:
+                lam, X = np.array([last[1]]), last[2][None]
+                with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
+                    for _ in range(2):
+                        lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), lam, X, 1)[:2]
+                last = there[speed] = off_synchronous(lam, speed)[0], lam[0], X[0]
+            return float(there[speed][0])
+
+        speed = float(brentq(excess, *at, xtol=1e-14 * at[1], rtol=1e-15))
+        left, value, vector = there[speed]
+        return None if abs(left) > _VANISHES * np.abs(f).max() else _Root(speed, mode, complex(value), vector)
+
+
+def off_synchronous(lam: ComplexArray, speed: FloatArray | float) -> FloatArray:
+    """Whirl frequency less the speed."""
+    return np.asarray(np.abs(lam.imag) - speed)
+
+
+def _decrements(lam: ComplexArray) -> FloatArray:
+    """Of what neither grows nor decays, but for rounding, 0."""
+    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+
+
+def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
+    lam, x, y = in_both_planes(values, whirl.Q.nodes(np.nan_to_num(vectors)))
+    return lam, np.where(np.isnan(lam), 0.0, whirl_direction(x, y))
+
+
+def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
+    """Directions in words, None where there is no motion."""
+    words: AnyArray = np.vectorize(DIRECTION_NAMES.get, otypes=[object])(direction)
+    words[np.isnan(there)] = None
+    return words
+
+
+def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
+    """Modes over speed, n (or fewer) of them asked for."""
+    P, available = both_planes(rotor), available_modes(rotor)
+    m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
+    while True:
+        paths = _closely(solve_whirl(P, speeds, m), n, heavy)
+        listed = paths.values[:, paths.columns]
+        full = np.isfinite(listed).all() and (_light(listed, heavy).mean(axis=0) >= 0.5).sum() == n
+        if full or m >= min(_MOST * n + 16, available):
+            return paths
+        m = min(2 * m, available)
+
+
+def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
+    """The modes of a whirl followed, with so many speeds between that nothing is in doubt."""
+    speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
+    while True:
+        paths = _chained(whirl, speeds, values, X, n, heavy)
+        steps: BoolArray = np.asarray(paths.doubtful[:, paths.columns].any(axis=1))
+        for gap in off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
+            steps[near_level(np.nan_to_num(gap), 0.0)] = True
+        wide = np.diff(speeds) > _NARROW * speeds[-1]
+        dense = speeds.size > _DENSE * whirl.speeds.size
+        if dense or not (steps & wide).any():
+            crossings, lost = paths.roots()
+            steps[lost] = True
+            if dense or not (steps & wide).any():
+                return replace(paths, crossings=crossings)
+        k = np.flatnonzero(steps & wide)
+        more = solve(whirl.Q, (speeds[k] + speeds[k + 1]) / 2, values.shape[1], whirl.scale)
+        speeds = np.insert(speeds, k + 1, more.speeds)
+        values, X = np.insert(values, k + 1, more.values, 0), np.insert(X, k + 1, more.vectors, 0)
+
+
+def _chained(
+    whirl: Whirl, speeds: FloatArray, values: ComplexArray, X: ComplexArray, n: int, heavy: float
+) -> _Paths:
+    """Modes of neighbouring speeds, (S, m) and (S, m, R), chained."""
+    from scipy.optimize import linear_sum_assignment
+
+    S, m = values.shape
+    phase = np.nan_to_num(values, nan=1.0)
+    phase /= np.abs(phase)
+    states = (1 + phase[:-1, :, None].conj() * phase[1:, None]) / 2
+    mac = np.nan_to_num(np.abs(X[:-1].conj() @ X[1:].swapaxes(1, 2) * states)) ** 2
+    partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
+    best = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0]
+    labels = np.tile(np.arange(m), (S, 1))
+    count = m
+    for k, mine in enumerate(partner):
+        # What is hardly alike is another mode that came while this one went.
+        new = best[k] < _HARDLY
+        labels[k + 1, mine] = np.where(new, count + np.cumsum(new) - 1, labels[k])
+        count += int(new.sum())
+    rows = np.arange(S)[:, None]
+    paths, vectors = np.full((S, count), NONE), np.full((S, count, X.shape[2]), NONE)
+    doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
+    paths[rows, labels], vectors[rows, labels] = values, X
+    doubtful[rows[:-1], labels[:-1]] = (best < _ALIKE) & (best > 0) & _light(values[:-1], heavy)
+    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), [])
+
+
+def _light(values: ComplexArray | complex, heavy: float) -> BoolArray:
+    """Which oscillate without heavy damping."""
+    return np.asarray(-2 * np.pi * values.real <= heavy * np.abs(values.imag))
+
+
+def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> IndexArray:
+    """The n lowest modes, by frequency at the first speed, backward first where a pair starts as one.
+
+    Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
+    speed is left out below that of another; then those of the lowest frequency on the whole. Those
+    that are heavily damped at half of the speeds come last.
+    """
+    light, there = _light(values, heavy), np.isfinite(values)
+    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    meets = [
+        np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
+        for mode in np.where(light, size, 1e9 * speeds[-1]).T
     ]
-    known = np.nanmax(np.abs(found.imag), axis=1, initial=0.0)
-    bound = growth_bound(whirl.Q.P.rotor, whirl.speeds[asked])
-    if (bound > known).any() or (numbers[0] > numbers[1]).any() or any(runs_away(whirl)):
-        return None
-    windows = joined(listed, whirl.speeds[asked])
-    return windows, tuple(window.said() for window in windows)
+    begins = there.argmax(axis=0)
+    start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
+    start = np.abs(start) * (1 + _PAIR * (start > 0))
+    best = np.lexsort((start, size.mean(axis=0), meets, light.mean(axis=0) < 0.5))[:n]
+    return np.asarray(best[np.lexsort((start[best], begins[best]))])
 
 
-def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> str:
-    """What to say where modes that are not listed have critical speeds in the range."""
-    others = np.delete(paths.values, columns, axis=1)
-    f, light = off_synchronous(others, whirl.speeds[:, None]), swings(others)
-    k, _ = np.nonzero((f[:-1] * f[1:] < 0) & (light[:-1] | light[1:]))
+def _cut(paths: _Paths) -> str:
+    """What to say where modes that are not listed have critical speeds in the range, or may have."""
+    others = np.delete(paths.values, paths.columns, axis=1)
+    f = np.where(_light(others, _SWINGS), off_synchronous(others, paths.speeds[:, None]), np.nan)
+    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
     if k.size:
-        near = ", ".join(f"{speed:.6g}" for speed in np.unique(whirl.speeds[k])[:_NAMED])
-        return (
-            f"the list of critical speeds is cut: modes that are not listed have {k.size} more in this "
-            f"range, just above {near} rad/s; ask for more modes (-n)"
+        where = (
+            f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
         )
-    sizes = np.abs(whirl.found.values[-1].imag)
-    top, last = float(np.nan_to_num(sizes).max(initial=0.0)), float(whirl.speeds[-1])
-    if np.isfinite(sizes).all() and top < last and sizes.size < available_modes(whirl.Q.P.rotor):
-        return (
-            f"the list of critical speeds may be cut: the modes followed reach {top:.6g} rad/s only at "
-            f"{last:.6g} rad/s; ask for more modes (-n)"
-        )
-    return ""
+    elif np.nan_to_num(np.abs(paths.values[-1].imag)).max() < paths.speeds[-1] and others.size:
+        where = f"no mode was followed that reaches {paths.speeds[-1]:.6g} rad/s there"
+    else:
+        return ""
+    return f"the list of critical speeds is cut: {where}; ask for more modes (-n)"
 
 
-def _warnings(
-    whirl: Whirl, paths: Followed, columns: IndexArray, n: int, asked: IndexArray
-) -> tuple[str, ...]:
-    texts = []
-    values, speeds = paths.values[asked][:, columns], whirl.speeds[asked]
-    gone = ~np.isfinite(values)
-    above = went_above(whirl, paths, columns)[asked]
-    for said, cells in (
-        ("does not oscillate (overdamped)", gone & ~above),
-        ("was not found (overdamped, or above the frequencies computed)", above),
-    ):
-        for k in np.flatnonzero(cells.any(axis=0)):
-            where = speeds[cells[:, k]]
-            texts.append(
-                f"mode {k + 1} {said} at {where.size} of {counted(speeds.size, 'speed')}, "
-                f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
-            )
-    if columns.size < n:
-        texts.append(f"only {columns.size} of {n} modes oscillate, the others are overdamped")
-    rigid = whirl.found.still // 2
-    if rigid.any():
+def _warnings(paths: _Paths, n: int, asked: IndexArray) -> tuple[str, ...]:
+    gone = np.isnan(paths.values[asked][:, paths.columns])
+    texts = [
+        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {gone[:, mode].sum()} of "
+        f"{len(gone)} speeds, the first {paths.speeds[asked[gone[:, mode].argmax()]]:.6g} rad/s"
+        for mode in np.flatnonzero(gone.any(axis=0)).tolist()
+    ]
+    if paths.columns.size < n:
+        texts.append(f"only {paths.columns.size} of {n} modes oscillate")
+    if (paths.whirl.still > 1).any():
         texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
-    doubtful = sorted({k for k, mode in paths.doubtful if mode in columns})
-    if doubtful:
-        places = ", ".join(f"{whirl.speeds[k]:.6g}" for k in doubtful[:5])
+    doubt = paths.speeds[:-1][paths.doubtful[:, paths.columns].any(axis=1)]
+    if doubt.size:
         texts.append(
-            f"modes could not be told apart by shape just above {places} rad/s: from there on two curves "
-            "may be exchanged"
+            f"modes could not be told apart by shape above {doubt[0]:.6g} rad/s: two curves may be exchanged"
         )
     return tuple(texts)
-
-
-def _rounded(delta: float) -> str:
-    """Four digits, without a negative zero."""
-    return f"{round(float(delta), 4) + 0.0:.4f}"
-
-
-def _no_peak(heavy: bool) -> str:
-    return f"no peak: above {HEAVY}" if heavy else ""

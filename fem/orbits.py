@@ -15,7 +15,6 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 
 DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 STRAIGHT = 1e-9  # minor by major axis below which an orbit is a line: rounding, not whirl
-_SMALL = 1e-2  # area by the largest area of a mode below which a node has no say in its direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,29 +51,25 @@ def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
 
     Examples
     --------
-    >>> found = orbits(3.0, -2.0j)
-    >>> float(found.major), float(found.minor), float(found.direction)
+    >>> ellipse = orbits(3.0, -2.0j)
+    >>> float(ellipse.major), float(ellipse.minor), float(ellipse.direction)
     (3.0, 2.0, 1.0)
     """
     X, Y = np.broadcast_arrays(np.asarray(x, dtype=complex), np.asarray(y, dtype=complex))
     forward, backward = (X + 1j * Y) / 2, (X - 1j * Y) / 2
     f, b = np.abs(forward), np.abs(backward)
     a, c = np.angle(forward), np.angle(backward)
-    inclination, phase = (a - c) / 2, (a + c) / 2
     # A circle has no major axis: measure from x.
-    round_ = np.minimum(f, b) <= 1e-15 * np.maximum(f, b)
-    whole = np.where(f >= b, a, c)
-    inclination, phase = np.where(round_, 0.0, inclination), np.where(round_, whole, phase)
+    circle = np.minimum(f, b) <= 1e-15 * np.maximum(f, b)
+    inclination = np.where(circle, 0.0, (a - c) / 2)
+    phase = np.where(circle, np.where(f >= b, a, c), (a + c) / 2)
     turned = (inclination > np.pi / 2) | (inclination <= -np.pi / 2)
-    inclination = inclination - np.where(turned, np.copysign(np.pi, inclination), 0.0)
-    phase = phase + np.where(turned, np.pi, 0.0)
-    major, minor = f + b, np.abs(f - b)
-    line = minor <= STRAIGHT * major
+    line = np.abs(f - b) <= STRAIGHT * (f + b)
     return Orbits(
-        major=major,
-        minor=np.where(line, 0.0, minor),
-        inclination=inclination,
-        phase=np.angle(np.exp(1j * phase)),
+        major=f + b,
+        minor=np.where(line, 0.0, np.abs(f - b)),
+        inclination=inclination - np.where(turned, np.copysign(np.pi, inclination), 0.0),
+        phase=np.angle(np.exp(1j * (phase + np.pi * turned))),
         direction=np.where(line, 0.0, np.sign(f - b)),
     )
 
@@ -115,10 +110,7 @@ def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
     """
     X, Y = np.asarray(x, dtype=complex), np.asarray(y, dtype=complex)
     area = (np.conj(X) * -Y).imag  # π times this is the area
-    size = (np.abs(X) ** 2 + np.abs(Y) ** 2).max(axis=-1)
-    seen = _SMALL * np.maximum(np.abs(area).max(axis=-1), STRAIGHT * size)
-    some_forward = (area > seen[..., None]).any(axis=-1)
-    some_backward = (area < -seen[..., None]).any(axis=-1)
-    flat = np.abs(area).max(axis=-1) <= STRAIGHT * size
-    one_way = some_forward.astype(float) - some_backward.astype(float)
-    return np.asarray(np.where(flat, 0.0, one_way))
+    line = STRAIGHT * (np.abs(X) ** 2 + np.abs(Y) ** 2).max(axis=-1)
+    largest = np.abs(area).max(axis=-1)
+    counts = np.where(np.abs(area) > 1e-2 * np.maximum(largest, line)[..., None], np.sign(area), 0.0)
+    return np.asarray(np.where(largest <= line, 0.0, counts.max(axis=-1) + counts.min(axis=-1)).clip(-1, 1))

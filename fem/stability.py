@@ -1,29 +1,133 @@
-"""The speed above which a rotor whirls by itself, of any equations of motion."""
+"""Where a rotor whirls by itself: the largest growth of all its motions over speed.
+
+Growth of a motion is Re λ / |λ|. The largest one of all motions is continuous in speed whatever mode has it:
+no mode must be followed. It is looked at on a grid of speeds, which is halved where its slopes tell of a
+change of sign between two of them. A motion grows where it is above `GROWTH`, the rounding of what damps and
+drives it: motions without any damping do not. Edges of unstable ranges are where the largest growth passes
+this level, moved back to Re λ = 0 on the mode that grows.
+
+Which motions may grow is bounded. Multiplied by the conjugate velocity the equations show that on positive
+stiffness and damping a growing motion of frequency ω takes work q from circulating forces and gives c ω to
+the damping, so that ω < q / c for one of them at least: kxy − kyx = 2 q at a support, ω < Ω for material and
+other damping that turns with the shaft (c z' − i Ω c z). Gyroscopic moments do no work.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from fem.growth_check import growing_mode, judged, loss
-from fem.matrices.lateral_planes import both_planes
-from fem.model.rotor import Rotor
-from fem.orbits import DIRECTION_NAMES
-from fem.solvers.reduced_whirl import Whirl, solve_whirl
-from fem.solvers.stable_speeds import Bases
-from fem.whirl import available_modes, checked_number
-from rotorid.base.arrays import BoolArray, FloatArray
+from fem.assembly import both_planes
+from fem.forces import InternalDamping
+from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.rotor import Rotor
+from fem.undamped import Result
+from fem.whirl import (
+    GROWTH,
+    Whirl,
+    available_modes,
+    checked_number,
+    in_both_planes,
+    solve,
+    solve_whirl,
+)
+from rotorid.base.answer import Answer
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, speed_text
+from rotorid.base.rpm import RPM, rpm_text, speed_text
+from rotorid.base.tables import Column, Table, frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+AWAY = 1e-6
+"""Part of the lowest frequency above which a real eigenvalue runs away."""
+_BESIDE = 0.1  # weight of such an eigenvalue beside the growth of motions that oscillate
+_SLACK = 1e-12  # of the largest entry of a matrix: rounding
+_TIMES = 2.0  # the highest speed: up to there modes are looked at, where no bound says how far
+_GRID = 60  # speeds of a grid at most, before it is halved
+_PARTS = 20  # of a range over tables, at least
+_ROUNDS = 6  # of halving
+_BACK = 1e-5  # of a step: to which the slope at an edge belongs
+_PAIR = 1e-6  # relative distance of forward and backward whirl that coincide
 
 Status = Literal["stable", "threshold", "unstable"]
 
 
-@dataclass(frozen=True, eq=False)
-class Stability:
+@dataclass(frozen=True)
+class Window:
+    """A range of speeds in which a mode grows, so that no steady response exists.
+
+    Attributes
+    ----------
+    first, last
+        Where growth begins and ends, rad/s; or the first and last speed asked for.
+    begins, ends
+        Whether these are such edges, and not the first or last speed asked for.
+    mode
+        Which mode grows there, by frequency at `first`, from 1, of two that coincide the backward one first;
+        None if the rotor runs away without oscillating.
+    frequency, direction
+        Its whirl frequency, rad/s, and 1 forward, −1 backward, 0 neither; None likewise.
+    """
+
+    first: float
+    last: float
+    begins: bool
+    ends: bool
+    mode: int | None = None
+    frequency: float | None = None
+    direction: float | None = None
+
+    @property
+    def way(self) -> str | None:
+        """The direction in a word."""
+        return None if self.direction is None else DIRECTION_NAMES[self.direction]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "from_rad_s": self.first,
+            "to_rad_s": self.last,
+            "from_rpm": self.first * RPM,
+            "to_rpm": self.last * RPM,
+            "begins": self.begins,
+            "ends": self.ends,
+            "mode": self.mode,
+            "frequency_rad_s": self.frequency,
+            "direction": self.way,
+        }
+
+    def where(self, text: Callable[[float], str] = rpm_text) -> str:
+        """The range, in rpm or as another function writes a speed."""
+        if self.first == self.last:
+            return f"at {text(self.first)}"
+        if self.begins and not self.ends:
+            return f"above {text(self.first)}"
+        return f"from {text(self.first)} to {text(self.last)}"
+
+    def sentence(self) -> str:
+        """What happens, as a warning."""
+        cause = "the rotor runs away without oscillating; check negative stiffness"
+        if self.mode is not None:
+            cause = f"mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows"
+        return f"the steady response does not exist {self.where(speed_text)}: there {cause}"
+
+
+def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:
+    """Which speeds, shape (S,), lie in one of the windows."""
+    inside: BoolArray = np.zeros(speeds.shape, dtype=bool)
+    for window in windows:
+        inside |= (speeds >= window.first) & (speeds <= window.last)
+    return inside
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stability(Result):
     """Where a rotor loses stability.
 
     Attributes
@@ -84,24 +188,188 @@ class Stability:
             }
         )
 
-    def summary(self) -> str:
-        """The answer as text."""
+    def tables(self) -> tuple[Table, ...]:
+        """One row, all but the warnings."""
+        row = {key: value for key, value in self.to_dict().items() if key != "warnings"}
+        return (Table("stability", tuple(Column(key, (value,), key=key) for key, value in row.items())),)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The same as a DataFrame."""
+        return frame(self.tables()[0])
+
+    def sentence(self) -> str:
+        """Whether it is stable, or from which speed on which mode grows."""
         where = f"from {self.lowest:.6g} to {self.highest:.6g} rad/s"
         if self.status == "stable":
-            lines = [f"stable {where}; smallest logarithmic decrement {self.margin:.4g}"]
-        elif self.status == "threshold" and self.threshold is not None:
-            lines = [f"stable up to {speed_text(self.threshold)}"]
+            return f"stable {where}; smallest logarithmic decrement {self.margin:z.4g}"
+        text = f"unstable already at {self.lowest:.6g} rad/s, where the search began"
+        if self.threshold is not None:
+            text = f"stable up to {speed_text(self.threshold)}"
+        if self.mode is None or self.frequency is None or self.direction is None:
+            return f"{text}; there the rotor runs away without oscillating"
+        ratio = f", {self.whirl_ratio:.4g} × speed" if self.whirl_ratio else ""
+        return (
+            f"{text}; there mode {self.mode} grows, {DIRECTION_NAMES[self.direction]} whirl at "
+            f"{self.frequency:.6g} rad/s{ratio}"
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence and the warnings."""
+        return Answer(self.sentence(), warnings=self.warnings)
+
+
+def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
+    """Frequency above which no mode grows at each speed, rad/s, shape (S,); 0: none grows, inf: not known."""
+    turning = np.any(rotor.material_damping) or any(isinstance(one, InternalDamping) for one in rotor.forces)
+    bound = np.where(turning, speeds, 0.0)
+    for support in rotor.supports:
+        k, c = support.at(speeds)
+        tiny, slack = (_SLACK * np.abs(one).max(axis=(1, 2)) for one in (k, c))
+        stiffness, damping = (np.linalg.eigvalsh(one + one.swapaxes(1, 2))[:, 0] / 2 for one in (k, c))
+        driving = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            highest = np.where(driving > tiny, driving / np.maximum(damping, 0.0), 0.0)
+        bound = np.maximum(bound, np.where((stiffness < -tiny) | (damping < -slack), np.inf, highest))
+    return np.asarray(bound)
+
+
+def grid_of(rotor: Rotor, speeds: FloatArray) -> FloatArray:
+    """Speeds, ascending, and the knots of tables between them; over tables at least so many."""
+    if rotor.constant:
+        return speeds
+    knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
+    return np.unique(np.concatenate((speeds, knots, np.linspace(speeds[0], speeds[-1], _PARTS + 1))))
+
+
+def covering(whirl: Whirl) -> Whirl:
+    """The same, or one at the same speeds that has all modes that may grow."""
+    P, speeds, n = whirl.Q.P, whirl.speeds, whirl.values.shape[1]
+    bound, available = growth_bound(P.rotor, speeds), available_modes(P.rotor)
+    while n < available:
+        top = np.nan_to_num(np.abs(whirl.values.imag), nan=np.inf).max(axis=1)
+        size, columns = whirl.Q.basis.shape
+        if (bound < top).all() or (columns < size and top.min() > _TIMES * speeds[-1]):
+            break
+        n = min(2 * n, available)
+        whirl = solve_whirl(P, speeds, n)
+    return whirl
+
+
+def _at(whirl: Whirl, *speeds: float) -> Whirl:
+    return solve(whirl.Q, np.array(speeds), whirl.values.shape[1], whirl.scale)
+
+
+def fastest(whirl: Whirl) -> tuple[ComplexArray, FloatArray]:
+    """Eigenvalue of the motion that grows fastest at each speed, and its growth, shape (S,) each.
+
+    That of what does not oscillate by the scale.
+    """
+    rates = np.nan_to_num(whirl.values.real / np.abs(whirl.values), nan=-1.0)
+    rows, k = np.arange(len(rates)), rates.argmax(axis=1)
+    real = np.array([one.max(initial=-whirl.scale) for one in whirl.real])
+    away = _BESIDE * (real / whirl.scale - AWAY)
+    return np.where(away > rates[rows, k], real, whirl.values[rows, k]), np.maximum(away, rates[rows, k])
+
+
+def near_level(values: FloatArray, level: float) -> IndexArray:
+    """Steps beside values that are the nearest to a level, where one more such step would pass it."""
+    near, crossed = -np.abs(values - level), np.diff(values > level)
+    before, here, after = near[:-2], near[1:-1], near[2:]
+    close = (here >= np.maximum(before, after)) & (2 * here > np.minimum(before, after))
+    k = np.flatnonzero(close & ~crossed[:-1] & ~crossed[1:])
+    return np.union1d(k, k + 1)
+
+
+def _scan(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
+    """Speeds between which the largest growth does not pass its level unseen, and it there."""
+    grid, rates = whirl.speeds, fastest(whirl)[1]
+    for _ in range(_ROUNDS):
+        k = near_level(rates, GROWTH)
+        if not k.size:
+            break
+        more = (grid[k] + grid[k + 1]) / 2
+        rates = np.insert(rates, k + 1, fastest(_at(whirl, *more))[1])
+        grid = np.insert(grid, k + 1, more)
+    return grid, rates
+
+
+def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, complex]:
+    """Speed between an unstable and a stable one where growth ends, and the eigenvalue there."""
+    from scipy.optimize import brentq
+
+    there = dict(zip(ends.tolist(), rates.tolist(), strict=True))
+
+    def excess(speed: float) -> float:
+        return (there[speed] if speed in there else float(fastest(_at(whirl, speed))[1][0])) - GROWTH
+
+    speed = float(brentq(excess, *ends, xtol=1e-13 * max(ends), rtol=1e-15))
+    step = _BACK * (ends[0] - speed)
+    value, other = fastest(_at(whirl, speed, speed + step))[0]
+    rise = (other - value).real
+    back = step * value.real / rise if rise > 0 else 0.0
+    return float(np.clip(speed - back, min(ends), max(ends))), value
+
+
+def _mode(whirl: Whirl, speed: float, value: complex) -> tuple[int, float, float] | tuple[None, None, None]:
+    """Number by frequency, whirl frequency and direction of a mode, as `Window` has them."""
+    if not value.imag:
+        return None, None, None
+    pairs = _at(whirl, speed)
+    lam, size = pairs.values[0], np.abs(pairs.values[0].imag)
+    k = int(np.nanargmin(np.abs(lam - value)))
+    way = np.sign(lam[k].imag)  # in a complex coordinate −1 of backward whirl
+    number = (size < size[k] * (1 + way * _PAIR)).sum() + (way < 0)
+    _, x, y = in_both_planes(lam[k : k + 1], whirl.Q.nodes(pairs.vectors[:1, k]))
+    return int(number), float(size[k]), float(whirl_direction(x, y)[0])
+
+
+def windows_of(whirl: Whirl) -> tuple[Window, ...]:
+    """Ranges of growth of a whirl that has all modes that may grow."""
+    grid, rates = _scan(whirl)
+    changes = np.flatnonzero(np.diff(rates > GROWTH, prepend=False, append=False)).tolist()
+    out = []
+    for i, j in zip(changes[::2], changes[1::2], strict=True):
+        first, last = grid[i], grid[j - 1]
+        if i:
+            first, value = _edge(whirl, grid[[i, i - 1]], rates[[i, i - 1]])
         else:
-            lines = [f"unstable already at {self.lowest:.6g} rad/s, where the search began"]
-        if self.mode is not None and self.frequency is not None and self.direction is not None:
-            ratio = f", {self.whirl_ratio:.4g} × speed" if self.whirl_ratio else ""
-            lines.append(
-                f"there mode {self.mode} grows, {DIRECTION_NAMES[self.direction]} whirl at "
-                f"{self.frequency:.6g} rad/s{ratio}"
-            )
-        elif self.status != "stable":
-            lines.append("there the rotor runs away without oscillating")
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+            value = fastest(whirl)[0][0]
+        if j < grid.size:
+            last, _ = _edge(whirl, grid[[j - 1, j]], rates[[j - 1, j]])
+        out.append(Window(float(first), float(last), i > 0, j < grid.size, *_mode(whirl, first, value)))
+    return tuple(out)
+
+
+def holding(windows: Iterable[Window], speeds: FloatArray) -> tuple[Window, ...]:
+    """Those that hold one of the speeds."""
+    return tuple(window for window in windows if within((window,), speeds).any())
+
+
+def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
+    """Ranges of speed without a steady response that hold one of the speeds asked for, and sentences on them.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    speeds
+        rad/s, in any order, shape (S,).
+
+    Returns
+    -------
+    The ranges, and a sentence of each; or none, and why stability cannot be judged.
+    """
+    asked = np.unique(speeds)
+    try:
+        grid = grid_of(rotor, asked if asked.size <= _GRID else np.linspace(asked[0], asked[-1], _GRID))
+        if not growth_bound(rotor, grid).any():
+            return (), ()
+        whirl = solve_whirl(both_planes(rotor), grid, checked_number(rotor, None))
+        windows = holding(windows_of(covering(whirl)), asked)
+    except ValueError as problem:
+        return (), (f"whether the rotor is stable at these speeds is not known: {problem}",)
+    return windows, tuple(window.sentence() for window in windows)
 
 
 def stability_threshold(
@@ -109,7 +377,7 @@ def stability_threshold(
 ) -> Stability:
     """Find the first speed at which a mode of the rotor stops decaying.
 
-    Every mode that may grow is judged, as `fem.growth_check` does it.
+    Every mode that may grow is judged.
 
     Parameters
     ----------
@@ -120,80 +388,55 @@ def stability_threshold(
     n
         How many modes of lowest frequency the margin is taken from.
     steps
-        Into how many steps the range is divided; a mode that is unstable only between two neighbouring
-        speeds is not seen. The threshold itself is found by iteration.
+        Into how many steps the range is divided at least; a mode that is unstable only in a narrow range
+        between two neighbouring speeds may not be seen. The threshold itself is found by iteration.
 
     Raises
     ------
     ValueError
         For an impossible range, or outside the table of a support.
     """
-    speeds = range_of_speeds(lowest, highest, steps)
     n = checked_number(rotor, min(n, available_modes(rotor)))
-    found, grows = judged(rotor, speeds)
-    return searched(found, grows, solve_whirl(both_planes(rotor), speeds, n))
+    speeds = grid_of(rotor, range_of_speeds(lowest, highest, steps))
+    return threshold_of(covering(solve_whirl(both_planes(rotor), speeds, n)), n)
 
 
 def range_of_speeds(lowest: float, highest: float, steps: int) -> FloatArray:
-    """The speeds that are looked at, rad/s, shape (steps + 1,).
+    """The speeds of a search for a threshold, rad/s, shape (steps + 1,).
 
     Raises
     ------
     ValueError
         For an impossible range.
     """
-    if not (np.isfinite(highest) and np.isfinite(lowest) and lowest < highest):
+    if not -np.inf < lowest < highest < np.inf:
         raise ValueError(
             f"the range of speeds is empty: {lowest!r} to {highest!r} rad/s; give finite lowest < highest"
         )
     if int(steps) != steps or steps < 1:
         raise ValueError(f"the range is divided into at least one step; got {steps!r}")
-    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1), ascending=True)
+    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1))
 
 
-def searched(found: Bases | None, grows: BoolArray, whirl: Whirl) -> Stability:
-    """The first threshold in the range of some speeds.
-
-    Parameters
-    ----------
-    found
-        The equations; None where nothing can grow.
-    grows
-        At which speeds a mode grows, shape (S,).
-    whirl
-        The modes at each speed that the margin is taken from.
-    """
-    speeds = whirl.speeds
-    upto = int(np.argmax(grows)) if grows.any() else speeds.size
-    decrements = least_damped(whirl)[0][: max(upto, 1)]
-    known = decrements[np.isfinite(decrements)]
-    stable = Stability(
-        status="stable",
-        lowest=float(speeds[0]),
-        highest=float(speeds[-1]),
-        threshold=None,
-        mode=None,
-        frequency=None,
-        direction=None,
-        margin=float(known.min()) if known.size else float("nan"),
-        rotor=whirl.Q.P.rotor,
-    )
-    if found is None or upto == speeds.size:
-        return stable
-    if upto == 0:
-        mode, frequency, direction = growing_mode(found, speeds[0])
-        return replace(stable, status="unstable", mode=mode, frequency=frequency, direction=direction)
-    speed, value = loss(found, speeds[upto], speeds[upto - 1])
-    mode, frequency, direction = growing_mode(found, speed, value)
-    return replace(
-        stable, status="threshold", threshold=speed, mode=mode, frequency=frequency, direction=direction
+def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
+    """The first threshold in a whirl that has all modes that may grow; its margin is that of n of them."""
+    speeds, windows = whirl.speeds, windows_of(whirl)
+    first = windows[0] if windows else Window(np.inf, np.inf, False, False)
+    lam = whirl.values[: max(1, int((speeds < first.first).sum())), :n]
+    margin = np.nan_to_num(-2 * np.pi * lam.real / np.abs(lam.imag), nan=np.inf).min()
+    return Stability(
+        "threshold" if first.begins else "unstable" if windows else "stable",
+        float(speeds[0]),
+        float(speeds[-1]),
+        first.first if first.begins else None,
+        first.mode,
+        first.frequency,
+        first.direction,
+        margin if np.isfinite(margin) else float("nan"),
+        whirl.Q.P.rotor,
     )
 
 
-def least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
-    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each."""
-    values = whirl.found.values
-    decrements = np.where(np.isfinite(values), -2 * np.pi * values.real / np.abs(values.imag), np.inf)
-    which = np.argmin(decrements, axis=1)[:, None]
-    least, lam = np.take_along_axis(decrements, which, axis=1), np.take_along_axis(values, which, axis=1)
-    return np.where(np.isfinite(least), least, np.nan)[:, 0], np.abs(lam.imag)[:, 0]
+def runs_away(whirl: Whirl) -> list[bool]:
+    """At which speeds a motion grows without oscillating, length S."""
+    return [bool(real.max(initial=-np.inf) > AWAY * whirl.scale) for real in whirl.real]

@@ -1,24 +1,16 @@
-"""Equations of motion as a linear state space, massless coordinates included.
+"""The equations of motion of a rotor as plain matrices, and as a linear state space.
 
-M q'' + C q' + K q = f, with coordinates q₁ that move mass and q₂ that do not (zero row and column of M); C
-and K need not be symmetric: gyroscopic terms and cross-coupling stand in them with the signs of
-`fem.matrices.lateral_planes` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …). The signs of the
-state space follow from
+In M q'' + C q' + K q = f let q₁ be the coordinates that move mass and q₂ the others, with zero rows and
+columns of M: nodes of a massless shaft, feet of massless pedestals. Singular vectors of their damping,
+Uᵀ C₂₂ V = Σ, part them in q₂ = V_a a + V_b b: a is damped, b is not. With v = q₁' and the signs of
+`fem.assembly` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …)
 
-    M₁₁ q₁'' + C₁₁ q₁' + C₁₂ q₂' + K₁₁ q₁ + K₁₂ q₂ = f₁
-               C₂₁ q₁' + C₂₂ q₂' + K₂₁ q₁ + K₂₂ q₂ = f₂.
+    (U_bᵀ K₂₂ V_b) b = U_bᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ V_a a)
+    Σ_a a'           = U_aᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂)
+    M₁₁ v'           = f₁ − C₁₁ v − C₁₂ V_a a' − K₁₁ q₁ − K₁₂ q₂
 
-C₂₂ need not be regular. With its null spaces, C₂₂ V_b = 0 and U_bᵀ C₂₂ = 0, the massless coordinates are
-q₂ = V_a a + V_b b: a is damped and becomes a state of first order, b is not and follows from the algebraic
-rows U_bᵀ:
-
-    M₁₁ v'                  = f₁ − C₁₁ v − C₁₂ V_a a' − K₁₁ q₁ − K₁₂ q₂
-    (U_aᵀ C₂₂ V_a) a'       = U_aᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂)
-    (U_bᵀ K₂₂ V_b) b        = U_bᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ V_a a).
-
-The last matrix must be regular; else the motion depends on derivatives of the forces (an index above 1) or is
-not determined at all, and is refused. So is damping by the velocity of b, C₁₂ V_b ≠ 0: dampers, seals and
-gyroscopic moments of a rotor have none, as what does no negative work cannot.
+where C₁₂ V_b = 0: what does no negative work has no force by a velocity that is not damped itself. The states
+are q₁, v and a.
 """
 
 from __future__ import annotations
@@ -29,9 +21,96 @@ from typing import Any
 
 import numpy as np
 
-from fem.matrices.equations_of_motion import Motion
-from fem.matrices.massless import ZERO, eigenvalues, massive_first, scales, solved, split_by_damping
+from fem.assembly import both_planes, project
+from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import number
+
+__all__ = ["Motion", "StateSpace", "equations_of_motion", "state_space"]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """M q'' + C q' + K q = f of a rotor at one speed; real, in SI.
+
+    Attributes
+    ----------
+    M, C, K
+        Mass, damping (with the gyroscopic effect) and stiffness, shape (n, n).
+    coordinates
+        Name of each unknown: `x3` and `y3` are the deflections of node 3, m; `tilt_x3` and `tilt_y3` the tilt
+        of the cross-section there (the slope dx/dz without shear); with shear `left_x3` and `right_x3` the
+        shear angles at the ends of element 3; `foot_x1` and `foot_y1` the pedestal of the first support, m.
+    speed
+        rad/s.
+    """
+
+    M: FloatArray
+    C: FloatArray
+    K: FloatArray
+    coordinates: tuple[str, ...]
+    speed: float
+
+    def index(self, name: str) -> int:
+        """Where an unknown stands, from 0.
+
+        Raises
+        ------
+        ValueError
+            For an unknown that does not exist.
+        """
+        if name not in self.coordinates:
+            raise ValueError(f"no unknown {name!r}: they are {self.coordinates[0]} … {self.coordinates[-1]}")
+        return self.coordinates.index(name)
+
+
+def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both") -> Motion:
+    """Mass, damping and stiffness matrices of a rotor.
+
+    Parameters
+    ----------
+    rotor
+        With all that its model holds; tables of supports are read at `speed`.
+    speed
+        rad/s.
+    plane
+        "both", or "x" alone: without gyroscopic effect and coupling between the planes, so only for a rotor
+        that has neither.
+
+    Raises
+    ------
+    ValueError
+        A plane that does not exist or is coupled to the other, a speed that is not finite, negative, or
+        outside the table of a support, forces that are not linear.
+
+    Examples
+    --------
+    >>> from fem import Rotor, Support
+    >>> shaft = Rotor(length=[0.5, 0.5], outer_diameter=0.05, supports=[Support(1, 1e7), Support(3, 1e7)])
+    >>> motion = equations_of_motion(shaft, plane="x")
+    >>> motion.coordinates
+    ('x1', 'tilt_x1', 'x2', 'tilt_x2', 'x3', 'tilt_x3')
+
+    Notes
+    -----
+    The signs are those of `fem.assembly`: rotation from x to y; M y'' … − Ω G x'.
+    """
+    if plane not in ("both", "x"):
+        raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
+    speed = number(speed, "speed")
+    P = both_planes(rotor, complex_coordinate=False)
+    equations = project(P, np.eye(P.A.size))
+    M, (C, K) = equations.M, (X[0] for X in equations.at(np.array([speed])))
+    kinds = ("", "tilt_", "left_", "right_")
+    shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
+    feet = [("foot_", int(i) + 1) for i in P.pedestals]
+    names = np.array([f"{kind}{axis}{i}" for part in (shaft, feet) for axis in "xy" for kind, i in part])
+    if plane == "x":
+        in_x = np.array([name.split("_")[-1].startswith("x") for name in names])
+        if any(X[np.ix_(in_x, ~in_x)].any() for X in (C, K)):
+            raise ValueError("the planes x and y of this rotor are coupled: take both")
+        (M, C, K), names = (X[np.ix_(in_x, in_x)] for X in (M, C, K)), names[in_x]
+    return Motion(M, C, K, tuple(names.tolist()), speed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +124,8 @@ class StateSpace:
     A, B, C, D
         Shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs); SI.
     states
-        Names: `x7` a deflection, `v_x7` its velocity; `damped1` … combinations of massless coordinates where
-        damping acts on combinations only.
+        Names: `x7` a deflection, `v_x7` its velocity; `damped1` … massless coordinates that are damped, or
+        combinations of them.
     inputs
         `f_x7` is a force on coordinate `x7`, N (on a tilt: N·m).
     outputs
@@ -71,16 +150,15 @@ class StateSpace:
     @property
     def eigenvalues(self) -> ComplexArray:
         """Of A, 1/s, by rising frequency |Im|, then real part, shape (n,)."""
-        values = eigenvalues(self.A)
+        # From the last state: what is fast stands first, and the slow keep their digits.
+        values = np.linalg.eigvals(self.A[::-1, ::-1]).astype(complex)
         return values[np.lexsort((values.imag, values.real, np.abs(values.imag)))]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
             "speed_rad_s": self.speed,
-            "states": list(self.states),
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
+            **{name: list(getattr(self, name)) for name in ("states", "inputs", "outputs")},
             **{name: matrix.tolist() for name, matrix in zip("ABCD", self, strict=True)},
         }
 
@@ -105,7 +183,7 @@ def state_space(
     ValueError
         For names that do not exist or repeat, numbers that are not finite, a singular mass matrix without a
         zero row, massless coordinates that nothing holds or whose velocity acts without being damped, or as
-        output the velocity of a massless undamped coordinate that follows a force at once.
+        output the velocity of a coordinate with neither mass nor damping.
 
     Examples
     --------
@@ -118,107 +196,79 @@ def state_space(
     >>> model.eigenvalues
     array([-1.-3.46410162j, -1.+3.46410162j])
     """
-    M, C, K = _checked(motion)
-    names = motion.coordinates
-    chosen_inputs = tuple(f"f_{name}" for name in names) if inputs is None else _listed(inputs, "input")
-    chosen_outputs = names if outputs is None else _listed(outputs, "output")
-    forces = [_force(name, motion) for name in chosen_inputs]
-    picked = [_output(name, motion) for name in chosen_outputs]
-
-    order, n1 = massive_first(M)
-    M, C, K = (matrix[np.ix_(order, order)] for matrix in (M, C, K))
-    mass, F = M[:n1, :n1], np.eye(len(names))[order][:, forces]
-    scale, omega = scales(M, C, K)
-    C11, C12, C21, C22 = _blocks(C, n1)
-    K11, K12, K21, K22 = _blocks(K, n1)
-    F1, F2 = F[:n1], F[n1:]
-    ordered = [names[i] for i in order]
-    split = split_by_damping(C22, scale[n1:], omega, ordered[n1:])
-    Va, Vb, Ua, Ub = split.Va, split.Vb, split.Ua, split.Ub
-    na = Va.shape[1]
-
-    if (omega * scale[:n1, None] * np.abs(C12 @ Vb) > ZERO).any():
+    names, n = motion.coordinates, len(motion.coordinates)
+    matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
+    if matrices.shape != (3, n, n) or not np.isfinite(matrices).all() or len(set(names)) < n:
+        raise ValueError(
+            "a state space needs coordinates with different names, and M, C and K of finite numbers, "
+            f"{n} × {n} for {n} coordinates"
+        )
+    M, C, K = matrices
+    every = tuple(f"f_{name}" for name in names)
+    inputs = every if inputs is None else tuple(inputs)
+    outputs = names if outputs is None else tuple(outputs)
+    forces = _places(inputs, every, "input")
+    shown = _places(outputs, [*names, *(f"v_{name}" for name in names)], "output")
+    massive = M.any(axis=0) | M.any(axis=1)
+    one, two = np.flatnonzero(massive), np.flatnonzero(~massive)
+    light = np.ix_(two, two)
+    size, rate = np.sqrt(np.abs(K).max(axis=1)), np.sqrt(np.abs(K).max() / (np.abs(M).max() or 1.0))
+    unit = 1 / np.where(size > 0, size, 1.0)[two]
+    W, sigma, Vt = np.linalg.svd(unit[:, None] * C[light] * unit)
+    rank = int(np.count_nonzero(rate * sigma > 1e-13))  # the rounding of stiffness damps nothing
+    (Va, Vb), (Ua, Ub) = (np.split(unit[:, None] * X, [rank], axis=1) for X in (Vt.T, W))
+    if (rate * np.abs(C[np.ix_(one, two)] @ Vb) > 1e-9 * size[one, None]).any():
         raise ValueError(
             "the velocity of a massless coordinate acts on others without being damped itself: there is no "
             "state space with velocities; make the damping symmetric, or give the coordinate mass"
         )
-
-    # Rows over the unknowns (q₁, v, a) and u.
-    n = 2 * n1 + na
-    width = n + len(forces)
-    Q1, v, A_, U = np.split(np.eye(width), [n1, 2 * n1, n])
-    b = solved(Ub.T @ K22 @ Vb, Ub.T @ (F2 @ U - K21 @ Q1 - K22 @ Va @ A_ - C21 @ v))
-    q2 = Va @ A_ + Vb @ b
-    rate_a = np.linalg.solve(Ua.T @ C22 @ Va, Ua.T @ (F2 @ U - C21 @ v - K21 @ Q1 - K22 @ q2))
-    rate_v = np.linalg.solve(mass, F1 @ U - C11 @ v - C12 @ Va @ rate_a - K11 @ Q1 - K12 @ q2)
-    S = np.vstack((v, rate_v, rate_a))
-
-    back = np.argsort(order)
-    deflections, velocities = np.vstack((Q1, q2))[back], np.vstack((v, Va @ rate_a))[back]
-    algebraic = np.concatenate((np.zeros(n1, dtype=bool), np.abs(Vb).max(axis=1, initial=0.0) > 0))[back]
-    velocities[algebraic] = deflections[algebraic, :n] @ S  # unless a force stands in the deflection
-    size = scale[back]
-    rows = []
-    for name, (kind, i) in zip(chosen_outputs, picked, strict=True):
-        direct = np.abs(deflections[i, n:]) > ZERO * size[i] * size[forces]
-        if kind == "v" and algebraic[i] and direct.any():
+    at_once = two[(np.abs(Vt[rank:]) > 1e-9).any(axis=0)]
+    for name, place in zip(outputs, shown, strict=True):
+        if place - n in at_once:
             raise ValueError(
-                f"output {name!r}: {names[i]!r} has neither mass nor damping of its own and follows "
-                f"{chosen_inputs[int(np.argmax(direct))]!r} at once, so its velocity holds the derivative of "
-                "this force; take the deflection, leave out the force, or give it mass or damping"
+                f"output {name!r}: {name[2:]!r} has neither mass nor damping and follows forces at once: its "
+                "velocity holds their derivatives; ask for its deflection, or give it mass or damping"
             )
-        rows.append(velocities[i] if kind == "v" else deflections[i])
-    Y = np.array(rows).reshape(len(rows), width)
-    states = (*ordered[:n1], *(f"v_{name}" for name in ordered[:n1]), *split.names)
-    return StateSpace(
-        S[:, :n], S[:, n:], Y[:, :n], Y[:, n:], states, chosen_inputs, tuple(chosen_outputs), motion.speed
+
+    # Rows over the states q₁, v, a and the inputs.
+    states = [*(names[i] for i in one), *(f"v_{names[i]}" for i in one)]
+    states += [f"damped{i + 1}" for i in range(rank)]
+    order = len(states)
+    width = order + len(forces)
+    q, velocity, load = np.zeros((3, n, width))
+    q[one], velocity[one], a, load[forces] = np.split(np.eye(width), np.cumsum([one.size, one.size, rank]))
+    q[two] = Va @ a
+    q[two] += Vb @ _solved(
+        Ub.T @ K[light] @ Vb,
+        Ub.T @ (load - C @ velocity - K @ q)[two],
+        "some massless coordinates are held neither by stiffness nor by damping, or move only with "
+        "derivatives of the forces (an index above 1): there is no state space; give them mass, damping "
+        "or stiffness",
     )
+    damped = Ua.T @ (load - C @ velocity - K @ q)[two] / sigma[:rank, None]
+    velocity[two] = Va @ damped
+    rate_v = _solved(
+        M[np.ix_(one, one)],
+        (load - C @ velocity - K @ q)[one],
+        "the mass matrix is singular without a zero row (as with shear but without rotary inertia): "
+        "there is no state space of it; give every combination of its coordinates mass",
+    )
+    rates, readings = np.vstack((velocity[one], rate_v, damped)), np.vstack((q, velocity))[shown]
+    A, B, Y, D = (part for rows in (rates, readings) for part in np.split(rows, [order], axis=1))
+    return StateSpace(A, B, Y, D, tuple(states), inputs, outputs, motion.speed)
 
 
-def _blocks(matrix: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    return matrix[:n, :n], matrix[:n, n:], matrix[n:, :n], matrix[n:, n:]
+def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]:
+    """Where names of inputs or outputs stand."""
+    for name in chosen:
+        if name not in names or chosen.count(name) > 1:
+            raise ValueError(f"no {what} {name!r}, or it is named more than once: {names[0]} … {names[-1]}")
+    return [names.index(name) for name in chosen]
 
 
-def _checked(motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-    n = len(motion.coordinates)
-    if not n:
-        raise ValueError("there are no coordinates: a state space needs at least one")
-    if len(set(motion.coordinates)) != n:
-        raise ValueError("two coordinates have the same name: give each its own")
-    for name in "MCK":
-        matrix = np.asarray(getattr(motion, name))
-        if matrix.shape != (n, n):
-            raise ValueError(f"{name} must be {n} × {n} for {n} coordinates, not of shape {matrix.shape}")
-        if not np.isfinite(matrix).all():
-            raise ValueError(f"{name} holds numbers that are not finite")
-    return tuple(np.asarray(getattr(motion, name), dtype=float) for name in "MCK")  # type: ignore[return-value]
-
-
-def _listed(names: Sequence[str], what: str) -> tuple[str, ...]:
-    if isinstance(names, str):
-        raise ValueError(f"{what}s must be a list of names, not the one name {names!r}")
-    listed = tuple(names)
-    repeated = [name for name in listed if listed.count(name) > 1]
-    if repeated:
-        raise ValueError(f"{what} {repeated[0]!r} is named more than once")
-    return listed
-
-
-def _force(name: str, motion: Motion) -> int:
-    plain = name.removeprefix("f_")
-    if not name.startswith("f_") or plain not in motion.coordinates:
-        c = motion.coordinates
-        raise ValueError(f"no input {name!r}: inputs are forces, f_{c[0]} … f_{c[-1]}")
-    return motion.index(plain)
-
-
-def _output(name: str, motion: Motion) -> tuple[str, int]:
-    if name in motion.coordinates:
-        return "q", motion.index(name)
-    plain = name.removeprefix("v_")
-    if not name.startswith("v_") or plain not in motion.coordinates:
-        c = motion.coordinates
-        raise ValueError(
-            f"no output {name!r}: outputs are deflections, {c[0]} … {c[-1]}, or velocities, v_{c[0]} …"
-        )
-    return "v", motion.index(plain)
+def _solved(matrix: FloatArray, right: FloatArray, reason: str) -> FloatArray:
+    """The solution with a matrix that is regular in the scale of its rows; else the reason is raised."""
+    scale = 1 / np.sqrt(np.abs(matrix).max(axis=1, initial=1e-300))
+    if matrix.size and np.linalg.cond(scale[:, None] * matrix * scale, 1) > 1e12:
+        raise ValueError(reason)
+    return np.asarray(np.linalg.solve(matrix, right))

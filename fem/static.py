@@ -1,28 +1,34 @@
-"""Static compliance, and the deflection of a resting or turning rotor under its weight."""
+"""Static compliance, and the deflection of a resting or turning rotor under its weight.
+
+K x + Ω B y + kxx x + kxy y = f_x and K y − Ω B x + kyx x + kyy y = f_y with the matrices of `fem.assembly`:
+the whole band at the frequency 0.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.matrices.banded_matrices import Matrices, assemble, general, multiply
-from fem.matrices.undamped_matrices import whole_rotor
-from fem.model.rotor import Rotor
+from fem.assembly import Planes, WholeBand, both_planes, multiply, rounding_error
+from fem.rotor import Rotor
+from fem.undamped import whole_rotor
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.tables import Column, Table, frame, html, terminal
 
 if TYPE_CHECKING:
     import pandas as pd
 
+__all__ = ["GRAVITY", "StaticDeflection", "compliance", "static_deflection"]
+
 GRAVITY = 9.80665  # m/s²
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StaticDeflection:
     """A rotor under its own weight.
 
@@ -53,15 +59,29 @@ class StaticDeflection:
         """Size of the deflection of each node, m, shape (N,)."""
         return np.hypot(self.x, self.y)
 
+    def tables(self) -> tuple[Table, ...]:
+        """The deflection, a row for each node; and the reactions."""
+        supports = self.rotor.supports
+        nodes = (
+            Column("node", range(1, self.rotor.n_nodes + 1)),
+            Column("position_m", self.rotor.positions, "{:.6g}".format, "positions_m.*"),
+            Column("x_m", self.x, "{:.4g}".format, "x_m.*"),
+            Column("y_m", self.y, "{:.4g}".format, "y_m.*"),
+        )
+        reactions = (
+            Column("support", [support.name or f"node {support.node}" for support in supports]),
+            Column("reaction x, N", self.reaction_x, "{:.6g}".format, "reactions.*.x_N"),
+            Column("y, N", self.reaction_y, "{:.6g}".format, "reactions.*.y_N"),
+        )
+        return Table("deflection", nodes), Table("reactions", reactions)
+
     def to_frame(self) -> pd.DataFrame:
         """One row per node."""
-        nodes = Column("node", range(1, self.rotor.n_nodes + 1))
-        positions = Column("position_m", self.rotor.positions)
-        return frame((nodes, positions, Column("x_m", self.x), Column("y_m", self.y)))
+        return frame(self.tables()[0])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        nodes = Column("node", [support.node for support in self.rotor.supports])
+        reactions = zip(self.rotor.supports, self.reaction_x, self.reaction_y, strict=True)
         return plain(
             {
                 "speed_rad_s": self.speed,
@@ -69,21 +89,25 @@ class StaticDeflection:
                 "positions_m": self.rotor.positions,
                 "x_m": self.x,
                 "y_m": self.y,
-                "reactions": rows((nodes, Column("x_N", self.reaction_x), Column("y_N", self.reaction_y))),
+                "reactions": [{"node": support.node, "x_N": x, "y_N": y} for support, x, y in reactions],
             }
         )
 
+    def sentence(self) -> str:
+        """Weight and largest deflection."""
+        k = int(np.argmax(self.deflection))
+        largest = f"{1e6 * self.deflection[k]:.4g} µm at node {k + 1}"
+        return f"Weight {self.weight:.6g} N; largest deflection {largest}"
+
     def summary(self) -> str:
         """Weight, largest deflection and reactions, as text."""
-        size = self.deflection
-        k = int(np.argmax(size))
-        lines = [
-            f"Weight {self.weight:.6g} N; largest deflection {1e6 * size[k]:.4g} µm at node {k + 1}",
-            f"{'support':>16}{'reaction x, N':>16}{'y, N':>12}",
-        ]
-        for support, x, y in zip(self.rotor.supports, self.reaction_x, self.reaction_y, strict=True):
-            lines.append(f"{support.name or f'node {support.node}':>16}{x:16.6g}{y:12.6g}")
-        return "\n".join(lines)
+        return f"{self.sentence()}\n{terminal(self.tables()[1])}"
+
+    def __repr__(self) -> str:
+        return f"StaticDeflection({self.sentence()})"
+
+    def _repr_html_(self) -> str:
+        return "\n".join(map(html, self.tables()))
 
 
 def static_deflection(
@@ -96,8 +120,8 @@ def static_deflection(
     rotor
         The rotor, held by its supports in both directions.
     speed
-        Of rotation, rad/s: where bearing tables are read, and where material damping, if there is any,
-        bends the turning shaft sideways.
+        Of rotation, rad/s: where bearing tables are read, and where material or internal damping, if there
+        is any, bends the turning shaft sideways.
     direction
         Of gravity, degrees from x with the rotation; −y by default.
     gravity
@@ -111,19 +135,16 @@ def static_deflection(
     """
     speed, gravity = number(speed, "speed"), number(gravity, "gravity")
     angle = np.radians(number(direction, "direction", signed=True))
-    A = assemble(rotor)
+    P = both_planes(rotor, complex_coordinate=False)
+    A = P.A
     ones = np.zeros((A.size, 1))
     ones[A.deflections] = 1.0
-    load = gravity * multiply(A.mass, ones)[:, 0]
-    forces = np.zeros((2, A.size, 1))
-    along = np.array([np.cos(angle), np.sin(angle)])
-    along[np.abs(along) < 1e-15] = 0.0  # straight down is straight down
-    forces[:, :, 0] = np.outer(along, load)
-    X = _solve(rotor, A, forces, speed)[:, :, 0]
-    reactions = np.zeros((2, len(rotor.supports)))
-    for k, support in enumerate(rotor.supports):
-        D = support.dynamic_stiffness(0.0, speed).real
-        reactions[:, k] = -D @ X[:, A.deflection(support.node)]
+    along = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
+    weight = gravity * multiply(A.mass, ones)[:, 0]
+    X = _solved(P, np.outer(along, weight)[None], speed)[0]
+    springs = [support.dynamic_stiffness(0.0, speed).real for support in rotor.supports]
+    moved = [X[:, A.deflection(support.node)] for support in rotor.supports]
+    reactions = -np.einsum("sij,sj->is", springs, moved)
     x, y = X[:, A.deflections]
     read_only(x, y, reactions)
     return StaticDeflection(x, y, reactions[0], reactions[1], gravity * rotor.total_mass, rotor, speed)
@@ -142,7 +163,7 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
     nodes
         Node numbers, from 1, or names of stations; n of them.
     speed
-        Where bearing tables are read, rad/s.
+        Where bearing tables are read, rad/s; damping that turns with the shaft is left out.
 
     Returns
     -------
@@ -155,62 +176,31 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
         If the supports leave the rotor free, or a node does not exist, or the mesh is so fine that float64
         carries fewer than about three digits.
     """
-    A = assemble(rotor)
-    unknowns = np.array([A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
-    forces = np.zeros((2, A.size, unknowns.size))
-    forces[0, unknowns, np.arange(unknowns.size)] = 1.0
-    alpha = _solve(rotor, A, forces, number(speed, "speed"), spin=False)[0, unknowns]
+    P = both_planes(rotor, complex_coordinate=False)
+    P = replace(P, A=replace(P.A, material=np.zeros_like(P.A.material)))
+    unknowns = np.array([P.A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
+    forces = np.zeros((unknowns.size, 2, P.A.size))
+    forces[np.arange(unknowns.size), 0, unknowns] = 1.0
+    alpha = _solved(P, forces, number(speed, "speed"))[:, 0, unknowns].T
     symmetric = all(support.plain for support in rotor.supports)
     return np.asarray((alpha + alpha.T) / 2 if symmetric else alpha)
 
 
-def _solve(rotor: Rotor, A: Matrices, forces: FloatArray, speed: float, spin: bool = True) -> FloatArray:
-    """Static deflections of both planes under forces of shape (2, size, m), same shape.
-
-    K x + Ω B y + kxx x + kxy y = f_x, K y − Ω B x + kyx x + kyy y = f_y.
-    """
-    from scipy.linalg.lapack import dgbsv
-
-    if whole_rotor(rotor, A, speed).rigid.shape[1]:
-        raise _free()
-    w, wide = A.width, 2 * A.width + 1
-    K = general(A.shaft)[w:]
-    band = np.zeros((3 * wide + 1, 2 * A.size), order="F")
-    middle = 2 * wide
-    for plane in (0, 1):
-        band[middle - 2 * w : middle + 2 * w + 1 : 2, plane::2] = K
-    if spin and speed and A.material.any():
-        B = speed * general(A.material)[w:]
-        band[middle - 2 * w - 1 : middle + 2 * w : 2, 1::2] = B  # row x, column y
-        band[middle - 2 * w + 1 : middle + 2 * w + 2 : 2, 0::2] = -B
-    for support in rotor.supports:
-        D, supported = support.dynamic_stiffness(0.0, speed).real, 2 * A.deflection(support.node)
-        for p in (0, 1):
-            for q in (0, 1):
-                band[middle + p - q, supported + q] += D[p, q]
-    size = forces.shape[2]
-    rhs = np.asfortranarray(np.moveaxis(forces, 0, 1).reshape(2 * A.size, size))
-    _, _, X, info = dgbsv(wide, wide, band, rhs)
-    work = np.abs(np.einsum("ij,ij->j", rhs, X))
-    scatter = np.zeros(size)
-    for plane in (0, 1):
-        part = np.abs(X[plane::2])
-        scatter += np.einsum("ij,ij->j", part, multiply(np.abs(A.shaft), part))
-    loaded = np.abs(rhs).max(axis=0) > 0
-    if info != 0 or not np.isfinite(X).all() or (np.finfo(float).eps * scatter > 1e-3 * work)[loaded].any():
-        raise _lost(rotor)
-    return np.asarray(np.moveaxis(X.reshape(A.size, 2, size), 1, 0))
-
-
-def _free() -> ValueError:
-    return ValueError(
-        "a rotor that is not held has no static compliance, and no rest under its weight: give stiffness to "
-        "supports at two nodes"
-    )
-
-
-def _lost(rotor: Rotor) -> ValueError:
-    return ValueError(
-        f"the compliance of {rotor.n_elements} elements on these supports is lost in float64; "
-        "join neighbouring elements (50 to 200 are ample for a rotor) or check the support stiffness"
-    )
+def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
+    """Deflections under forces at rest, both of shape (m, 2, size)."""
+    if whole_rotor(P.rotor, P.A, speed).rigid.shape[1]:
+        raise ValueError(
+            "a rotor that is not held has no static compliance, and no rest under its weight: give stiffness "
+            "to supports at two nodes"
+        )
+    band = WholeBand(P)
+    X = band.planes(band.factor(0.0, speed).solve(band.interleaved(forces).T).T).real
+    work = np.abs((forces * X).sum(axis=(1, 2)))
+    lost = np.add(*(rounding_error(P.A.shaft, X[:, plane].T, work) for plane in (0, 1)))
+    if not (lost[forces.any(axis=(1, 2))] < 1e-3).all():
+        raise ValueError(
+            f"the compliance of {P.rotor.n_elements} elements on these supports is lost in float64; "
+            "join neighbouring elements (50 to 200 are ample for a rotor) or check the support stiffness"
+        )
+    # What rounding alone moves across does not move.
+    return np.where(np.abs(X) < 1e-9 * np.abs(X).max(axis=1, keepdims=True), 0.0, X)

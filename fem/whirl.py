@@ -1,30 +1,266 @@
-"""Whirl: complex eigenvalues and shapes of the rotor turning at a speed."""
+"""Whirl: complex eigenvalues and shapes of the rotor turning at one speed or many.
+
+λ² M + λ D(Ω) + K(Ω) of both planes (see `assembly`) is solved in one basis of the shaft for all speeds.
+
+Basis. Let K₀ be the stiffness of the rotor on springs like its supports, σ ≥ 0, and Uᵀ U = K₀ + σ M. The
+basis begins with the static answers to the inertia of the lowest modes of K₀ and to unit forces at the
+supports, so that no force of a support is ever missing. For a pair (λ, x) of the reduced equations the shaft
+is left with the loads
+
+    r = (λ² − σ) M x + λ B x + Ω J (λ G + B) x,      J (x, y) = (y, −x), or −i of z = x + i y,
+
+as far as the basis does not answer them: with e the part of U⁻ᵀ r outside of its images U x, the relative
+error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x), of second order as that of a Rayleigh quotient. Vectors
+have xᴴ K₀ x ≈ 1, images are orthonormal (in them low modes keep their digits), and |e|² is the estimate.
+Where it is too large the largest directions of all such e join the basis: they are static answers to
+gyroscopic loads, to the inertia of the support vectors, to material damping that differs along the shaft.
+
+Eigenvalues. With λ = σ + 1/μ the problem is μ² K_σ + μ D_σ + M with K_σ = K + σ D + σ² M and
+D_σ = D + 2 σ M: the slowest modes are the largest μ, and mass may be zero. σ > 0 leaves room for rigid-body
+modes. Vectors follow by inverse iteration.
+
+Small real parts. With λ = ς + iω the imaginary part of xᴴ (λ² M + λ D + K) x = 0 is
+2 ς ω m + ω Re d + ς Im d + Im k = 0: what does no work over an orbit, however large, is not in it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.matrices.banded_matrices import assemble
-from fem.matrices.lateral_planes import both_planes
-from fem.model.rotor import Rotor, whole
+from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem.orbits import DIRECTION_NAMES, whirl_direction
-from fem.solvers.eigen import finite_modes
-from fem.solvers.reduced_whirl import solve_whirl
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.checks import checked_speeds
+from fem.rotor import Rotor, Support
+from fem.undamped import Result, Spectrum, finite_modes, lowest_modes
+from rotorid.base.answer import Answer
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
+from rotorid.base.tables import Column, Table, frame
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_USUAL = 6  # modes, where nothing else is asked for
+GROWTH = 1e-14
+"""Re λ / |λ| above which a mode grows: rounding of what damps and drives it."""
+NONE = complex(np.nan, np.nan)
+"""No mode: neither part of it may pass for a number."""
+_TOLERANCE = 6e-9  # of eigenvalues, relative to their size
+_FEW = 8  # speeds, about, for which the basis is made first
+_SHIFT = 0.3  # σ in units of the reference frequency
+_STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
+_REAL = 0.1  # |Im λ| below this part of |λ| is no oscillation: log decrement above 62
+_INFINITE = 1e-6  # |μ| below this part of the largest: no mass moves, or too little to be of interest
+_QUIET = 1e-6  # |Re λ| below this part of |λ| comes from work, not from the eigenvalue, which has rounding
 
 
 @dataclass(frozen=True, eq=False)
-class WhirlModes:
+class Whirl:
+    """Oscillating modes at each speed, by rising frequency, in one basis.
+
+    What decays to nothing within a fraction of a turn (damping ratio above 0.995) does not oscillate: such
+    motions are overdamped but for rounding, or at rest in the turning shaft, where its material damps them.
+
+    Attributes
+    ----------
+    Q
+        The equations in the basis.
+    speeds
+        rad/s, shape (S,).
+    scale
+        A frequency of the order of the lowest, rad/s.
+    values
+        λ, rad/s, shape (S, m), `NONE` where there are fewer. In two planes Im λ > 0; of a complex coordinate
+        Im λ < 0 is backward whirl.
+    vectors
+        In the basis, scaled to length 1, shape (S, m, R).
+    real
+        Eigenvalues of motions that do not oscillate, rad/s, slowest first, one array per speed.
+    still
+        How many rigid-body motions without stiffness there are at each speed, shape (S,).
+    error
+        Estimated largest relative error of an eigenvalue.
+    """
+
+    Q: Reduced
+    speeds: FloatArray
+    scale: float
+    values: ComplexArray
+    vectors: ComplexArray
+    real: tuple[FloatArray, ...]
+    still: IndexArray
+    error: float = 0.0
+
+
+def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
+    """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`."""
+    D, K = Q.at(speeds)
+    lam = _eigenvalues(Q.M, D, K, scale)
+    size, frequency = np.abs(lam), np.abs(lam.imag)
+    still = size < _STILL * scale
+    oscillates = ~still & (frequency > _REAL * size)
+    wanted = oscillates if Q.P.planes == 1 else oscillates & (lam.imag > 0)
+    key = np.where(wanted, frequency, np.inf)
+    rows, order = np.arange(len(lam))[:, None], np.argsort(key, axis=1, kind="stable")[:, :m]
+    missing = ~wanted[rows, order]
+    values = lam[rows, order]
+    values[missing] = 1j * scale
+    # Something of every unknown, so that no mode is left out, and apart for modes of one frequency.
+    phases = np.outer(np.arange(1, m + 1), np.arange(Q.size) ** 1.5)
+    vectors = _answers(Q.M, D, K, values, np.exp(1j * phases))
+    vectors /= np.linalg.norm(vectors, axis=2, keepdims=True)
+    values = _by_work(Q.M, D, K, values, vectors)
+    values[missing] = vectors[missing] = NONE
+    others = ~still & ~oscillates & (size < np.inf)
+    real = tuple(np.sort(one.real[which])[::-1] for one, which in zip(lam, others, strict=True))
+    return Whirl(Q, speeds, scale, values, vectors, real, still.sum(axis=1))
+
+
+def polish(
+    Q: Reduced, speeds: FloatArray, at: IndexArray, values: ComplexArray, vectors: ComplexArray, steps: int
+) -> tuple[ComplexArray, ComplexArray]:
+    """Improve single pairs by inverse iteration: each step squares the error.
+
+    Parameters
+    ----------
+    Q, speeds
+        The problem, rad/s.
+    at
+        Which speed each pair belongs to, shape (B,).
+    values, vectors
+        Shapes (B,) and (B, R), vectors of length 1.
+    steps
+        How many.
+    """
+    D, K = Q.at(speeds[at])
+    lam, X = values[:, None], vectors[:, None]
+    for _ in range(steps):
+        new = _answers(Q.M, D, K, lam, X @ np.swapaxes(D, 1, 2) + 2 * lam[..., None] * (X @ Q.M))
+        lam = lam - 1 / (X.conj() * new).sum(axis=2)
+        X = new / np.linalg.norm(new, axis=2, keepdims=True)
+    return _by_work(Q.M, D, K, lam, X)[:, 0], X[:, 0]
+
+
+def _eigenvalues(M: FloatArray, D: AnyArray, K: AnyArray, scale: float) -> ComplexArray:
+    """All λ, shape (S, 2 R); −inf for motions without mass."""
+    R = len(M)
+    M, D = scale * scale * M, scale * D
+    A = np.zeros((len(D), 2 * R, 2 * R), dtype=D.dtype)
+    A[:, :R, R:] = np.eye(R)
+    A[:, R:] = -np.linalg.solve(
+        K + _SHIFT * D + _SHIFT**2 * M,
+        np.concatenate((np.broadcast_to(M, D.shape), D + 2 * _SHIFT * M), axis=2),
+    )
+    mu = np.linalg.eigvals(A).astype(complex)
+    # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
+    size = np.abs(mu)
+    massless = size <= _INFINITE * size.max(axis=1, keepdims=True)
+    mu[massless] = 1.0
+    return np.where(massless, -np.inf, scale * (_SHIFT + 1 / mu))
+
+
+def _answers(
+    M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, loads: ComplexArray
+) -> ComplexArray:
+    """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
+    terms = np.stack(np.broadcast_arrays(M, D, K), axis=1).reshape(len(D), 3, M.size)
+    lam = values * (1 + 1e-14)  # beside an eigenvalue: there the matrix is not singular to the last bit
+    powers = np.stack((lam * lam, lam, np.ones_like(lam)), axis=2)
+    dynamic = (powers @ terms).reshape(*lam.shape, *M.shape)
+    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads, dynamic.shape[:-1])[..., None])[..., 0])
+
+
+def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray) -> ComplexArray:
+    """Values (S, m) whose small real parts have the digits of what damps and drives them."""
+
+    def form(A: AnyArray, sign: int) -> ComplexArray:
+        part = A + sign * np.swapaxes(A.conj(), -1, -2)
+        return np.asarray((X.conj() * (X @ np.swapaxes(part, -1, -2))).sum(axis=2))
+
+    omega = values.imag
+    power = omega * form(D, 1).real + form(K, -1).imag
+    inertia = 2 * omega * form(M, 1).real + form(D, -1).imag
+    quiet = np.abs(values.real) < _QUIET * np.abs(values)
+    return np.where(quiet, 1j * omega - power / inertia, values)
+
+
+def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
+    """The m oscillating modes of lowest frequency at each speed, rad/s, to about eight digits.
+
+    Raises
+    ------
+    ValueError
+        If a support has no table at a speed, or the mesh is too fine for float64.
+    """
+    most = finite_modes(P.A)
+    modes = min(m // 2 + 3, most)  # of a plane; some more than asked for
+    while True:
+        spectrum, scale = reference(P, speeds, modes)
+        whirl = _in_basis(P, spectrum, scale, speeds, m)
+        # Rigid-body motions and overdamped ones take room, too; and modes near the next ones feel them.
+        if modes == most or (np.abs(whirl.values) ** 2 < spectrum.squares[-1]).all():
+            return whirl
+        modes = min(2 * modes, most)
+
+
+def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
+    """Modes of the rotor on supports as at the middle speed, without pedestals, and its lowest frequency."""
+    K, _ = P.supports(speeds[speeds.size // 2, None])
+    springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
+    supports = [
+        Support(s.node, spring, tilting_stiffness=s.tilting_stiffness)
+        for s, spring in zip(P.rotor.supports, springs, strict=True)
+    ]
+    spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
+    moving = spectrum.squares[spectrum.squares > 0]
+    return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
+
+
+def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m: int) -> Whirl:
+    """The same in a basis that begins with modes, and grows for a few speeds, then for all."""
+    from scipy.linalg.lapack import dtbtrs
+
+    A, U = P.A, spectrum.factor
+    loads = np.hstack((multiply(A.mass, spectrum.vectors), np.eye(A.size)[:, P.rows]))
+    Y = np.linalg.qr(dtbtrs(U, loads, trans="T")[0])[0]
+    some = speeds[:: -1 - speeds.size // _FEW][::-1]  # with the last, where gyroscopic loads are largest
+    while True:
+        Q = project(P, dtbtrs(U, Y)[0])
+        loads = np.hstack([multiply(band, Q.basis) for band in (A.mass, A.gyroscopic, A.material)])
+        images = dtbtrs(U, loads, trans="T")[0]
+        outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
+        while True:
+            whirl = solve(Q, some, m, scale)
+            left = _loads(whirl, spectrum.shift) @ triangle.T
+            errors = (left**2).sum(axis=(2, 3))
+            wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
+            if wrong.any() or some.size == speeds.size:
+                break
+            some = speeds
+        if not wrong.any():
+            return replace(whirl, error=float(errors.max()))
+        columns = left[wrong].reshape(-1, len(triangle))
+        sizes, directions = np.linalg.eigh(columns.T @ columns)
+        new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
+        Y = np.hstack((Y, new - Y @ (Y.T @ new)))
+
+
+def _loads(whirl: Whirl, shift: float) -> FloatArray:
+    """The loads r: factors of M, G and B times the basis, shape (S, m, real and imaginary planes, 3 d)."""
+    p, d = whirl.Q.P.planes, whirl.Q.basis.shape[1]
+    lam, speed = np.nan_to_num(whirl.values)[..., None, None], whirl.speeds[:, None, None, None]
+    x = np.nan_to_num(whirl.vectors)[..., : p * d].reshape(*whirl.values.shape, p, d)
+    turned = speed * (np.array([[-1j]] if p == 1 else [[0.0, 1.0], [-1.0, 0.0]]) @ x)
+    r = np.concatenate(((lam * lam - shift) * x, lam * turned, lam * x + turned), axis=3)
+    return np.concatenate((r.real, r.imag), axis=2)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WhirlModes(Result):
     """Modes of the rotor at one speed, by rising frequency.
 
     Attributes
@@ -58,12 +294,12 @@ class WhirlModes:
     @property
     def frequencies(self) -> FloatArray:
         """Whirl frequencies |Im λ|, rad/s, shape (n,)."""
-        return np.asarray(self.eigenvalues.imag)
+        return self.eigenvalues.imag
 
     @property
     def log_decrements(self) -> FloatArray:
         """Logarithmic decrements −2π Re λ / |Im λ|, shape (n,); negative: unstable."""
-        return np.asarray(-2 * np.pi * self.eigenvalues.real / self.eigenvalues.imag)
+        return -2 * np.pi * self.eigenvalues.real / self.frequencies
 
     @property
     def direction(self) -> FloatArray:
@@ -72,46 +308,52 @@ class WhirlModes:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "speed_rad_s": self.speed,
-            "frequencies_rad_s": self.frequencies.tolist(),
-            "log_decrements": self.log_decrements.tolist(),
-            "direction": [DIRECTION_NAMES[float(d)] for d in self.direction],
-            "real_eigenvalues_rad_s": self.real.tolist(),
-            "warnings": list(self.warnings),
-        }
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per mode: frequency, log decrement, direction."""
-        import pandas as pd
-
-        return pd.DataFrame(
+        return plain(
             {
-                "mode": range(1, self.eigenvalues.size + 1),
-                "frequency_rad_s": self.frequencies,
-                "log_decrement": self.log_decrements,
-                "direction": [DIRECTION_NAMES[float(d)] for d in self.direction],
+                "speed_rad_s": self.speed,
+                "frequencies_rad_s": self.frequencies,
+                "log_decrements": self.log_decrements,
+                "direction": self._ways,
+                "real_eigenvalues_rad_s": self.real,
+                "warnings": self.warnings,
             }
         )
 
-    def summary(self) -> str:
-        """The modes as text."""
-        lines = [
-            f"Whirl at {speed_text(self.speed)}",
-            "mode     rad/s         rpm   log dec  direction",
-        ]
-        for k, (omega, delta, way) in enumerate(
-            zip(self.frequencies, self.log_decrements, self.direction, strict=True), start=1
-        ):
-            rounded = round(float(delta), 4) + 0.0  # no negative zero
-            lines.append(
-                f"{k:4d}{omega:12.4f}{omega * RPM:12.2f}{rounded:10.4f}  {DIRECTION_NAMES[float(way)]}"
-            )
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+    def tables(self) -> tuple[Table, ...]:
+        """The modes, one row each."""
+        columns = (
+            Column("mode", range(1, self.eigenvalues.size + 1)),
+            Column("whirl", self._ways),
+            Column("rpm", self.frequencies * RPM, "{:.2f}".format, "frequencies_rad_s.*", RPM),
+            Column("rad/s", self.frequencies, "{:.4f}".format, "frequencies_rad_s.*"),
+            Column("log dec", self.log_decrements, "{:z.4f}".format, "log_decrements.*"),
+        )
+        return (Table("whirl modes", columns),)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per mode: number, direction, frequency in rpm and rad/s, log decrement."""
+        return frame(self.tables()[0])
+
+    def sentence(self) -> str:
+        """How many modes there are at this speed, and which of them decays least."""
+        least = int(np.argmin(self.log_decrements))
+        return (
+            f"{counted(self.eigenvalues.size, 'whirl mode')} at {speed_text(self.speed)}; mode {least + 1} "
+            f"decays least, log decrement {self.log_decrements[least]:z.4g}."
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence, the modes and the warnings."""
+        return replace(super().answer, warnings=self.warnings)
+
+    @property
+    def _ways(self) -> list[str]:
+        return [DIRECTION_NAMES[way] for way in self.direction.tolist()]
 
 
 def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
-    """Compute the whirl modes of lowest frequency at a speed, in a reduced basis: to 1e-7 and better.
+    """Compute the whirl modes of lowest frequency at a speed, in a reduced basis: to 1e-8 and better.
 
     Parameters
     ----------
@@ -131,21 +373,17 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     speeds = checked_speeds([speed])
     P = both_planes(rotor)
     n = checked_number(rotor, n)
-    solution = solve_whirl(P, speeds, n)
-    values, real = solution.found.values[0], solution.found.real[0]
-    still = int(solution.found.still[0])
-    there = np.isfinite(values)
-    values = values[there]
-    shapes = solution.Q.nodes(solution.found.vectors[0, there])
-    if not values.size:
+    whirl = solve_whirl(P, speeds, n)
+    there = np.isfinite(whirl.values[0])
+    if not there.any():
         raise ValueError(
             f"the rotor has no oscillating mode at {speed:.6g} rad/s: all motions are overdamped"
         )
-    values, x, y = in_both_planes(values, shapes)
-    size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
-    x, y = x.T / size, y.T / size
-    warnings = missing_modes(P.planes, real, still, values.size, n)
-    return WhirlModes(float(speeds[0]), values, x, y, real, solution.error, rotor, warnings)
+    values, x, y = in_both_planes(whirl.values[0, there], whirl.Q.nodes(whirl.vectors[0, there]))
+    size = np.hypot(np.abs(x), np.abs(y)).max(axis=1)
+    real = whirl.real[0]
+    warnings = missing_modes(real, int(whirl.still[0]), values.size, n)
+    return WhirlModes(float(speeds[0]), values, x.T / size, y.T / size, real, whirl.error, rotor, warnings)
 
 
 def in_both_planes(
@@ -155,25 +393,20 @@ def in_both_planes(
     if shapes.shape[-2] == 2:
         return values, shapes[..., 0, :], shapes[..., 1, :]
     z = shapes[..., 0, :]
-    back = (values.imag < 0)[..., None]
+    back = values.imag < 0
     # z = φ e^{λt}: x is its real part, y its imaginary part; the conjugate of λ has the positive frequency.
-    x = np.where(back, z.conj(), z)
-    y = np.where(back, 1j, -1j) * x
-    return np.where(values.imag < 0, values.conj(), values), x, y
+    x = np.where(back[..., None], z.conj(), z)
+    return np.where(back, values.conj(), values), x, np.where(back[..., None], 1j, -1j) * x
 
 
-def missing_modes(planes: int, real: FloatArray, still: int, found: int, n: int) -> tuple[str, ...]:
-    """What is not among the modes."""
-    texts = []
-    if found < n:
-        texts.append(f"only {found} of {n} modes oscillate, the others are overdamped")
-    rigid = still // 2
-    if rigid:
-        texts.append(f"rigid-body motions that nothing holds (eigenvalue 0, {still} times) are left out")
-    growing = real[real > 0] if planes == 2 else real[real > 0][:1]
-    if growing.size:
+def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
+    """What is not among the modes, of which `count` of n oscillate."""
+    texts = [f"only {count} of {n} modes oscillate, the others are overdamped"] if count < n else []
+    if still > 1:
+        texts.append(f"rigid-body motions that nothing holds (eigenvalue 0, {still // 2} times) are left out")
+    if real.max(initial=0.0) > 0:
         texts.append(
-            f"the rotor runs away without oscillating (eigenvalue {growing.max():.4g} 1/s): "
+            f"the rotor runs away without oscillating (eigenvalue {real.max():.4g} 1/s): "
             "a support pushes it aside; check negative stiffness"
         )
     return tuple(texts)
@@ -188,7 +421,7 @@ def checked_number(rotor: Rotor, n: int | None) -> int:
         If the model has fewer.
     """
     available = available_modes(rotor)
-    n = min(_USUAL, available) if n is None else whole(n, "the number of modes")
+    n = min(6, available) if n is None else whole(n, "the number of modes")
     if not 1 <= n <= available:
         raise ValueError(
             f"{n} modes cannot be found: the model has 1 to {available}; "

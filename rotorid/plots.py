@@ -40,7 +40,7 @@ def plot(result: object, ax: Any = None, **options: Any) -> Any:  # noqa: ANN401
 
 def _rotors() -> Pictures:
     import fem
-    from fem._new import plots
+    from fem import plots
 
     return {
         fem.Modes: plots.draw_modes,

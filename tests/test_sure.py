@@ -16,7 +16,7 @@ from balancing import ReadingErrors, Trials, UndeterminedError, correct, estimat
 from balancing.coefficients.machine_type import fit_type
 from balancing.correction.update_coefficients import update
 from balancing.data.conventions import Labels
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import experiments

@@ -30,8 +30,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from fem.model.rotor import Rotor
-    from fem.model.sensors import SensorLike
+    from fem import Rotor, SensorLike
 
 Quantity = Literal["displacement", "velocity", "acceleration"]
 
@@ -86,7 +85,7 @@ def model_influence(  # noqa: PLR0913
     ValueError
         For nodes, speeds or radii that cannot be, and as `fem.influence`.
     """
-    from fem.response import influence
+    from fem import influence
 
     if not (np.isfinite(relative_error) and relative_error >= 0):
         raise ValueError(f"the relative error of the model must be a finite number ≥ 0, not {relative_error}")
@@ -160,7 +159,7 @@ def modal_shapes(
     ValueError
         For modes or nodes that the model does not have.
     """
-    from fem.critical import critical_speeds
+    from fem import critical_speeds
 
     found = critical_speeds(rotor, n=modes)
     if found.shapes.shape[1] < modes:

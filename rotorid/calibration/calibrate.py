@@ -13,9 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.model.calibration import Calibration, is_reading
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import as_they_stand, with_parameters
+from fem import Calibration, Rotor, is_reading
+from fem.parameters import as_they_stand, with_parameters
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.calibration.calibrated_rotor import LEVEL, CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies

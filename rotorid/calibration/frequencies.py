@@ -11,12 +11,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.critical import NOT_COUNTED, critical_speeds_near, lowest_critical_speeds
-from fem.matrices.undamped_matrices import static_stiffness
-from fem.model.calibration import is_reading
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import as_they_stand, typical_size, with_changes, with_parameters
-from fem.model.supports import Pedestal, Support
+from fem import (
+    NOT_COUNTED,
+    Pedestal,
+    Rotor,
+    Support,
+    critical_speeds_near,
+    is_reading,
+    lowest_critical_speeds,
+)
+from fem.assembly import static_stiffness
+from fem.parameters import as_they_stand, typical_size, with_changes, with_parameters
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.rpm import rpm_text
 

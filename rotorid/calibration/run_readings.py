@@ -20,21 +20,20 @@ from balancing.coefficients.run_errors import run_columns, runs_of
 from balancing.data.reading_errors import error_model, mean_covariance
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
-from fem.matrices.banded_matrices import assemble, multiply
-from fem.matrices.support_dynamic_stiffness import supported
-from fem.matrices.undamped_matrices import one_plane
-from fem.model.calibration import is_reading
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import (
-    as_they_stand,
-    typical_size,
-    with_changes,
-    with_parameters,
+from fem import (
+    MatrixChange,
+    Rotor,
+    Sensor,
+    finite_modes,
+    is_reading,
+    lowest_modes,
+    matrix_change,
+    one_plane,
+    receptance_with_derivatives,
+    unit_loads,
 )
-from fem.model.sensors import Sensor
-from fem.solvers.eigen import finite_modes, lowest_modes
-from fem._new.response import unit_loads
-from fem._new.derivatives import MatrixChange, matrix_change, receptance_with_derivatives
+from fem.assembly import assemble, multiply, supported
+from fem.parameters import as_they_stand, typical_size, with_changes, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.regression import least_squares, solution, stretch

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.model.calibration import is_reading
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import numbers_of, parameter_value
+from fem import Rotor, is_reading
+from fem.parameters import numbers_of, parameter_value
 
 _SIGNED = ("kxy", "kyx", "cxy", "cyx", "offset", "angle")
 """Last words of paths of numbers that may have either sign."""

@@ -79,8 +79,8 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         For a rotor or an option that cannot be.
     """
     import fem
-    from fem.parameter_bands import band as error_band
-    from fem.parameter_bands import nearest_modes
+    from fem.parameters import band as error_band
+    from fem.parameters import nearest_modes
     from fem.plots import campbell_figure
 
     operating = band(options.operating)

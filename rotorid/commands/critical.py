@@ -66,8 +66,8 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         For a rotor or an option that cannot be.
     """
     import fem
-    from fem.critical import critical_speeds_near
-    from fem.parameter_bands import band as error_band
+    from fem import critical_speeds_near
+    from fem.parameters import band as error_band
 
     options = options or CriticalOptions()
     operating = band(options.operating)

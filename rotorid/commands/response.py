@@ -31,9 +31,7 @@ from rotorid.commands.quantities import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from fem import Peak, Peaks, Response, Rotor
-    from fem.model.sensors import SensorLike
-    from fem.response import Unbalance
+    from fem import Peak, Peaks, Response, Rotor, SensorLike, Unbalance
     from rotorid.base.arrays import AnyArray, FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s²
@@ -285,7 +283,7 @@ class Vibration:
     @property
     def labels(self) -> list[str]:
         """Names of the sensors."""
-        from fem.model.sensors import label
+        from fem import label
 
         return [str(label(place)) for place in self.sensors]
 
@@ -322,7 +320,7 @@ class Vibration:
         import numpy as np
 
         import fem
-        from fem.model.sensors import as_sensor
+        from fem import as_sensor
 
         result = self.response
         nodes = [result.rotor.node(as_sensor(place, result.rotor).node) for place in self.sensors]
@@ -419,8 +417,8 @@ def response(
     import numpy as np
 
     import fem
-    from fem.model.sensors import as_sensor
-    from fem.parameter_bands import band as error_band
+    from fem import as_sensor
+    from fem.parameters import band as error_band
     from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 

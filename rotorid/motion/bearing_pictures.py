@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.static import GRAVITY
+from fem import GRAVITY
 from rotorid.base.plot_style import (
     DARK,
     VERMILION,

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.forces.laws import law
-from fem.model.node_forces import CubicSpring, JournalBearing, NodeForce, SqueezeFilm, Stop, kind_of
+from fem import CubicSpring, JournalBearing, NodeForce, SqueezeFilm, Stop
+from fem.forces import kind_of, law
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import speed_text

@@ -16,9 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from fem.matrices.banded_matrices import assemble, multiply
-from fem.model.node_forces import JournalBearing, SqueezeFilm
-from fem.static import GRAVITY
+from fem import GRAVITY, JournalBearing, SqueezeFilm
+from fem.assembly import assemble, multiply
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing, percent
 from rotorid.motion.small_model import SmallModel

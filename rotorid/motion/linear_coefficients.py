@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from fem.model.node_forces import SqueezeFilm, Stop, kind_of
+from fem import SqueezeFilm, Stop
+from fem.forces import kind_of
 from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import speed_text
 from rotorid.motion.equilibrium import Equilibrium, each_force, equilibria

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 import fem
-from fem.static import GRAVITY
+from fem import GRAVITY
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import number
 from rotorid.motion.small_model import SmallModel

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fem.model.node_forces import JournalBearing, NodeForce
+from fem import JournalBearing, NodeForce
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import rpm_text

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.model.node_forces import NodeForce, kind_of
+from fem import NodeForce
+from fem.forces import kind_of
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number

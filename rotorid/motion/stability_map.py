@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.forces.short_film import short_film
+from fem.forces import short_film
 from rotorid.base.arrays import FloatArray
 
 

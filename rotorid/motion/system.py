@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 
 import fem
-from fem.forces.laws import law, tables
-from fem.model.node_forces import NodeForce
+from fem import NodeForce
+from fem.forces import law, tables
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.compiled import compiled_part
 

@@ -27,9 +27,8 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.matrices.banded_matrices import assemble, held, ignored_inertia, multiply
-from fem.matrices.undamped_matrices import Pencil, whole_rotor
-from fem.solvers.eigen import Spectrum, lowest_modes
+from fem import Pencil, Spectrum, lowest_modes, whole_rotor
+from fem.assembly import assemble, held, ignored_inertia, multiply
 from rotorid.base import registry
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole

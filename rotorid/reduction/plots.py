@@ -55,8 +55,8 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     Without a rotor the measured shapes stand beside those of the model, place by place. Of many modes the
     first six are drawn.
     """
-    from fem.plots import draw_rotor
-    from fem.plots.mode_shapes import smooth_shapes
+    from fem import draw_rotor
+    from fem.plots import smooth_shapes
 
     axes = new_axes((WIDTH, 5.0)) if ax is None else ax
     rotor, full, n = reduction.rotor, reduction.rotor_modes, len(reduction.frequencies)

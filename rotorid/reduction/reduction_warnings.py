@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import fem
-from fem.matrices.banded_matrices import ignored_inertia
+from fem.assembly import ignored_inertia
 from rotorid.base.arrays import FloatArray
 from rotorid.reduction.equivalent.small_model_modes import mac
 from rotorid.regression.estimate import Estimate

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.model.rotor import Rotor
+from fem import Rotor
 from rotorid.base.rpm import RPM, phase_deg
 from rotorid.base.tables import Column, Table
 from rotorid.report.document import Cells
@@ -18,8 +18,7 @@ from rotorid.report.rotor_figures import Drawing, rotor_picture
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fem.model.sensors import SensorLike
-    from fem.model.supports import Support
+    from fem import SensorLike, Support
 
 
 @dataclass(frozen=True)

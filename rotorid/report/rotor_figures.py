@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fem import Rotor
-    from fem.model.sensors import SensorLike
+    from fem import Rotor, SensorLike
     from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost
 
 WIDTH, LETTERS = 6.0, 9.0
@@ -55,7 +54,7 @@ def rotor_picture(
     """The rotor to scale, with a few sensors; `meaning` says what stands at the planes."""
 
     def draw(figure: Figure) -> None:
-        from fem.plots import draw_rotor
+        from fem import draw_rotor
 
         marked = sensors if len(sensors) <= MARKED else ()
         axes = draw_rotor(rotor, figure.add_subplot(), planes=planes, sensors=marked)

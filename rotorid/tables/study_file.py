@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.data.trials import ReadingErrors
-from fem.model.rotor_parameters import expand, numbers_of, parameter_value
-from fem.model.sensors import Sensor
+from fem import Sensor
+from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.tables.reader import units, value_kinds
 from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
@@ -21,7 +21,7 @@ from rotorid.tables.rotor.bearing import NODE
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
 if TYPE_CHECKING:
-    from fem.model.rotor import Rotor
+    from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
 
 MOST_SAMPLES, MOST_CORRECTIONS = 10**9, 20

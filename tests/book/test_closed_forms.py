@@ -8,7 +8,7 @@ from exact_solutions import SOLVERS
 
 import fem
 from balancing import Influence, Labels, correct
-from fem._new.assembly import WholeBand, both_planes
+from fem.assembly import WholeBand, both_planes
 from rotorid.reduction import equivalent_masses, natural_frequencies
 
 MASS, BETA, SPEED = 20.0, 2e-5, 300.0

@@ -26,9 +26,9 @@ from scipy.special import chdtri
 import fem
 from balancing import Labels, ReadingErrors, Trials, UndeterminedError, compare_check
 from balancing.data.trials import RunScatter
-from fem.matrices.banded_matrices import assemble, multiply
-from fem.model.rotor_parameters import with_parameters
-from fem.solvers.receptance_derivatives import receptance_with_derivatives
+from fem import receptance_with_derivatives
+from fem.assembly import assemble, multiply
+from fem.parameters import with_parameters
 from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.regression import stretch

@@ -6,7 +6,7 @@ from helpers.calibration.jobs import Runs, machine
 from scipy.stats import chi2
 
 from balancing.data.trials import ReadingErrors
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 
 ERRORS = ReadingErrors(0.02, 0.02)

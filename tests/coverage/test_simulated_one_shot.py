@@ -7,7 +7,7 @@ import pytest
 from repetitions import FULL, of_a_spread
 
 import fem
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid import read_job
 from rotorid.samples import sample_data
 from rotorid.workflows import balance
@@ -43,6 +43,6 @@ def test_errors_of_the_parameters_are_those_of_drawn_rotors(shot):
 
 
 def fem_value(rotor, name):
-    from fem.model.rotor_parameters import parameter_value
+    from fem.parameters import parameter_value
 
     return rotor.calibration.readings.get(name) or parameter_value(rotor, name)

@@ -7,7 +7,7 @@ import pytest
 from repetitions import FULL
 
 import fem
-from fem.parameter_bands import spread
+from fem.parameters import spread
 
 NAMES = ("bearing[1].kxx", "bearing[2].stiffness.scale", "material.youngs_modulus", "disc[wheel].mass")
 

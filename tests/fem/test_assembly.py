@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 import fem
-from fem._new.assembly import WholeBand, assemble, both_planes, project, supported
-from fem._new.forces import law, tables
-from fem._new.state_space import state_space
+from fem import state_space
+from fem.assembly import WholeBand, assemble, both_planes, project, supported
+from fem.forces import law, tables
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.matrices.banded_matrices import assemble, dense
+from fem.assembly import assemble, dense
 
 FULL = fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
 

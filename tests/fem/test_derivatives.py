@@ -8,10 +8,9 @@ import pytest
 from fem_rotors import uniform
 
 import fem
-from fem._new.assembly import assemble
-from fem._new.derivatives import matrix_change, receptance_with_derivatives
-from fem._new.parameters import as_they_stand, parameter_value, typical_size, with_changes, with_parameters
-from fem._new.response import unit_loads
+from fem import matrix_change, receptance_with_derivatives, unit_loads
+from fem.assembly import assemble
+from fem.parameters import as_they_stand, parameter_value, typical_size, with_changes, with_parameters
 
 ALPHA = np.array([0.0, 90.0, 37.0])
 

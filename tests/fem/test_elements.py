@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem._new.assembly import assemble, dense
-from fem._new.elements import strains
+from fem.assembly import assemble
+from fem.elements import dense, strains
 
 # E = 2.1e11 Pa, ρ = 7850 kg/m³, D = 0.1 m, L = 1 m, rad/s.
 SIMPLY = [1276.18775, 5104.75102, 11485.68979]

@@ -14,7 +14,7 @@ from cases import each_of
 from scipy.optimize import brentq, root
 
 import fem
-from fem._new.forces import law, short_film, tables
+from fem.forces import law, short_film, tables
 
 BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
 SPEED = 50 * math.pi  # 1500 rpm

@@ -3,13 +3,14 @@ import math
 
 import numpy as np
 import pytest
+from fem.matrices.banded_matrices import general
 from fem_rotors import mirrored, refined, rotor23, rotors, uniform
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.matrices.banded_matrices import assemble, dense, general, multiply
-from fem._new.undamped import lowest_modes, one_plane
+from fem import lowest_modes, one_plane
+from fem.assembly import assemble, dense, multiply
 
 # Roots of cos x cosh x = 1: the free beam.
 FREE = np.array([4.730040744862704, 7.853204624095838, 10.995607838001671])

@@ -12,10 +12,10 @@ from hypothesis import given
 from repetitions import FULL
 
 import fem
-from fem._new.parameters import (
+from fem import is_reading
+from fem.parameters import (
     band,
     expand,
-    is_reading,
     nearest_modes,
     parameter_value,
     spread,

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 
 import fem
-from fem._new.peaks import (
-    Separation,
-    api617_limit,
-    api_unbalance,
-    critical_peaks,
-    find_peaks,
-    open_question,
-    unsearched,
-)
+from fem import Separation, api617_limit, api_unbalance, critical_peaks, open_question, unsearched
+from fem.peaks import find_peaks
 
 
 def jeffcott(speeds, zeta, critical=100.0):

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from repetitions import FULL as WHOLE
 
 import fem
-from fem._new.assembly import assemble, dense
+from fem.assembly import assemble
+from fem.elements import dense
 
 FULL = fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
 MASS, EI = 12.0, 2.1e11 * math.pi * 0.04**4 / 64

@@ -12,8 +12,7 @@ import ross_rotors
 from exact_solutions import SOLVERS, whirl_exactly
 
 import fem
-from fem._new.whirl import whirl_modes
-from fem.campbell import campbell
+from fem import campbell, whirl_modes
 
 FINER = 24
 METHODS = ("fast", "exact")

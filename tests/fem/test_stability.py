@@ -12,7 +12,7 @@ from repetitions import FULL
 from whirl_rotors import machine
 
 import fem
-from fem._new.stability import growth_bound, judge, within
+from fem.stability import growth_bound, judge, within
 
 MASS, SHAFT, DIAMETER = 20.0, 1.0, 0.03
 STIFFNESS = 48 * fem.STEEL_MODULUS * math.pi / 64 * DIAMETER**4 / SHAFT**3

@@ -14,7 +14,7 @@ from scipy.signal import StateSpace as ScipyStateSpace
 from scipy.signal import lsim
 
 import fem
-from fem._new.state_space import state_space
+from fem import state_space
 
 
 def motion_of(M, C, K, names=None):

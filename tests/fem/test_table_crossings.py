@@ -7,7 +7,7 @@ import pytest
 from repetitions import FULL
 
 import fem
-from fem.matrices.banded_matrices import assemble, dense
+from fem.assembly import assemble, dense
 
 DRAWN = 200 if FULL else 25
 SCAN = 1500 if FULL else 600

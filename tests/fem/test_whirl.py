@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
-from fem._new.assembly import both_planes
-from fem._new.whirl import polish, solve_whirl
+from fem import solve_whirl
+from fem.assembly import both_planes
+from fem.whirl import polish
 
 
 def relative(found, expected):

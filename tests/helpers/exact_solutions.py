@@ -7,9 +7,9 @@ import pytest
 from full_whirl import exact_modes
 
 import fem
-from fem._new import response
-from fem._new.assembly import both_planes
-from fem._new.whirl import WhirlModes, in_both_planes, missing_modes
+from fem import WhirlModes, response
+from fem.assembly import both_planes
+from fem.whirl import in_both_planes, missing_modes
 
 
 def exactly(function, *arguments, **named):

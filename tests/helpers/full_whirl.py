@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem._new.assembly import Planes, project
-from fem._new.whirl import reference, solve
+from fem import reference, solve
+from fem.assembly import Planes, project
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _DENSE = 400  # unknowns of both planes up to which all eigenvalues are computed

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.plots.bode import draw_polar, right_angles
+from fem.plots import draw_polar, right_angles
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     BOX,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from fem.matrices.lateral_planes import Quadratic
 
 import fem
-from fem.matrices.banded_matrices import assemble, free_motions, ignored_inertia, multiply, rounding_error
-from fem.matrices.lateral_planes import Quadratic
+from fem.assembly import assemble, free_motions, ignored_inertia, multiply, rounding_error
 from rotorid.base.arrays import FloatArray
 
 _LOST = 1e-3  # relative rounding error of a static shape

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.critical import critical_speeds_below
-from fem.model.sensors import SensorLike, label
-from fem.response_result import polar
+from fem import SensorLike, critical_speeds_below, label, polar
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds

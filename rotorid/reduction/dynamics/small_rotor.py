@@ -19,11 +19,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from fem.matrices.lateral_planes import Quadratic
 from numpy.typing import ArrayLike
 
 import fem
-from fem.matrices.lateral_planes import Quadratic, both_planes, project
-from fem.state_space import StateSpace, state_space
+from fem import StateSpace, state_space
+from fem.assembly import both_planes, project
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem._new.assembly import Reduced, both_planes, project
-from fem._new.whirl import Whirl, reference, solve
+from fem import Whirl, reference, solve
+from fem.assembly import Reduced, both_planes, project
 from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fem
-from fem._new.assembly import both_planes
-from fem._new.response import DIRECTION_NAMES
-from fem._new.stability import runs_away
-from fem._new.whirl import Whirl, available_modes, checked_number, solve_whirl
+from fem import DIRECTION_NAMES, Whirl, available_modes, checked_number, runs_away, solve_whirl
+from fem.assembly import both_planes
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text

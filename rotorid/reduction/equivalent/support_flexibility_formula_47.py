@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.matrices.banded_matrices import assemble, held, rounding_error
+from fem.assembly import assemble, held, rounding_error
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain

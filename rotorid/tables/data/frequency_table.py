@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.model.rotor import Rotor
+from fem import Rotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.tables.reader import units

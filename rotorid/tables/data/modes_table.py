@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.model.rotor import Rotor
+from fem import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.tables.data.repeated_readings import FREQUENCIES

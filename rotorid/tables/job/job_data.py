@@ -18,8 +18,7 @@ from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors, as
 
 if TYPE_CHECKING:
     from balancing.mounting.mount_result import Mounted
-    from fem.model.rotor import Rotor
-    from fem.model.sensors import Sensor
+    from fem import Rotor, Sensor
 
 
 @dataclass(frozen=True)

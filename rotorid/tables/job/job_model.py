@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from balancing.data.conventions import Labels
-from fem.model.sensors import Sensor
+from fem import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.settings_keys import Said
 
 if TYPE_CHECKING:
-    from fem.model.rotor import Rotor
+    from fem import Rotor
 
 
 @dataclass(frozen=True)

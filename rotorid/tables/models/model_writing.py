@@ -11,7 +11,7 @@ from rotorid.base.arrays import BoolArray
 from rotorid.base.versions import SCHEMA_VERSION
 
 if TYPE_CHECKING:
-    from fem.matrices.equations_of_motion import Motion
+    from fem import Motion
 
 
 def ode_model_bytes(
@@ -107,7 +107,7 @@ def _states(
     outputs: Sequence[str] | None,
 ) -> list[str]:
     """Rates s' = A s + B u − Σ B_i d_i v_i with the dampers' forces −d_i v_i on their coordinates."""
-    from fem.state_space import state_space
+    from fem import state_space
 
     names = motion.coordinates
     for name in dampers:

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from balancing.data.conventions import polar
-from fem.model.node_forces import FORCES
-from fem.model.supports import KINDS
-from fem.static import GRAVITY
+from fem import GRAVITY, KINDS
+from fem.forces import FORCES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION

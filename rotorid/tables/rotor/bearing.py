@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.model.supports import KINDS, Coefficient, Pair, Pedestal, Support
+from fem import KINDS, Coefficient, Pair, Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find, names
 from rotorid.base.text import listing

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fem.model.calibration import Calibration
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import expand
+from fem import Calibration, Rotor
+from fem.parameters import expand
 from rotorid.base.text import counted
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.settings_keys import Key, Said

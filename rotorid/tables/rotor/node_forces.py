@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from typing import Any, get_args
 
-from fem.model.node_forces import FORCES, Film, JournalBearing, MuszynskaSeal, NodeForce, Stop, kind_of
+from fem import JournalBearing, MuszynskaSeal, NodeForce, Stop
+from fem.forces import FORCES, Film, kind_of
 from rotorid.base.registry import find
 from rotorid.tables.reader import units
 from rotorid.tables.reader.settings_keys import Key, Kind, Quantity, take

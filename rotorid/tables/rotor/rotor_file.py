@@ -7,9 +7,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from fem.model.node_forces import FORCES
-from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
-from fem.model.supports import KINDS
+from fem import KINDS, STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
+from fem.forces import FORCES
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.settings_keys import Key, take

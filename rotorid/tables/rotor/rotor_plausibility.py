@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.model.node_forces import NodeForce, ShortFilm
-from fem.model.rotor import Rotor
+from fem import NodeForce, Rotor
+from fem.forces import ShortFilm
 from rotorid.base.arrays import BoolArray
 from rotorid.base.checks import attachment
 from rotorid.base.text import counted

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from fem.model.node_forces import NodeForce
-from fem.model.rotor import (
+from fem import (
     SHORTEST,
     STEEL_DENSITY,
     STEEL_MODULUS,
     STEEL_POISSON,
     Disc,
     Model,
+    NodeForce,
     Rotor,
     Support,
     too_short,

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.model.rotor import Disc, Model, Rotor, Support
-from fem.model.supports import KINDS, Coefficient
+from fem import KINDS, Coefficient, Disc, Model, Rotor, Support
 from rotorid.base.registry import names
 from rotorid.base.tables import Value, csv_bytes
 from rotorid.base.text import listing

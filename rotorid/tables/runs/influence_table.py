@@ -11,7 +11,7 @@ import numpy as np
 from balancing.coefficients.influence import Influence
 from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
-from fem.model.sensors import label
+from fem import label
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from fem.model.sensors import SensorLike
+    from fem import SensorLike
 
 _GAPS_NAMED = 100
 _PATTERN = (

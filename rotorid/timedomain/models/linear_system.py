@@ -12,7 +12,7 @@ from rotorid.timedomain.models.compiled import signs
 from rotorid.timedomain.models.ode_model import OdeModel
 
 if TYPE_CHECKING:
-    from fem.state_space import StateSpace
+    from fem import StateSpace
 
 
 def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
@@ -43,7 +43,7 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
     >>> state_space(model).A
     array([[-2.]])
     """
-    from fem.state_space import StateSpace
+    from fem import StateSpace
 
     _check_linear(model)
     values = model.start if theta is None else np.asarray(theta, dtype=float)

@@ -19,7 +19,7 @@ from balancing.coefficients.run_error_estimate import known_run_errors
 from balancing.coefficients.run_errors import runs_of
 from balancing.data.reading_errors import error_model
 from balancing.data.trials import Trials
-from fem.model.rotor_parameters import as_change, parameter_value
+from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
 from rotorid.commands.outcome import hash_of
 

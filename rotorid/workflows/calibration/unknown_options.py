@@ -9,8 +9,8 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import expand, numbers_of, parameter_value
+from fem import Rotor
+from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.base.text import counted
 from rotorid.calibration import Unknown
 from rotorid.calibration.unknowns import check_different

@@ -10,9 +10,8 @@ import numpy as np
 from balancing import Correction, Trials, UndeterminedError, correct, estimate_influence
 from balancing.data.trials import RunScatter
 from balancing.solvers.error_propagation import region_radius
-from fem.model.rotor import Rotor
-from fem.model.rotor_parameters import with_parameters
-from fem.response import InfluenceCoefficients, influence
+from fem import InfluenceCoefficients, Rotor, influence
+from fem.parameters import with_parameters
 from rotorid.base.arrays import ComplexArray
 from rotorid.regression import stretch
 from rotorid.tables.study_file import MachineStudy

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fem.model import supports
 from repetitions import FULL
 
 from balancing import (
@@ -22,7 +23,6 @@ from balancing import (
 from balancing.correction import correction_words
 from balancing.solvers import correction_methods
 from balancing.solvers.effective_variance import effective_variance
-from fem.model import supports
 from rotorid.base.registry import Method
 from rotorid.reduction import guyan_irs_serep as reduction
 

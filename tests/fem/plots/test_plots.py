@@ -10,18 +10,11 @@ from documents import check_hygiene
 from fem_rotors import rotor23, uniform
 
 import fem
-from fem._new.peaks import Peak, Peaks, smooth_curves
-from fem._new.plots import (
-    campbell_figure,
-    draw_bode,
-    draw_orbits,
-    draw_polar,
-    draw_speed_map,
-    influence_figure,
-    polar_figure,
-)
-from fem._new.plots.rotor import draw_rotor, radii, surface
-from fem._new.stability import Window
+from fem import Peak, Peaks, Window, draw_rotor
+from fem.peaks import smooth_curves
+from fem.plots.campbell import campbell_figure, draw_speed_map
+from fem.plots.response import draw_bode, draw_orbits, draw_polar, influence_figure, polar_figure
+from fem.plots.rotor import radii, surface
 from rotorid.base.plot_style import new_axes
 from rotorid.base.rpm import RPM
 from rotorid.plots import plot

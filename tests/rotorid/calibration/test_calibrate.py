@@ -12,7 +12,7 @@ from repetitions import FULL
 
 import fem
 from balancing.data.trials import ReadingErrors
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid.calibration import MeasuredFrequencies, Unknown, calibrate
 from rotorid.regression import nonlinear, search
 

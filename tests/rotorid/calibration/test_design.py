@@ -7,7 +7,7 @@ import pytest
 from helpers.calibration.jobs import Runs, machine
 
 from balancing.data.trials import ReadingErrors, RunScatter
-from fem.model.rotor_parameters import parameter_value, with_parameters
+from fem.parameters import parameter_value, with_parameters
 from rotorid.calibration import Unknown
 from rotorid.workflows.calibration.calibration_design import design
 

@@ -10,7 +10,7 @@ from helpers.calibration.jobs import machine
 from scipy.linalg import eigh
 
 import fem
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid.calibration import MeasuredFrequencies
 from rotorid.calibration.frequencies import at_rest
 

@@ -12,7 +12,7 @@ import fem
 from balancing.coefficients.run_error_estimate import given
 from balancing.coefficients.run_errors import runs_of
 from balancing.data.trials import ReadingErrors, RunScatter
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 
 ERRORS = ReadingErrors(0.02, 0.03)
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import fem
-from fem.model.node_forces import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm
+from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
 from rotorid.workflows import BearingsOptions, bearings

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import fem
-from fem.model.node_forces import JournalBearing, MuszynskaSeal
+from fem import JournalBearing, MuszynskaSeal
 from rotorid.motion.small_model import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor

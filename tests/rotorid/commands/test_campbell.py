@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.parameter_bands import spread
+from fem.parameters import spread
 from rotorid import read_rotor
 from rotorid.commands import CampbellOptions, campbell
 

@@ -8,7 +8,7 @@ import pytest
 from tables_data import write_csv
 
 import fem
-from fem.parameter_bands import spread
+from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands import CriticalOptions, critical
 

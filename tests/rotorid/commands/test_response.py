@@ -9,7 +9,7 @@ from exact_solutions import exactly
 from tables_data import write_csv
 
 import fem
-from fem.parameter_bands import spread
+from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands import ResponseOptions, response
 from rotorid.samples import sample_data

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import root
 
 import fem
-from fem.model.node_forces import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
 from rotorid.motion.equilibrium import equilibria, equilibrium
 from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.system import system

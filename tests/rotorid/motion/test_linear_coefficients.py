@@ -8,15 +8,8 @@ import pytest
 from scipy.optimize import approx_fprime, brentq
 
 import fem
-from fem.forces.short_film import short_film
-from fem.model.node_forces import (
-    CubicSpring,
-    InternalDamping,
-    JournalBearing,
-    MuszynskaSeal,
-    SqueezeFilm,
-    Stop,
-)
+from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from fem.forces import short_film
 from rotorid.motion.equilibrium import equilibria, equilibrium
 from rotorid.motion.linear_coefficients import coefficients, linear_rotor, threshold
 from rotorid.motion.rotor_system import rotor_system

@@ -7,9 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fem.forces.laws import law, tables
-from fem.matrices.equations_of_motion import Motion
-from fem.model.node_forces import CubicSpring, InternalDamping, JournalBearing, SqueezeFilm, Stop
+from fem import CubicSpring, InternalDamping, JournalBearing, Motion, SqueezeFilm, Stop
+from fem.forces import law, tables
 from rotorid.motion.bifurcation_diagram import draw_bifurcations
 from rotorid.motion.continuation import DOUBLING, FOLD, HOPF, TORUS
 from rotorid.motion.periodic import periodic_motion

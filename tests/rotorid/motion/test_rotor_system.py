@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from fem import Disc, Model, Rotor, Support
-from fem.response import unbalance_response
-from fem.static import static_deflection
+from fem import Disc, Model, Rotor, Support, static_deflection, unbalance_response
 from rotorid.motion.rotor_system import rotor_system
 
 TABLE = Support(

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fem
-from fem.model.node_forces import CubicSpring, JournalBearing, MuszynskaSeal
+from fem import CubicSpring, JournalBearing, MuszynskaSeal
 from rotorid.motion.run import MotionRun, run
 from rotorid.motion.start import begin
 from rotorid.motion.steady_end import steady_end
@@ -106,7 +106,7 @@ def rotor():
 
 
 def test_the_steady_end_on_linear_supports_is_the_response():
-    from fem.response import unbalance_response
+    from fem import unbalance_response
     from rotorid.motion.rotor_system import rotor_system
 
     speed, unbalance = 200.0, {3: 1e-3 * np.exp(0.4j)}

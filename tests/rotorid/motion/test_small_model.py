@@ -8,8 +8,7 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 import fem
-from fem.model.node_forces import CubicSpring, JournalBearing, SqueezeFilm, Stop
-from fem.static import GRAVITY, static_deflection
+from fem import GRAVITY, CubicSpring, JournalBearing, SqueezeFilm, Stop, static_deflection
 from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.kept_supports import held_rigidly, keep_supports
 from rotorid.motion.rotor_system import rotor_system

@@ -5,7 +5,7 @@ import numpy as np
 from fem_rotors import rotor23
 
 import fem
-from fem.plots import bode_figure
+from fem.plots.response import bode_figure
 
 mpl.use("Agg")
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid import read_job, read_rotor
 from rotorid.samples import sample_data
 from rotorid.workflows import BalanceOptions, balance

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.state_space import state_space
+from fem import state_space
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.small_rotor import small_rotor
 

@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.model.node_forces import (
-    CubicSpring,
-    InternalDamping,
-    JournalBearing,
-    MuszynskaSeal,
-    SqueezeFilm,
-    Stop,
-)
+from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
 from rotorid.motion.small_model import SmallModel
 from rotorid.tables import InputError, TableWarning
 from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes

@@ -8,7 +8,7 @@ import pytest
 from tables_data import complaints, write_csv
 
 import fem
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
 

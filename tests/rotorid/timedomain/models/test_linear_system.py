@@ -9,7 +9,7 @@ from exact_solutions import frequency_response
 from timedomain_cases import motion_in
 
 import fem
-from fem.state_space import state_space as of_motion
+from fem import state_space as of_motion
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.samples import sample_data

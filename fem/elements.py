@@ -26,7 +26,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fem._new.rotor import Rotor
+from fem.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray
 
 __all__ = [

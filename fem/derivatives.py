@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from fem._new.assembly import (
+from fem.assembly import (
     FROM_XY,
     TO_XY,
     WholeBand,
@@ -28,7 +28,7 @@ from fem._new.assembly import (
     multiply,
     whirl_change,
 )
-from fem._new.rotor import Rotor
+from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
 _BANDS = ("shaft", "mass", "gyroscopic", "material")

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fem._new.rotor import KINDS, Calibration, Disc, Pedestal, Rotor, Support, is_reading
+from fem.rotor import KINDS, Calibration, Disc, Pedestal, Rotor, Support, is_reading
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.registry import names

@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem._new.response import Response, judged
-from fem._new.rotor import SensorLike
-from fem._new.undamped import Result, critical_speeds_below
+from fem.response import Response, judged
+from fem.rotor import SensorLike
+from fem.undamped import Result, critical_speeds_below
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem._new.forces import NodeForce, check_numbers, code_of
+from fem.forces import NodeForce, check_numbers, code_of
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, read_only
 from rotorid.base.checks import attachment, number, whole
 from rotorid.base.registry import Method, find

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem._new.orbits import DIRECTION_NAMES, orbits
-from fem._new.peaks import smooth_curves
-from fem._new.plots.rotor import draw_rotor
-from fem._new.rotor import SensorLike, as_sensor, label
-from fem._new.stability import Window, within
+from fem.orbits import DIRECTION_NAMES, orbits
+from fem.peaks import smooth_curves
+from fem.plots.rotor import draw_rotor
+from fem.rotor import SensorLike, as_sensor, label
+from fem.stability import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -46,9 +46,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
-    from fem._new.peaks import Peaks
-    from fem._new.response import InfluenceCoefficients, Response
-    from fem._new.rotor import Rotor
+    from fem.peaks import Peaks
+    from fem.response import InfluenceCoefficients, Response
+    from fem.rotor import Rotor
 
 MICROMETRES = Shown("µm peak", 1e6)
 _ROWS, _ORBITS = 5, 4  # sensors and orbits that one picture tells apart

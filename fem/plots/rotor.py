@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem._new.forces import kind_of
-from fem._new.rotor import Disc, Rotor, SensorLike, as_sensor, label
+from fem.forces import kind_of
+from fem.rotor import Disc, Rotor, SensorLike, as_sensor, label
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     COLORS,
@@ -29,8 +29,8 @@ from rotorid.base.rpm import RPM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from fem._new.static import StaticDeflection
-    from fem._new.undamped import Modes
+    from fem.static import StaticDeflection
+    from fem.undamped import Modes
 
 _SUPPORT = "#2f3640"
 _TIP = ((0, 0), (-0.8, -1), (0.8, -1))  # a triangle that touches the shaft from below

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem._new.orbits import DIRECTION_NAMES
+from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fem._new.campbell import Campbell
-    from fem._new.speed_map import SpeedMap
+    from fem.campbell import Campbell
+    from fem.speed_map import SpeedMap
 
 _HIGHEST = 3.0  # logarithmic decrements above it are not drawn to scale
 _PALE = 0.35

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem._new.assembly import (
+from fem.assembly import (
     FROM_XY,
     TO_XY,
     Matrices,
@@ -37,8 +37,8 @@ from fem._new.assembly import (
     rounding_error,
     static_stiffness,
 )
-from fem._new.elements import strains
-from fem._new.rotor import Pedestal, Rotor, refined
+from fem.elements import strains
+from fem.rotor import Pedestal, Rotor, refined
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import whole

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem._new.elements import (
+from fem.elements import (
     Layout,
     bending_terms,
     dense,
@@ -40,8 +40,8 @@ from fem._new.elements import (
     multiply,
     strains,
 )
-from fem._new.forces import InternalDamping, kind_of
-from fem._new.rotor import Rotor, Support
+from fem.forces import InternalDamping, kind_of
+from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 __all__ = [

@@ -1,1 +1,0 @@
-"""Laws of the forces at nodes that are not linear, with their derivatives; compiled where numba is there."""

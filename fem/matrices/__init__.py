@@ -1,1 +1,0 @@
-"""From a rotor to matrices: elements, bands, the conservative pencil, both lateral planes, plain matrices."""

@@ -1,1 +1,0 @@
-"""A rotor as plain data: shaft, discs, supports, and where vibration is read."""
