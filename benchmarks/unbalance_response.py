@@ -72,8 +72,8 @@ def run(sizes: dict[int, int] = SIZES) -> list[Row]:
         theirs = lambda rows=rows: ross_rotor(rows, BEARING)  # noqa: E731
 
         def ours(rotor: fem.Rotor, method: Any, times: int = times) -> np.ndarray:
-            banded = partial(fem.response.prepare, exact=method == "exact")
-            with patch.object(fem.response, "prepare", banded):
+            banded = partial(fem.response.Receptance, exact=method == "exact")
+            with patch.object(fem.response, "Receptance", banded):
                 return fem.influence(rotor, at(PLANES, times), at(SENSORS, times), SPEEDS).W
 
         if n == 23:

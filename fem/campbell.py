@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.assembly import both_planes
-from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.parameters import nearest_modes
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.rotor import Rotor, refined
 from fem.stability import (
     Window,
@@ -57,6 +57,7 @@ if TYPE_CHECKING:
 HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
 _ALIKE = 0.8  # MAC of a mode with itself a step further
+_OTHER = 0.5  # largest MAC with another mode, relative to it
 _HARDLY = 0.3  # MAC below which two modes are not one
 _NARROW = 1e-4  # of the highest speed: steps that are not halved
 _DENSE = 8  # times the speeds asked for: so many are computed at most
@@ -350,8 +351,7 @@ class _Paths:
             if speed not in there:
                 lam, X = np.array([last[1]]), last[2][None]
                 with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
-                    for _ in range(2):
-                        lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), lam, X, 1)[:2]
+                    lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), lam, X, 2)
                 last = there[speed] = off_synchronous(lam, speed)[0], lam[0], X[0]
             return float(there[speed][0])
 
@@ -429,7 +429,10 @@ def _chained(
     states = (1 + phase[:-1, :, None].conj() * phase[1:, None]) / 2
     mac = np.nan_to_num(np.abs(X[:-1].conj() @ X[1:].swapaxes(1, 2) * states)) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
-    best = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0]
+    best, others = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0], mac.copy()
+    np.put_along_axis(others, partner[..., None], 0.0, axis=2)
+    rivals = np.maximum(others.max(axis=2), np.take_along_axis(others.max(axis=1), partner, axis=1))
+    clear = (best >= _ALIKE) & (rivals <= _OTHER * best)
     labels = np.tile(np.arange(m), (S, 1))
     count = m
     for k, mine in enumerate(partner):
@@ -441,7 +444,7 @@ def _chained(
     paths, vectors = np.full((S, count), NONE), np.full((S, count, X.shape[2]), NONE)
     doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
     paths[rows, labels], vectors[rows, labels] = values, X
-    doubtful[rows[:-1], labels[:-1]] = (best < _ALIKE) & (best > 0) & _light(values[:-1], heavy)
+    doubtful[rows[:-1], labels[:-1]] = ~clear & (best > 0) & _light(values[:-1], heavy)
     return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), [])
 
 

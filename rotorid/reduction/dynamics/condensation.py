@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from fem.matrices.lateral_planes import Quadratic
+from fem.assembly import Reduced
 
 import fem
 from fem.assembly import assemble, free_motions, ignored_inertia, multiply, rounding_error
@@ -71,7 +71,7 @@ def damping_ratios(modal_damping: Sequence[float]) -> tuple[float, ...]:
     return ratios
 
 
-def external_damping(rotor: fem.Rotor, quadratic: Quadratic, ratios: tuple[float, ...]) -> FloatArray:
+def external_damping(rotor: fem.Rotor, quadratic: Reduced, ratios: tuple[float, ...]) -> FloatArray:
     """Damping matrix of given ratios of the first modes of each plane, in the order of `quadratic`.
 
     The modes are those of each plane without damping, cross-coupling and gyroscopic effect; supports without

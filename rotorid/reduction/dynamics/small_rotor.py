@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from fem.matrices.lateral_planes import Quadratic
+from fem.assembly import Reduced
 from numpy.typing import ArrayLike
 
 import fem
@@ -81,7 +81,7 @@ class SmallRotor(Answered):
     kept: tuple[int, ...]
     shapes: FloatArray
     shaft_stiffness: FloatArray
-    quadratic: Quadratic
+    quadratic: Reduced
     external: FloatArray
     warnings: tuple[str, ...] = ()
 

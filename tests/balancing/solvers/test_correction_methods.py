@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fem.model import supports
+from fem import rotor as supports
 from repetitions import FULL
 
 from balancing import (
