@@ -103,7 +103,7 @@ SLOW_FIRST = (
     "rotorid/worksheet/test_worksheet_page.py",
     "rotorid/worksheet/test_worksheet_server.py",
     "rotorid/report/test_rotor.py",
-    "fem/matrices/test_lateral_planes.py",
+    "fem/test_response_supports.py",
     "fuzz/test_mutants.py",
     "fem/test_campbell.py",
 )

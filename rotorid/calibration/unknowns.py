@@ -25,7 +25,7 @@ class Unknown:
     Attributes
     ----------
     path
-        As in `fem.model.rotor_parameters`: "bearing[1].kxx", "disc[2].scale", "probe[p1].angle".
+        As in `fem.parameters`: "bearing[1].kxx", "disc[2].scale", "probe[p1].angle".
     name
         To print; default: the path.
     start

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from fem.model.rotor_parameters import with_parameters
+from fem.parameters import with_parameters
 
 import fem
 from rotorid import read_rotor

@@ -15,7 +15,7 @@ import fem
 @given(st.integers(3, 24), st.booleans())
 @settings(max_examples=25, deadline=None)
 def test_the_estimate_is_the_true_error(n, shear):
-    """Simply supported shaft: closed forms of tests/fem/matrices/test_elements.py."""
+    """Simply supported shaft: closed forms of tests/fem/test_elements.py."""
     exact = [1261.04906276, 4877.35161039] if shear else [1276.187754, 5104.751016]
     rotor = uniform(
         n,

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from fem.assembly import Reduced
 
 import fem
-from fem.assembly import assemble, free_motions, ignored_inertia, multiply, rounding_error
+from fem.assembly import Reduced, assemble, free_motions, ignored_inertia, multiply, rounding_error
 from rotorid.base.arrays import FloatArray
 
 _LOST = 1e-3  # relative rounding error of a static shape

@@ -2,7 +2,7 @@
 
 The deflections of the masses and of all supported nodes are kept; between them the shaft hangs statically.
 With T the static shapes of the shaft, one column for a unit deflection of each kept node (all others held),
-the equations of `fem.matrices.lateral_planes` in the basis T read, per plane with M = diag(m) (zero at a
+the equations of `fem.assembly` in the basis T read, per plane with M = diag(m) (zero at a
 support without a mass), B = Tᵀ B T, G = Tᵀ G T, K = Tᵀ K T and rotation from x to y,
 
     x:  M x'' + (B + C) x' + Ω G y' + K x + Ω B y + supports = f_x
@@ -19,12 +19,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from fem.assembly import Reduced
 from numpy.typing import ArrayLike
 
 import fem
-from fem import StateSpace, state_space
-from fem.assembly import both_planes, project
+from fem import StateSpace
+from fem.assembly import Reduced, both_planes, project
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
@@ -162,7 +161,7 @@ class SmallRotor(Answered):
         """
         motion = self.motion(speed, plane)
         masses = [f"{axis}{node}" for axis in ("xy" if plane == "both" else "x") for node in self.nodes]
-        return state_space(
+        return fem.state_space(
             motion,
             inputs=[f"f_{name}" for name in masses] if inputs is None else inputs,
             outputs=masses if outputs is None else outputs,
@@ -179,7 +178,7 @@ class SmallRotor(Answered):
         ValueError
             For an impossible speed or one outside the table of a support.
         """
-        return state_space(self.motion(speed), inputs=(), outputs=()).eigenvalues
+        return fem.state_space(self.motion(speed), inputs=(), outputs=()).eigenvalues
 
     def response(self, speeds: ArrayLike) -> ComplexArray:
         """Response of the masses to unbalance at the masses, as `fem.influence` defines it.
