@@ -6,6 +6,7 @@ import dataclasses
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from fem import KINDS, STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
 from fem.forces import FORCES
@@ -18,7 +19,7 @@ from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, re
 from rotorid.tables.rotor.calibration_keys import CALIBRATION, read_calibration
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, read_force
 from rotorid.tables.rotor.rotor_plausibility import warn_of_value
-from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
+from rotorid.tables.rotor.rotor_table import Material, Shaft, build, read_shaft
 
 
 def _material(section: Section) -> Material:
@@ -147,12 +148,18 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
         discs=(*shaft.discs, *filter(None, discs)),
         supports=(*shaft.supports, *filter(None, supports)),
         forces=tuple(filter(None, forces)),
-        model=Model(**said["model"]),
+        model=Model(**_model(data, shaft, said["model"])),
     )
     rotor = build(str(path), whole, names, problems)
     if said["calibration"] is None:
         return rotor
     return dataclasses.replace(rotor, calibration=read_calibration(said["calibration"], rotor, problems))
+
+
+def _model(data: dict[str, Any], shaft: Shaft, model: dict[str, bool]) -> dict[str, bool]:
+    """What the elements take into account: shear, too, where Poisson's ratio is given and `shear` is not."""
+    ratio = shaft.model.shear or "poisson_ratio" in data.get("material", {})
+    return model if "shear" in data.get("model", {}) else model | {"shear": ratio}
 
 
 def rotor_files(path: str | Path) -> tuple[Path, ...]:

@@ -127,7 +127,9 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     warn_of_table(table, elements)
     own = {stem: values[elements] for stem, values in own.items()}
     discs, supports = _attached(table)
-    return Shaft(length[elements], diameter[elements], inner[elements], discs=discs, supports=supports, **own)
+    model = Model(shear="poisson_ratio" in table)  # nothing else depends on it
+    sizes = length[elements], diameter[elements], inner[elements]
+    return Shaft(*sizes, discs=discs, supports=supports, model=model, **own)
 
 
 def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problems) -> Rotor:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fem import KINDS, Coefficient, Disc, Model, Rotor, Support
+from fem import KINDS, STEEL_POISSON, Coefficient, Disc, Model, Rotor, Support
 from rotorid.base.registry import names
 from rotorid.base.tables import Value, csv_bytes
 from rotorid.base.text import listing
@@ -34,7 +34,7 @@ def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
     path
         `.toml` for any rotor: the tables `NAME_shaft.csv` and `NAME_bearing_1.csv`, `NAME_seal_2.csv`, …
         (of supports whose coefficients depend on speed) go beside it. `.csv` for one whose shaft table
-        can say everything: the default model, isotropic constant supports, no names.
+        can say everything: the default model or shear besides, isotropic constant supports, no names.
     rotor
         What to write. A disc is written by its mass and moments of inertia, however it was made.
 
@@ -63,7 +63,8 @@ def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
                 f"{path}: a rotor table cannot hold {listing(beyond, 'and')}; "
                 f"write a rotor file, {path.with_suffix('.toml').name}"
             )
-        files = {path: _shaft_table(rotor, _OF_ELEMENTS, attached=True)}
+        columns = [name for name in _OF_ELEMENTS if name != "poisson_ratio" or rotor.model.shear]
+        files = {path: _shaft_table(rotor, columns, attached=True)}
     else:
         files = rotor_file_bytes(path, rotor)
     write_files(files)
@@ -75,7 +76,9 @@ def _beyond_a_table(rotor: Rotor) -> list[str]:
     discs, supports = rotor.discs, rotor.supports
     reasons = {
         "the names of stations": bool(rotor.stations),
-        "the effects of its model": rotor.model != Model(),
+        "the effects of its model": rotor.model not in (Model(), Model(shear=True)),
+        "a Poisson's ratio without shear": not rotor.model.shear
+        and (rotor.poisson_ratio != STEEL_POISSON).any(),
         "names of discs or supports": any([d.name for d in discs] + [s.name for s in supports]),
         "several discs or supports at a node, or in another order than the nodes'": not all(
             np.all(np.diff([item.node for item in items]) > 0) for items in (discs, supports)
@@ -107,6 +110,8 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     if material:
         document["material"] = material
     model = {key.name: True for key in MODEL if getattr(rotor.model, key.name)}
+    if not rotor.model.shear and (rotor.poisson_ratio != STEEL_POISSON).any():
+        model["shear"] = False  # without a word it would be counted
     if model:
         document["model"] = model
     files = {shaft: _shaft_table(rotor, [name for name in _OF_ELEMENTS if name not in uniform])}

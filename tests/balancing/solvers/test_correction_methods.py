@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fem import rotor as supports
 from repetitions import FULL
 
 from balancing import (
@@ -23,6 +22,7 @@ from balancing import (
 from balancing.correction import correction_words
 from balancing.solvers import correction_methods
 from balancing.solvers.effective_variance import effective_variance
+from fem import rotor as supports
 from rotorid.base.registry import Method
 from rotorid.reduction import guyan_irs_serep as reduction
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from cases import each_of
@@ -341,6 +342,30 @@ def test_a_plain_rotor_comes_back_from_its_table(tmp_path):
         [Support(2, 0.0, 40.0), Support(3, 2e7, 3.0)],
         poisson_ratio=0.25,
         material_damping=1e-5,
+        model=Model(shear=True),
     )
     assert write_rotor(tmp_path / "plain.csv", plain) == (tmp_path / "plain.csv",)
     assert read_rotor(tmp_path / "plain.csv") == plain
+    bare = replace(plain, model=Model())
+    with pytest.raises(ValueError, match="Poisson's ratio without shear"):
+        write_rotor(tmp_path / "bare.csv", bare)
+    write_rotor(tmp_path / "bare.toml", bare)
+    assert read_rotor(tmp_path / "bare.toml") == bare
+
+
+@pytest.mark.parametrize(
+    ("material", "model", "shear"),
+    [
+        ("", "", False),
+        ("poisson_ratio = 0.29", "", True),
+        ("poisson_ratio = 0.29", "shear = false", False),
+        ("", "shear = true", True),
+    ],
+)
+def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(
+    tmp_path, material, model, shear
+):
+    (tmp_path / "s.csv").write_text("length_m,diameter_m\n0.5,0.05\n0.5,0.05\n")
+    text = f'shaft = "s.csv"\n[material]\n{material}\n[model]\n{model}\n'
+    (tmp_path / "r.toml").write_text(text)
+    assert read_rotor(tmp_path / "r.toml").model.shear is shear
