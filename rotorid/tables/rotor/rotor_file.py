@@ -30,10 +30,11 @@ def _material(section: Section) -> Material:
 
 
 _SIZE = number(0.0)
+RATIO = "Poisson's ratio; where it is given, shear is counted unless `[model] shear = false`"
 MATERIAL = (
     Key("youngs_modulus_Pa", ABOVE_ZERO, "Young's modulus", default=STEEL_MODULUS),
     Key("density_kg_per_m3", _SIZE, "density", default=STEEL_DENSITY),
-    Key("poisson_ratio", number(-1.0 + 1e-9, 0.5), "Poisson's ratio", default=STEEL_POISSON),
+    Key("poisson_ratio", number(-1.0 + 1e-9, 0.5), RATIO, default=STEEL_POISSON),
     Key("material_damping_s", _SIZE, "loss per stress rate: the stress is E (ε + τ dε/dt)", default=0.0),
 )
 """In the order of `Material`."""

@@ -279,7 +279,7 @@ def test_a_rotor_with_everything_comes_back_from_its_file(tmp_path):
 
 BEYOND = [
     ({"stations": {"a": 1}}, "the names of stations"),
-    ({"model": Model(shear=True)}, "the effects of its model"),
+    ({"model": Model(gyroscopic=True)}, "the effects of its model"),
     ({"discs": [Disc(1, 2, name="wheel")]}, "names of discs or supports"),
     ({"supports": [Support(1, 2), Support(1, 2)]}, "several discs or supports at a node"),
     ({"discs": [Disc(2, 2), Disc(1, 2)]}, "in another order than the nodes'"),
