@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from full_whirl import exact_modes
 
-import fem
 from fem import WhirlModes, response
 from fem.assembly import both_planes
 from fem.whirl import in_both_planes, missing_modes

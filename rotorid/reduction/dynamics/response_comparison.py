@@ -15,7 +15,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.tables import Column, Table, frame
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import counted, sentence
 from rotorid.reduction.dynamics.instability_threshold import stability_threshold
@@ -123,17 +123,16 @@ class ResponseCost(Answered):
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane."""
         S, C, P = self.full.shape
-        return frame(
-            (
-                Column("speed_rad_s", np.repeat(self.speeds, C * P)),
-                Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.nodes] * S),
-                Column("plane", list(self.nodes) * (S * C)),
-                *polar("full_m_per_kg_m", "full_phase_deg", self.full),
-                *polar("small_m_per_kg_m", "small_phase_deg", self.small),
-                Column("relative_difference", self.relative_difference.ravel()),
-                Column("excluded", np.repeat(self.excluded, C * P)),
-            )
+        columns = (
+            Column("speed_rad_s", np.repeat(self.speeds, C * P)),
+            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.nodes] * S),
+            Column("plane", list(self.nodes) * (S * C)),
+            *polar("full_m_per_kg_m", "full_phase_deg", self.full),
+            *polar("small_m_per_kg_m", "small_phase_deg", self.small),
+            Column("relative_difference", self.relative_difference.ravel()),
+            Column("excluded", np.repeat(self.excluded, C * P)),
         )
+        return frame(Table("responses", columns))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: what is said of all speeds, and `worst` of each as relative difference."""
