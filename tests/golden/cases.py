@@ -545,7 +545,7 @@ STORED = (
     "demo-list",
     "fit-design",
     "fit-equations",
-    "fit-prior-auto",
+    "fit-prior",
     "fit-run-down-plot",
     "fit-shooting",
     "fleet-add",
