@@ -69,12 +69,12 @@ def draw_campbell(
     """
     ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     frequencies = campbell.frequencies * RPM
-    top = 1.06 * float(np.nanmax(frequencies, initial=1e-9))
+    top = 1.15 * float(np.nanmax(frequencies, initial=1e-9))
     end = min(campbell.speeds.max() * RPM, top)
     _draw_curves(ax, campbell, frequencies)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
-    ax.set(ylim=(-0.05 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
-    note(ax, "1×", (end, end), (-4, 4), ha="right", fontsize=11)
+    ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
+    note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top", fontsize=11)
     if campbell.criticals:
         _mark_criticals(ax, [(speed * RPM, decrement) for speed, decrement in campbell.criticals], top)
     for way in np.unique(campbell.direction[np.isfinite(frequencies)]):

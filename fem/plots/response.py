@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,7 +58,8 @@ def draw_response(
     By default at the named stations, or at the supports, and where the rotor moves most.
     """
     if nodes is None:
-        named = [*response.rotor.stations] or [support.node for support in response.rotor.supports]
+        rotor = response.rotor
+        named: Iterable[str | int] = rotor.stations or [support.node for support in rotor.supports]
         largest = (response.major * response.steady[:, None]).max(axis=0)
         nodes = list(dict.fromkeys([*named, int(response.nodes[np.argmax(largest)])]))
     labels = [f"node {node}" for node in nodes]
@@ -86,7 +87,7 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
     for c, name in enumerate(names):
         sizes, phases = (figure.add_subplot(grid[1 + c, k]) for k in (0, 1))
         W, words = influence.W[:, c], f"sensor {name}\nµm per g·mm"
-        _amplitudes(sizes, speeds, W, labels, words, windows).get_legend().remove()
+        _amplitudes(sizes, speeds, W, labels, words, windows).legend_ = None
         _phases(phases, speeds, W, labels, windows)
     legend_below(figure, (sizes,), 3)
     return figure
@@ -195,7 +196,6 @@ def draw_polar(
         leads = range(0, 360, 45)
         ax.set_xticks(np.radians(leads), [f"{-angle % 360}°" for angle in leads])
     legend_above(ax, height=-0.08)
-    ax.set_rlabel_position(22.5)
     return ax
 
 

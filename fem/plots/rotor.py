@@ -98,9 +98,9 @@ def draw_rotor(
     ax.spines[["top", "right"]].set_visible(False)
     if height is None:
         top = scale * outside.max()
-        ax.set(xlabel="position, m", ylabel="radius, mm", ylim=(-1.9 * top, 1.55 * top))
+        ax.set(xlabel="position, m", ylabel="radius, mm", ylim=(-2.2 * top, 2.0 * top))
     low, high = ax.get_ylim()
-    inside = 0.13 * (high - low)
+    inside = 0.2 * (high - low)
     if planes:
         end = high - inside
         _mark(ax, positions[at_planes], np.full(len(planes), -end), end, planes, label="correction plane",
@@ -166,7 +166,8 @@ def draw_deflection(deflection: StaticDeflection, ax: Axes | None = None) -> Axe
     ax = new_axes((WIDTH, 3.2)) if ax is None else ax
     positions = deflection.rotor.positions
     for k, (name, values) in enumerate((("x", deflection.x), ("y", deflection.y))):
-        ax.plot(positions, 1e6 * values, label=name, **look(k, positions.size))
+        if values.any():
+            ax.plot(positions, 1e6 * values, label=name, **look(k, positions.size))
     ax.set(xlabel="position, m", ylabel="static deflection, µm")
     plain(ax)
     legend_above(ax)
@@ -219,7 +220,7 @@ def _mark(
     """Lines to names above or below the rotor, of many in two rows."""
     ax.vlines(x, start, end, linewidth=1.2, zorder=5, **style)
     for row, k in enumerate(np.argsort(x)):
-        shift = np.copysign(3 + 11 * (row % 2 if len(x) > 4 else 0), end)
+        shift = np.copysign(2 + 10 * (row % 2 if len(x) > 4 else 0), end)
         va = "bottom" if end > 0 else "top"
         note(ax, str(names[k]), (x[k], end), (0, shift), ha="center", va=va, color=style["color"])
 
@@ -234,7 +235,8 @@ def _looks(item: Support | NodeForce) -> str:
 def _draw_supports(rotor: Rotor, ax: Axes, scale: float) -> None:
     """Bearings, seals and forces that are not linear; those that look alike have one name."""
     groups: dict[str, list[int]] = {}
-    for item in (*rotor.supports, *rotor.forces):
+    items: list[Support | NodeForce] = [*rotor.supports, *rotor.forces]
+    for item in items:
         groups.setdefault(_looks(item), []).append(item.node - 1)
     for number, (words, at) in enumerate(groups.items()):
         seal, holds = "seal" in words, "bearing" in words or "film" in words

@@ -280,13 +280,13 @@ def test_a_drawing_holds_everything_and_its_marks_touch_the_rotor():
     ((plane,),) = ([segment.tolist() for segment in lines[name]] for name in ("correction plane",))
     assert [x for x, _ in plane] == pytest.approx([0.2, 0.2])
     assert sorted(y for _, y in plane) == pytest.approx(
-        [-(high - 0.13 * (high - low)), high - 0.13 * (high - low)]
+        [-(high - 0.2 * (high - low)), high - 0.2 * (high - low)]
     )
     assert plane[1][1] > radius
     # a sensor looks at the disc at node 1, and at the shaft at node 4, from below
     for segment, (x, y) in zip(lines["sensor"], ((0.0, -radius), (0.8, -40.0)), strict=True):
         assert segment[:, 0] == pytest.approx([x, x])
-        assert sorted(segment[:, 1]) == pytest.approx([low + 0.13 * (high - low), y])
+        assert sorted(segment[:, 1]) == pytest.approx([low + 0.2 * (high - low), y])
     tips = next(c for c in ax.collections if len(c.get_offsets()) == 2 and not c.get_label().startswith("d"))
     np.testing.assert_allclose(tips.get_offsets(), [[0.0, -radius], [0.8, -40.0]])
 
