@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import cycle, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
+from fem.parameters import NORMAL_95
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -28,6 +29,7 @@ from rotorid.base.plot_style import (
     plain_numbers,
     rad_s_above,
     scale_beside,
+    shade_bands,
     shade_operating,
     shade_unstable,
 )
@@ -65,7 +67,8 @@ def draw_campbell(
 
     Forward whirl is a solid line with filled triangles that point up, backward whirl a dashed one with open
     triangles that point down, neither (a straight line) a dotted one: told apart in black and white too.
-    Where a mode is heavily damped its line is pale. The range of operating speeds, rad/s, is shaded.
+    Where a mode is heavily damped its line is pale. The range of operating speeds, rad/s, is shaded, and 95 %
+    of the frequencies of a calibrated rotor.
     """
     ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     frequencies = campbell.frequencies * RPM
@@ -74,6 +77,9 @@ def draw_campbell(
     _draw_curves(ax, campbell, frequencies)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
+    if campbell.std is not None:
+        half = NORMAL_95 * RPM * campbell.std
+        shade_bands(ax, campbell.speeds * RPM, frequencies, half, cycle(COLORS))
     note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top", fontsize=11)
     if campbell.criticals:
         _mark_criticals(ax, [(speed * RPM, decrement) for speed, decrement in campbell.criticals], top)
