@@ -3,8 +3,6 @@
 from fem.plots.campbell import campbell_figure, draw_campbell, draw_log_decrements, draw_speed_map
 from fem.plots.response import (
     bode_figure,
-    draw_bode,
-    draw_deflected_shape,
     draw_influence,
     draw_orbits,
     draw_polar,
@@ -14,12 +12,11 @@ from fem.plots.response import (
     polar_figure,
     right_angles,
 )
-from fem.plots.rotor import draw_deflection, draw_modes, draw_rotor, smooth_shapes
+from fem.plots.rotor import draw_deflected_shape, draw_deflection, draw_modes, draw_rotor, smooth_shapes
 
 __all__ = [
     "bode_figure",
     "campbell_figure",
-    "draw_bode",
     "draw_campbell",
     "draw_deflected_shape",
     "draw_deflection",

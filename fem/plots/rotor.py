@@ -1,22 +1,19 @@
-"""Pictures along the rotor: its sections, discs and supports; mode shapes; the static line."""
+"""Pictures along the rotor: sections, discs and supports; mode shapes, deflected shapes, the static line."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.forces import kind_of
-from fem.rotor import Disc, Rotor, SensorLike, as_sensor, label
-from rotorid.base.arrays import FloatArray
+from fem.forces import NodeForce, kind_of
+from fem.rotor import Rotor, SensorLike, Support, as_sensor, label
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.plot_style import (
     COLORS,
     DARK,
-    MARKERS,
     QUIET,
-    STYLES,
     WIDTH,
     legend_above,
     look,
@@ -29,11 +26,12 @@ from rotorid.base.rpm import RPM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from fem.response import Response
     from fem.static import StaticDeflection
     from fem.undamped import Modes
 
-_SUPPORT = "#2f3640"
 _TIP = ((0, 0), (-0.8, -1), (0.8, -1))  # a triangle that touches the shaft from below
+_PARTS = 12  # points of a smooth shape in each element
 
 
 def draw_rotor(
@@ -48,7 +46,7 @@ def draw_rotor(
 
     Lengths are in m, radii in mm. A disc with moments of inertia is drawn as the solid steel-like disc
     that has the same mass and moments; a mass without them is a point of an area in proportion to it. A
-    bearing is a triangle that holds the shaft at its tip, coloured if it has damping, with a thick edge if it
+    bearing is a triangle that holds the shaft at its tip, dark if nothing damps it, with a thick edge if it
     stands on a pedestal; a seal is a square above and below the shaft. Forces that are not linear have marks
     below it: films a triangle, others a diamond.
 
@@ -74,61 +72,44 @@ def draw_rotor(
     ValueError
         If a plane or sensor is no node of the rotor.
     """
-    plane_nodes = [rotor.node(plane) for plane in planes]
-    sensor_nodes = [rotor.node(as_sensor(sensor, rotor).node) for sensor in sensors]
+    at_planes = np.array([rotor.node(plane) for plane in planes], int) - 1
+    at_sensors = np.array([rotor.node(as_sensor(sensor, rotor).node) for sensor in sensors], int) - 1
     ax = new_axes((WIDTH, 2.8)) if ax is None else ax
-    solid = [disc for disc in rotor.discs if disc.mass > 0 and disc.polar_inertia > 0]
-    points = [disc for disc in rotor.discs if disc.mass > 0 and not disc.polar_inertia]
-    largest = float(max([rotor.outer_diameter.max() / 2, *(_radius(disc) for disc in solid)]))
-    scale = 1e3 if height is None else height / largest
-    span = float(rotor.positions[-1])
-    edges = [0.0, span]
-    if solid:
-        x, widths = _positions(rotor, solid), np.maximum([_width(disc) for disc in solid], 0.004 * span)
-        edges += [*(x - widths / 2), *(x + widths / 2)]
-        radius = scale * np.array([_radius(disc) for disc in solid])
-        words = f"disc{_s(solid)}, {_masses_text(solid)}"
-        ax.bar(x, 2 * radius, widths, -radius, color="#aab3bf", edgecolor=DARK, linewidth=0.9, zorder=0.8,
-               label=words)  # fmt: skip
-    for diameter, color, layer, style in (
-        (rotor.outer_diameter, "#d9dde3", 1.0, "-"),
-        (rotor.inner_diameter, "white", 1.5, (0, (4, 2))),
+    positions, outside = rotor.positions, surface(rotor)
+    scale = 1e3 if height is None else height / outside.max()
+    at, mass, radius, width = _discs(rotor)
+    points, width = radius == 0, np.maximum(width, 0.004 * positions[-1])
+    words = f"disc, {_kg(mass[~points])}"
+    for left, length, diameter, color, layer, name in (
+        (positions[:-1], rotor.length, rotor.outer_diameter, "#d9dde3", 1.0, ""),
+        (positions[:-1], rotor.length, rotor.inner_diameter, "white", 1.5, ""),
+        (positions[at] - width / 2, width, 2 * radius, "#aab3bf", 0.8, words),
     ):
-        there = diameter > 0
-        left, length, d = rotor.positions[:-1][there], rotor.length[there], scale * diameter[there]
-        ax.bar(left, d, length, -d / 2, align="edge", color=color, edgecolor=QUIET, linewidth=0.7,
-               zorder=layer, linestyle=style)  # fmt: skip
-    if points:
-        masses = np.array([disc.mass for disc in points])
-        words = f"mass{'es' if len(points) > 1 else ''}, {_masses_text(points)}"
-        ax.scatter(_positions(rotor, points), np.zeros(masses.size), s=130 * masses / masses.max(),
-                   label=words, color=DARK, edgecolor="white", linewidth=0.8, zorder=4)  # fmt: skip
+        if (there := diameter > 0).any():
+            d = scale * diameter[there]
+            ax.bar(left[there], d, length[there], -d / 2, align="edge", color=color, edgecolor=QUIET,
+                   linewidth=0.7, zorder=layer, label=name)  # fmt: skip
+    if points.any():
+        size = 130 * mass[points] / mass[points].max()
+        ax.scatter(positions[at[points]], 0 * size, s=size, label=f"mass, {_kg(mass[points])}", color=DARK,
+                   edgecolor="white", linewidth=0.8, zorder=4)  # fmt: skip
     _draw_supports(rotor, ax, scale)
-    ax.set_xlim(min(edges) - 0.02 * span, max(edges) + 0.02 * span)
+    ax.margins(x=0.02)
     ax.spines[["top", "right"]].set_visible(False)
     if height is None:
-        top = 1e3 * largest
-        ax.set(xlabel="position, m", ylabel="radius, mm", ylim=(-1.9 * top, (1.55 if planes else 1.35) * top))
+        top = scale * outside.max()
+        ax.set(xlabel="position, m", ylabel="radius, mm", ylim=(-2.2 * top, 2.0 * top))
     low, high = ax.get_ylim()
-    inside = 0.13 * (high - low)
-    for kind, color, names, nodes in (
-        ("correction plane", COLORS[1], planes, plane_nodes),
-        ("sensor", COLORS[0], [label(sensor) for sensor in sensors], sensor_nodes),
-    ):
-        if not nodes:
-            continue
-        at, plane = np.array(nodes) - 1, kind != "sensor"
-        x, end = rotor.positions[at], high - inside if plane else low + inside
-        other = np.full(len(at), -end) if plane else -1e3 * surface(rotor)[at]
-        style = (0, (5, 2, 1, 2)) if plane else "-"
-        ax.vlines(x, np.minimum(other, end), np.maximum(other, end), color=color, linestyle=style,
-                  linewidth=1.2, zorder=5, label=f"{kind}{_s(nodes)}")  # fmt: skip
-        for place, name, row in sorted(zip(x.tolist(), names, range(len(at)), strict=True)):
-            shift = 3 + 11 * (row % 2 if len(at) > 4 else 0)
-            below: dict[str, Any] = {"ha": "center", "va": "bottom" if plane else "top", "color": color}
-            note(ax, str(name), (place, end), (0, shift if plane else -shift), **below)
-        if not plane:
-            ax.scatter(x, other, marker="^", s=46, color=color, edgecolor="white", linewidth=0.6, zorder=5.5)
+    inside = 0.2 * (high - low)
+    if planes:
+        end = high - inside
+        _mark(ax, positions[at_planes], np.full(len(planes), -end), end, planes, label="correction plane",
+              color=COLORS[1], linestyle=(0, (5, 2, 1, 2)))  # fmt: skip
+    if sensors:
+        x, below = positions[at_sensors], -scale * outside[at_sensors]
+        names = [label(sensor) for sensor in sensors]
+        _mark(ax, x, below, low + inside, names, label="sensor", color=COLORS[0])
+        ax.scatter(x, below, marker="^", s=46, color=COLORS[0], edgecolor="white", linewidth=0.6, zorder=5.5)
     if height is None and ax.get_legend_handles_labels()[0]:
         legend_above(ax, marker_scale=0.7)
     return ax
@@ -136,45 +117,57 @@ def draw_rotor(
 
 def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
     """Draw mode shapes, each to its largest value 1, over the rotor with its supports and masses."""
-    ax = new_axes() if ax is None else ax
-    draw_rotor(modes.rotor, ax, height=0.22)
+    ax = _over_rotor(modes.rotor, ax, 1.0, "deflection, largest = 1")
     x, curves = smooth_shapes(modes)
-    for k, (omega, curve) in enumerate(zip(modes.frequencies, curves.T, strict=True)):
+    ways = zip(modes.frequencies, modes.direction, curves.T, strict=True)
+    for k, (omega, way, curve) in enumerate(ways):
         words = f"{k + 1}: {omega * RPM:.5g} rpm = {omega:.5g} rad/s" if omega else f"{k + 1}: rigid body"
-        if omega and modes.direction[k] != "forward":
-            words += f", {modes.direction[k]}"
-        style: dict[str, Any] = {"linewidth": 2.2, "zorder": 5, **look(k)}
-        if k >= len(STYLES):
-            style |= {"marker": MARKERS[k % len(MARKERS)], "markevery": (k, 24), "markeredgecolor": "white"}
-        ax.plot(x, curve / np.abs(curve).max(), label=words, **style)
-    ax.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
-    ax.set(xlabel="position, m", ylabel="deflection, largest = 1", ylim=(-1.12, 1.12))
+        if omega and way != "forward":
+            words += f", {way}"
+        shape = curve / np.abs(curve).max()
+        ax.plot(x, shape, label=words, linewidth=2.2, zorder=5, **look(k, x.size))
     legend_above(ax, 2, marker_scale=0.6)
     return ax
 
 
-def smooth_shapes(modes: Modes, points: int = 12) -> tuple[FloatArray, FloatArray]:
+def smooth_shapes(modes: Modes) -> tuple[FloatArray, FloatArray]:
     """Shapes between the nodes, as the elements' own cubics have them.
 
     Returns
     -------
-    Positions, m, `points` in each element and the last node, shape (n,); the shapes there, shape (n, modes).
+    Positions, m, twelve in each element and the last node, shape (n,); the shapes there, shape (n, modes).
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    parts = np.linspace(0.0, 1.0, points, endpoint=False)
-    within = modes.positions[:-1, None] + modes.rotor.length[:, None] * parts
-    x = np.append(within, modes.positions[-1])
+    nodes = np.arange(modes.positions.size)
+    x = np.interp(np.arange(_PARTS * nodes[-1] + 1) / _PARTS, nodes, modes.positions)
     return x, np.asarray(CubicHermiteSpline(modes.positions, modes.shapes, modes.slopes)(x))
+
+
+def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> Axes:
+    """Draw the deflected shape of the rotor at speed k, from 0, of a response.
+
+    The larger half axis of each node's orbit, µm peak, with the sign of its motion in the phase of the node
+    that moves most, over the rotor.
+    """
+    size, phase = 1e6 * response.major[k], np.angle(response.amplitudes[k])
+    shape = np.where(np.cos(phase - phase[np.argmax(size)]) < 0, -size, size)
+    words = f"deflection at {response.speeds[k] * RPM:.0f} rpm, µm peak"
+    ax = _over_rotor(response.rotor, ax, float(size.max()), words)
+    ax.plot(
+        response.rotor.positions[response.nodes - 1], shape, "o-", color=COLORS[0], markersize=4, zorder=5
+    )
+    legend_above(ax, 2, marker_scale=0.6)
+    return ax
 
 
 def draw_deflection(deflection: StaticDeflection, ax: Axes | None = None) -> Axes:
     """Draw the static deflection in x and y along the rotor; return the axes."""
     ax = new_axes((WIDTH, 3.2)) if ax is None else ax
-    positions, largest = deflection.rotor.positions, deflection.deflection.max()
+    positions = deflection.rotor.positions
     for k, (name, values) in enumerate((("x", deflection.x), ("y", deflection.y))):
-        if np.abs(values).max() > 1e-9 * largest:
-            ax.plot(positions, 1e6 * values, marker=MARKERS[k], markersize=4, label=name, **look(k))
+        if values.any():
+            ax.plot(positions, 1e6 * values, label=name, **look(k, positions.size))
     ax.set(xlabel="position, m", ylabel="static deflection, µm")
     plain(ax)
     legend_above(ax)
@@ -189,59 +182,69 @@ def radii(rotor: Rotor) -> FloatArray:
 
 def surface(rotor: Rotor) -> FloatArray:
     """Outermost radius at each node, discs included, m, shape (N,)."""
-    outer = radii(rotor)
-    for disc in rotor.discs:
-        if disc.mass > 0:
-            outer[disc.node - 1] = max(outer[disc.node - 1], _radius(disc))
+    outer, (at, _, radius, _) = radii(rotor), _discs(rotor)
+    np.maximum.at(outer, at, radius)
     return outer
 
 
-def _radius(disc: Disc) -> float:
-    """Radius of the solid disc of the same mass and moments of inertia, m."""
-    return math.sqrt(2 * disc.polar_inertia / disc.mass)
+def _discs(rotor: Rotor) -> tuple[IndexArray, FloatArray, FloatArray, FloatArray]:
+    """Node, from 0, mass, kg, radius and width, m, of solid discs of the same moments; points have 0."""
+    rows = [(d.node - 1, d.mass, d.polar_inertia, d.diametral_inertia) for d in rotor.discs if d.mass > 0]
+    node, mass, polar, diametral = np.array(rows).reshape(-1, 4).T
+    width = np.sqrt(np.maximum(12 * (diametral - polar / 2) / mass, 0.0))
+    return node.astype(np.intp), mass, np.sqrt(2 * polar / mass), width
 
 
-def _width(disc: Disc) -> float:
-    """Width of the same solid disc, m."""
-    return math.sqrt(max(12 * (disc.diametral_inertia - disc.polar_inertia / 2) / disc.mass, 0.0))
+def _kg(masses: FloatArray) -> str:
+    texts = [f"{mass:.3g}" for mass in np.sort(masses)]
+    return f"{' to '.join(dict.fromkeys(texts[:1] + texts[-1:]))} kg"
 
 
-def _positions(rotor: Rotor, discs: Iterable[Disc]) -> FloatArray:
-    return np.asarray(rotor.positions[[disc.node - 1 for disc in discs]])
+def _over_rotor(rotor: Rotor, ax: Axes | None, largest: float, ylabel: str) -> Axes:
+    """Axes for curves up to this size over the rotor as scenery."""
+    ax = new_axes() if ax is None else ax
+    draw_rotor(rotor, ax, height=0.22 * largest)
+    ax.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
+    ax.set(xlabel="position, m", ylabel=ylabel, ylim=(-1.12 * largest, 1.12 * largest))
+    return ax
 
 
-def _masses_text(discs: Iterable[Disc]) -> str:
-    masses = sorted(disc.mass for disc in discs)
-    low, high = f"{masses[0]:.3g} kg", f"{masses[-1]:.3g} kg"
-    return low if low == high else f"{masses[0]:.3g} to {high}"
+def _mark(
+    ax: Axes,
+    x: FloatArray,
+    start: FloatArray,
+    end: float,
+    names: Sequence[str | int],
+    **style: Any,  # noqa: ANN401  of matplotlib
+) -> None:
+    """Lines to names above or below the rotor, of many in two rows."""
+    ax.vlines(x, start, end, linewidth=1.2, zorder=5, **style)
+    for row, k in enumerate(np.argsort(x)):
+        shift = np.copysign(2 + 10 * (row % 2 if len(x) > 4 else 0), end)
+        va = "bottom" if end > 0 else "top"
+        note(ax, str(names[k]), (x[k], end), (0, shift), ha="center", va=va, color=style["color"])
 
 
-def _s(items: Sequence[object]) -> str:
-    return "s" if len(items) > 1 else ""
+def _looks(item: Support | NodeForce) -> str:
+    """What a support or a force is drawn as, in words."""
+    if isinstance(item, NodeForce):
+        return kind_of(item).replace("_", " ")
+    return f"{'damped ' if item.damped else ''}{item.kind}{' on pedestal' if item.pedestal else ''}"
 
 
 def _draw_supports(rotor: Rotor, ax: Axes, scale: float) -> None:
     """Bearings, seals and forces that are not linear; those that look alike have one name."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for support in rotor.supports:
-        damped = "damped " if support.kind == "bearing" and np.any(np.asarray(support.damping) != 0) else ""
-        noun = damped + ("support" if support.kind == "bearing" else support.kind)
-        groups.setdefault((noun, "" if support.pedestal is None else " on pedestal"), []).append(support.node)
-    for force in rotor.forces:
-        groups.setdefault((kind_of(force).replace("_", " "), ""), []).append(force.node)
-    colors = {"support": _SUPPORT, "damped support": COLORS[4], "seal": COLORS[5]}
-    for number, ((noun, standing), nodes) in enumerate(groups.items()):
-        at = np.array(nodes) - 1
-        x, radius = rotor.positions[at], scale * (surface(rotor) if "seal" in noun else radii(rotor))[at]
-        holds = noun.endswith(("support", "bearing", "film"))
-        style: dict[str, Any] = {
-            "marker": _TIP if holds else "s" if "seal" in noun else "D",
-            "s": 200 if holds else 60,
-            "facecolor": colors.get(noun, COLORS[number % len(COLORS)]),
-            "edgecolor": _SUPPORT,
-            "linewidth": 2.6 if standing else 1.0,
-            "zorder": 4,
-        }
-        ax.scatter(x, -radius, label=f"{noun}{_s(at)}{standing}{_s(at) if standing else ''}", **style)
-        if "seal" in noun:
+    groups: dict[str, list[int]] = {}
+    items: list[Support | NodeForce] = [*rotor.supports, *rotor.forces]
+    for item in items:
+        groups.setdefault(_looks(item), []).append(item.node - 1)
+    for number, (words, at) in enumerate(groups.items()):
+        seal, holds = "seal" in words, "bearing" in words or "film" in words
+        marker: Any = _TIP if holds else "s" if seal else "D"
+        color = DARK if words.startswith("bearing") else COLORS[(4 + number) % len(COLORS)]
+        style = {"marker": marker, "s": 200 if holds else 60, "facecolor": color, "edgecolor": "black",
+                 "linewidth": 2.6 if "pedestal" in words else 1.0, "zorder": 4}  # fmt: skip
+        x, radius = rotor.positions[at], scale * (surface(rotor) if seal else radii(rotor))[at]
+        ax.scatter(x, -radius, label=words, **style)
+        if seal:
             ax.scatter(x, radius, **style)

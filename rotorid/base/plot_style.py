@@ -70,9 +70,15 @@ def on_figure(
     return figure
 
 
-def look(k: int) -> dict[str, Any]:
-    """Colour and style of curve k: neighbours differ by their style too, in black and white."""
-    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[k % len(STYLES)]}
+def look(k: int, points: int | None = None) -> dict[str, Any]:
+    """Colour and style of curve k: neighbours differ by their style too, in black and white.
+
+    With the number of its points given, also marks where they are few, or more curves than line styles.
+    """
+    style: dict[str, Any] = {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[k % len(STYLES)]}
+    if points and (points < 12 or k >= len(STYLES)):
+        style |= {"marker": MARKERS[k % len(MARKERS)], "markevery": max(points // 8, 1)}
+    return style
 
 
 def note(
