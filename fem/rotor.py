@@ -301,8 +301,9 @@ class Support:
     @cached_property
     def table(self) -> FloatArray:
         """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
-        both = (self.stiffness, self.damping) if self.speeds else ([self.stiffness], [self.damping])
-        return np.array([[v if isinstance(v, tuple) else v * np.eye(2) for v in rows] for rows in both])
+        rows = (*self.stiffness, *self.damping) if self.speeds else (self.stiffness, self.damping)
+        matrices = [row if isinstance(row, tuple) else row * np.eye(2) for row in rows]
+        return np.reshape(matrices, (2, -1, 2, 2))
 
 
 def _canonical(value: Any, isotropic: FloatArray, what: str, signed: bool = False) -> Any:  # noqa: ANN401
@@ -312,8 +313,11 @@ def _canonical(value: Any, isotropic: FloatArray, what: str, signed: bool = Fals
         array = np.where(isotropic, array, 0.0)
     if array.shape != isotropic.shape:
         raise ValueError(f"{what} must be a number or of the shape {isotropic.shape}, not {value!r}")
-    if not (np.isfinite(array) & (signed | (array >= 0) | (isotropic == 0))).all():
-        raise ValueError(f"{what} must be finite{'' if signed else ' and not negative'}, not {value!r}")
+    right = np.isfinite(array) & (signed | (array >= 0) | (isotropic == 0))
+    if not right.all():
+        raise ValueError(
+            f"{what} must be finite{'' if signed else ' and not negative'}, not {array[~right][0]}"
+        )
     first = float(array.flat[0])
     if np.array_equal(array, first * isotropic):
         return first
