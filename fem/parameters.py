@@ -10,7 +10,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,9 +51,9 @@ _KEYS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """By kind and name: keys of numbers."""
 _READINGS = ("probe[NAME].angle", "probe[NAME].gain", "key_phasor.angle")
-_ACTS = {"": np.full_like, "scale": np.multiply, "offset": np.add}
+_ACTS: dict[str, Callable[..., FloatArray]] = {"": np.full_like, "scale": np.multiply, "offset": np.add}
 """What a suffix does to a number with a value, in the order in which they act."""
-_Numbers = dict[tuple[str, int], dict[str, FloatArray]]
+_Numbers = dict[tuple[str, int], dict[str, Any]]
 """By kind and place in `rotor.supports` or `rotor.discs`, and by key: rows of a table, elements, or one."""
 
 
@@ -180,8 +180,10 @@ def parameter_value(rotor: Rotor, path: str) -> float:
 def _one(path: str, values: FloatArray) -> float:
     """The value that all of these have; refused where they differ."""
     if np.ptp(values):
-        raise ValueError(f"{path} is several numbers, {min(values):.6g} to {max(values):.6g}: {path}.scale")
-    return float(values.flat[0])
+        raise ValueError(
+            f"{path} is several numbers, {np.min(values):.6g} to {np.max(values):.6g}: {path}.scale"
+        )
+    return float(np.max(values))
 
 
 def typical_size(rotor: Rotor, path: str) -> float:
@@ -278,22 +280,22 @@ def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:
 def _numbers(rotor: Rotor) -> _Numbers:
     numbers = {("material", 0): {key: getattr(rotor, key) for key in _MATERIAL}}
     for i, disc in enumerate(rotor.discs):
-        numbers["disc", i] = {key: np.array(getattr(disc, key)) for key in _DISC}
+        numbers["disc", i] = {key: getattr(disc, key) for key in _DISC}
     for i, support in enumerate(rotor.supports):
         values = [*np.moveaxis(support.table, 1, -1).reshape(8, -1), support.tilting_stiffness]
         if stand := support.pedestal:
             values += [stand.mass, *stand.xy("stiffness"), *stand.xy("damping")]
-        numbers[support.kind, i] = dict(zip(_SUPPORT, map(np.asarray, values), strict=False))
+        numbers[support.kind, i] = dict(zip(_SUPPORT, values, strict=False))
     return numbers
 
 
-def _support(support: Support, *numbers: FloatArray) -> Support:
+def _support(support: Support, *numbers: Any) -> Support:  # noqa: ANN401
     table = np.moveaxis(np.reshape(numbers[:8], (2, 2, 2, -1)), -1, 1)
     stiffness, damping = table if support.speeds else table[:, 0]
-    tilting, *stand = map(float, numbers[8:])
+    stand = numbers[9:]
     pedestal = Pedestal(stand[0], stand[1:3], stand[3:]) if stand else None
     return replace(
-        support, stiffness=stiffness, damping=damping, pedestal=pedestal, tilting_stiffness=tilting
+        support, stiffness=stiffness, damping=damping, pedestal=pedestal, tilting_stiffness=numbers[8]
     )
 
 

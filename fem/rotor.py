@@ -449,7 +449,7 @@ class Calibration:
             return np.zeros((omega.size, len(sensors)))
         lack = np.column_stack((self.lack_of_fit, self.lack_of_fit.max(axis=1)))
         columns = [self.sensors.index(c) if c in self.sensors else -1 for c in sensors]
-        return lack[np.abs(omega[:, None] - self.speeds).argmin(axis=1)][:, columns]
+        return np.asarray(lack[np.abs(omega[:, None] - self.speeds).argmin(axis=1)][:, columns])
 
 
 @dataclass(frozen=True, eq=False)
