@@ -274,6 +274,11 @@ class InternalDamping(NodeForce):
 
     damping: float = 0.0
 
+    @property
+    def parameters(self) -> Sequence[float]:
+        """Those of a seal whose fluid turns with the shaft, without a wall."""
+        return 0.0, self.damping, 0.0, 1.0, math.inf, 0.0, 0.0
+
 
 FORCES: tuple[Method[Any], ...] = (
     Method("journal_bearing", "a short plain journal bearing (Ocvirk)", JournalBearing),
@@ -284,7 +289,7 @@ FORCES: tuple[Method[Any], ...] = (
     Method("internal_damping", "damping that turns with the shaft", InternalDamping),
 )
 """Kinds of forces as rotor files name them, in the order in which rotors keep and `law` numbers them."""
-_SQUEEZE, _SPRING, _STOP, _INTERNAL = 1, 3, 4, 5
+_SQUEEZE, _SPRING, _STOP = 1, 3, 4
 _WALL = 1e-14  # of 1 − ε², below which it is rounding
 
 
@@ -338,11 +343,9 @@ def law(
         return
     # A, B and their derivatives by |z|² (_e) and Ω (_o)
     z, dz, e2 = complex(x, y), complex(vx, vy), x * x + y * y
-    A, B, A_e, B_e, A_o, B_o = 0j, 0j, 0j, 0j, 0j, 0j
     if code == _SPRING:
         A, A_e = v[0] + v[1] * e2 + 0j, v[1] + 0j
-    elif code == _INTERNAL:
-        A, B, A_o = -1j * omega * v[0], v[0] + 0j, -1j * v[0]
+        B = B_e = A_o = B_o = 0j
     else:
         K0, D0, m, tau0, c, n, b = v[0], v[1], v[2], v[3], v[4], v[5], v[6]
         E = e2 / (c * c)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fem.rotor import KINDS, Pedestal, Rotor, Support, is_reading
+from fem.rotor import KINDS, Pedestal, Rotor, is_reading
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.registry import names
@@ -108,7 +108,14 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
             item = numbers[kind, i]
             item[key] = _ACTS[parameter.suffix](item[key], value)
     discs = [replace(disc, **numbers["disc", i]) for i, disc in enumerate(rotor.discs)]
-    supports = [_support(each, *numbers[each.kind, i].values()) for i, each in enumerate(rotor.supports)]
+    supports = []
+    for i, support in enumerate(rotor.supports):
+        its = tuple(numbers[support.kind, i].values())
+        table = np.moveaxis(np.reshape(its[:8], (2, 2, 2, -1)), -1, 1)
+        k, c = table if support.speeds else table[:, 0]
+        pedestal = Pedestal(its[9], its[10:12], its[12:]) if support.pedestal else None
+        new = replace(support, stiffness=k, damping=c, pedestal=pedestal, tilting_stiffness=its[8])
+        supports.append(new)
     return replace(rotor, discs=discs, supports=supports, **numbers["material", 0])
 
 
@@ -254,8 +261,6 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
         keys = _alike(keys)
     numbers = _numbers(rotor)
     places = [i for each, i in numbers if each == kind]
-    if not places:
-        raise ValueError(f"{path}: the rotor has no {kind}")
     if selection not in ("", "*"):
         items = {"material": [rotor], "disc": rotor.discs}.get(kind, rotor.supports)
         called = [getattr(items[i], "name", "") for i in places]
@@ -268,7 +273,7 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
         (kind, i, key): numbers[kind, i][key] for i in places for key in keys if key in numbers[kind, i]
     }
     if not chosen:
-        raise ValueError(f"{path}: the {kind} stands on no pedestal")
+        raise ValueError(f"{path}: the rotor has no {kind} with this number")
     return _Parameter(path, chosen, suffix)
 
 
@@ -287,16 +292,6 @@ def _numbers(rotor: Rotor) -> _Numbers:
             values += [stand.mass, *stand.xy("stiffness"), *stand.xy("damping")]
         numbers[support.kind, i] = dict(zip(_SUPPORT, values, strict=False))
     return numbers
-
-
-def _support(support: Support, *numbers: Any) -> Support:  # noqa: ANN401
-    table = np.moveaxis(np.reshape(numbers[:8], (2, 2, 2, -1)), -1, 1)
-    stiffness, damping = table if support.speeds else table[:, 0]
-    stand = numbers[9:]
-    pedestal = Pedestal(stand[0], stand[1:3], stand[3:]) if stand else None
-    return replace(
-        support, stiffness=stiffness, damping=damping, pedestal=pedestal, tilting_stiffness=numbers[8]
-    )
 
 
 def spread(rotor: Rotor, evaluate: Callable[[Rotor], AnyArray]) -> FloatArray:

@@ -112,7 +112,6 @@ class Disc:
         >>> round(disc.mass, 3), round(disc.polar_inertia, 4), round(disc.diametral_inertia, 4)
         (32.548, 0.3291, 0.1779)
         """
-        width = number(width, f"disc at node {node}: width")
         D, d = outer_diameter, inner_diameter
         if not 0 <= d < D:
             raise ValueError(
@@ -270,9 +269,8 @@ class Support:
                 f"{attachment(self)}: its table holds {first:.6g} to {last:.6g} rad/s, not "
                 f"{outside[0]:.6g} rad/s; it is not extrapolated"
             )
-        below = np.searchsorted(speeds[1:-1], near, "right")
-        share = ((near - speeds[below]) / np.diff(speeds)[below])[..., None, None]
-        k, c = (1 - share) * self.table[:, below] + share * self.table[:, below + 1]
+        hats = np.array([np.interp(near, speeds, row) for row in np.eye(speeds.size)])
+        k, c = np.einsum("n...,knij->k...ij", hats, self.table)
         return k, c
 
     def dynamic_stiffness(self, omega: ArrayLike, speed: ArrayLike | None = None) -> ComplexArray:
@@ -293,10 +291,11 @@ class Support:
         k, c = self.at(omega if speed is None else speed)
         w = np.asarray(omega, dtype=float)[..., None, None]
         bearing = k + 1j * w * c
-        if self.pedestal is None:
+        stand = self.pedestal
+        if stand is None:
             return bearing, None
-        k, c = np.diag(self.pedestal.xy("stiffness")), np.diag(self.pedestal.xy("damping"))
-        return bearing, k - w * w * self.pedestal.mass * np.eye(2) + 1j * w * c
+        k, c = np.diag(stand.xy("stiffness")), np.diag(stand.xy("damping"))
+        return bearing, k - w * w * stand.mass * np.eye(2) + 1j * w * c
 
     @cached_property
     def table(self) -> FloatArray:
@@ -399,8 +398,12 @@ class Calibration:
             if len({*labels}) < len(labels):
                 raise ValueError(f"calibration: one of its {name} comes twice")
         n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
-        shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
-        for name, shape in shapes.items():
+        for name, shape in {
+            "values": (n,),
+            "covariance": (n, n),
+            "speeds": (S,),
+            "lack_of_fit": (S, C),
+        }.items():
             array = np.array(getattr(self, name), dtype=float)
             if (array.size and array.shape != shape) or not np.isfinite(array).all():
                 raise ValueError(f"calibration: {name} must be finite and of the shape {shape}")

@@ -247,7 +247,7 @@ def test_a_rotor_with_everything_survives_copying():
         (lambda: fem.Pedestal(1.0, (1, 2, 3)), r"a number or of the shape \(2,\)"),
         (lambda: fem.Pedestal(-1.0, 1e8), "pedestal: mass must be finite and not negative"),
         (lambda: fem.Disc.from_geometry(1, 0.1, 0.2, 0.2), "inner diameter, 0.2 m, must be smaller"),
-        (lambda: fem.Disc.from_geometry(1, -0.1, 0.2), "width must be finite and not negative"),
+        (lambda: fem.Disc.from_geometry(1, -0.1, 0.2), "mass must be finite and not negative"),
         (
             lambda: fem.Rotor([1.0], 0.1, poisson_ratio=0.6),
             "element 1: poisson_ratio must be finite and above",
