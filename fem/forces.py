@@ -453,10 +453,8 @@ def short_film(  # noqa: PLR0913  what is compiled takes no objects
     by_p = u * complex(Jppp, sign * Jppq) + w * complex(Jppq, Jpqq)
     by_q = u * complex(Jppq, sign * Jpqq) + w * complex(Jpqq, Jqqq)
     if at_line:
-        by_beta = complex(0.0, w * ends)
-        if u < 0.0:
-            by_beta -= 2.0 * complex(-u * Jpq, w * Jpq + u * q * Jppq)
-        by_p -= by_beta / q
+        pulled = (1.0 - sign) * complex(-u * Jpq, w * Jpq + u * q * Jppq)
+        by_p -= (complex(0.0, w * ends) - pulled) / q
     _write(out, n, u * by_u + w * by_w, by_p / c, by_q / c, by_u, by_w, 0j)
     for i in range(2):  # a and b change with x, y and Ω
         out[i, 1] -= 0.5 * omega * out[i, 4]

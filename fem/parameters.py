@@ -255,9 +255,7 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
     keys = of_kind[one_of(name, f"{path}: of a {kind},", tuple(of_kind))]
     if suffix:
         one_of(suffix, f"{path}: the suffix", tuple(_ACTS)[1:] if keys[0] in _TABLED else ("scale",))
-    if name == "scale":
-        suffix = name
-    elif suffix == "scale" and len(keys) > 1:
+    if suffix == "scale" and len(keys) > 1:
         keys = _alike(keys)
     numbers = _numbers(rotor)
     places = [i for each, i in numbers if each == kind]
@@ -274,7 +272,7 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
     }
     if not chosen:
         raise ValueError(f"{path}: the rotor has no {kind} with this number")
-    return _Parameter(path, chosen, suffix)
+    return _Parameter(path, chosen, "scale" if name == "scale" else suffix)
 
 
 def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:

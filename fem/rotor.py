@@ -414,7 +414,9 @@ class Calibration:
         if not np.allclose(R, R.T, rtol=0.0, atol=1e-9):
             raise ValueError("calibration: the covariance must be symmetric")
         if (np.linalg.eigvalsh(R) < -1e-9).any() or (self.lack_of_fit < 0).any():
-            raise ValueError("calibration: covariance and lack_of_fit must not be negative in any direction")
+            raise ValueError(
+                "calibration: lack_of_fit is not negative, the covariance must not be negative in any direction"
+            )
 
     @property
     def readings(self) -> dict[str, float]:

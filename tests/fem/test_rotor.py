@@ -322,7 +322,7 @@ def test_a_rotor_keeps_its_calibration_and_stays_equal():
         ({"values": [1.0]}, r"values must be finite and of the shape \(3,\)"),
         ({"covariance": np.eye(2)}, r"covariance must be finite and of the shape \(3, 3\)"),
         ({"lack_of_fit": [[0.1, 0.1]]}, r"lack_of_fit must be finite and of the shape \(2, 2\)"),
-        ({"lack_of_fit": [[0.1, -0.1], [0, 0]]}, "must not be negative"),
+        ({"lack_of_fit": [[0.1, -0.1], [0, 0]]}, "not negative"),
         ({"values": [1.0, np.nan, 1.0]}, "values must be finite"),
         ({"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "must be symmetric"),
         ({"covariance": np.diag([1.0, -1.0, 1.0])}, "negative in any direction"),
