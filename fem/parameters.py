@@ -10,7 +10,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -57,12 +57,8 @@ _Numbers = dict[tuple[str, int], dict[str, Any]]
 """By kind and place in `rotor.supports` or `rotor.discs`, and by key: rows of a table, elements, or one."""
 
 
-class _Parameter(NamedTuple):
-    """A path, read: the numbers that it is of, as they stand, and its suffix."""
-
-    path: str
-    numbers: dict[tuple[str, int, str], FloatArray]
-    suffix: str
+_Parameter = tuple[dict[tuple[str, int, str], Any], str]
+"""The numbers that a path is of, by kind, place and key, as they stand, and its suffix."""
 
 
 def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
@@ -96,17 +92,19 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
         along the shaft has several, a number given twice, an impossible value.
     """
     numbers, given = _numbers(rotor), set[tuple[str, int, str]]()
-    read = [(_parameter(rotor, path), number(value, path, signed=True)) for path, value in values.items()]
-    for parameter, value in sorted(read, key=lambda each: [*_ACTS].index(each[0].suffix)):
-        if not parameter.suffix:
-            for before in parameter.numbers.values():
-                _one(parameter.path, before)
-            if given & parameter.numbers.keys():
-                raise ValueError(f"{parameter.path}: another parameter has this number, too")
-            given |= parameter.numbers.keys()
-        for kind, i, key in parameter.numbers:
+    changes = [
+        (path, number(value, path, signed=True), *_parameter(rotor, path)) for path, value in values.items()
+    ]
+    for path, value, before, suffix in sorted(changes, key=lambda change: [*_ACTS].index(change[3])):
+        if not suffix:
+            for each in before.values():
+                _one(path, each)
+            if given & before.keys():
+                raise ValueError(f"{path}: another parameter has this number, too")
+            given |= before.keys()
+        for kind, i, key in before:
             item = numbers[kind, i]
-            item[key] = _ACTS[parameter.suffix](item[key], value)
+            item[key] = _ACTS[suffix](item[key], value)
     discs = [replace(disc, **numbers["disc", i]) for i, disc in enumerate(rotor.discs)]
     supports = []
     for i, support in enumerate(rotor.supports):
@@ -136,9 +134,9 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 
 def as_change(rotor: Rotor, path: str) -> str:
     """The parameter by which this one can be changed from where it stands: `.offset` of a coefficient."""
-    parameter = _parameter(rotor, path)
-    tabled = any(key in _TABLED for _, _, key in parameter.numbers)
-    return f"{path}.offset" if not parameter.suffix and tabled else path
+    numbers, suffix = _parameter(rotor, path)
+    tabled = any(key in _TABLED for _, _, key in numbers)
+    return f"{path}.offset" if tabled and not suffix else path
 
 
 def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
@@ -167,7 +165,7 @@ def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
 
 def numbers_of(rotor: Rotor, path: str) -> frozenset[tuple[str, int, str]]:
     """Which numbers a parameter sets, scales or adds to: kind, place, name of each; none of a reading."""
-    return frozenset(_parameter(rotor, path).numbers)
+    return frozenset(_parameter(rotor, path)[0])
 
 
 def parameter_value(rotor: Rotor, path: str) -> float:
@@ -178,10 +176,10 @@ def parameter_value(rotor: Rotor, path: str) -> float:
     ValueError
         For a path that the rotor does not have, and several numbers that are not the same.
     """
-    parameter = _parameter(rotor, path)
-    if parameter.suffix:
-        return float(parameter.suffix == "scale")
-    return _one(path, np.hstack([*parameter.numbers.values()]))
+    numbers, suffix = _parameter(rotor, path)
+    if suffix:
+        return float(suffix == "scale")
+    return _one(path, np.hstack([*numbers.values()]))
 
 
 def _one(path: str, values: FloatArray) -> float:
@@ -204,12 +202,12 @@ def typical_size(rotor: Rotor, path: str) -> float:
     ValueError
         For a path that the rotor does not have.
     """
-    parameter = _parameter(rotor, path)
-    if parameter.suffix == "scale" or not parameter.numbers:
+    numbers, suffix = _parameter(rotor, path)
+    if suffix == "scale" or not numbers:
         return 1.0
     around = _numbers(rotor)
-    alike = [around[kind, i][other] for kind, i, key in parameter.numbers for other in _alike((key,))]
-    size, around_it = (np.abs(np.hstack(each)).max() for each in ([*parameter.numbers.values()], alike))
+    alike = [around[kind, i][other] for kind, i, key in numbers for other in _alike((key,))]
+    size, around_it = (np.abs(np.hstack(each)).max() for each in ([*numbers.values()], alike))
     return float(size or around_it or 1.0)
 
 
@@ -235,18 +233,18 @@ def expand(rotor: Rotor, path: str, probes: Sequence[str] = ()) -> tuple[str, ..
         name, rest = match.groups()
         one_of(name, f"{path}: the probe", ("*", *probes))
         return tuple(f"probe[{probe}]{rest}" for probe in probes if name in ("*", probe))
-    parameter = _parameter(rotor, path)
+    numbers, _ = _parameter(rotor, path)
     if "[*]" not in path:
         return (path,)
     places = [i for kind, i in _numbers(rotor) if path.startswith(f"{kind}[")]
-    chosen = {i for _, i, _ in parameter.numbers}
+    chosen = {i for _, i, _ in numbers}
     return tuple(path.replace("*", str(n)) for n, i in enumerate(places, start=1) if i in chosen)
 
 
 def _parameter(rotor: Rotor, path: str) -> _Parameter:
     """A path, read and checked."""
     if is_reading(path):
-        return _Parameter(path, {}, "scale" if path.endswith("gain") else "offset")
+        return {}, "scale" if path.endswith("gain") else "offset"
     match = re.fullmatch(r"([^.\[\]]+)(?:\[(.*)\])?\.([^.\[\]]+)(?:\.([^\[\]]+))?", path)
     if match is None:
         raise ValueError(f"{path!r} is no parameter: one looks like bearing[1].kxx or material.density.scale")
@@ -272,7 +270,7 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
     }
     if not chosen:
         raise ValueError(f"{path}: the rotor has no {kind} with this number")
-    return _Parameter(path, chosen, "scale" if name == "scale" else suffix)
+    return chosen, "scale" if name == "scale" else suffix
 
 
 def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:

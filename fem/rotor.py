@@ -415,7 +415,7 @@ class Calibration:
             raise ValueError("calibration: the covariance must be symmetric")
         if (np.linalg.eigvalsh(R) < -1e-9).any() or (self.lack_of_fit < 0).any():
             raise ValueError(
-                "calibration: lack_of_fit is not negative, the covariance must not be negative in any direction"
+                "calibration: lack_of_fit not negative, covariance must not be negative in any direction"
             )
 
     @property
