@@ -48,7 +48,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import attachment, number
 from rotorid.base.compiled import compiled_part
-from rotorid.base.registry import Method, names
+from rotorid.base.registry import Method
 from rotorid.base.suggestions import one_of
 
 __all__ = [
@@ -73,12 +73,12 @@ Film = Literal["pressure", "line of centres"]
 centres bounds, on the side where a steady journal's pressure is positive (the textbook's π film)."""
 
 
-def check_numbers(item: Any, what: str, above_zero: Sequence[str] = ()) -> None:  # noqa: ANN401
+def check_numbers(item: Any, what: str) -> None:  # noqa: ANN401
     """Make plain floats of the fields of that type of a frozen dataclass: finite and not negative."""
     for each in fields(item):
         if each.type == "float":
             value = number(getattr(item, each.name), f"{what}: {each.name}")
-            if value < 1e-30 and each.name in above_zero:
+            if value < 1e-30 and each.name in getattr(item, "above_zero", ()):
                 raise ValueError(f"{what}: {each.name} must be above 0, not {value:g}")
             object.__setattr__(item, each.name, value)
 
@@ -105,12 +105,12 @@ class NodeForce:
     """Numbers that must be so, 1e-30 at least."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, attachment(self), self.above_zero)
+        check_numbers(self, attachment(self))
 
     @property
-    def parameters(self) -> FloatArray:
+    def parameters(self) -> Sequence[float]:
         """Its numbers in SI in the order in which the law takes them."""
-        return np.array([getattr(self, item.name) for item in fields(self) if item.type == "float"])
+        return [getattr(self, each.name) for each in fields(self) if each.type == "float"]
 
     @property
     def mass(self) -> float:
@@ -141,6 +141,14 @@ class ShortFilm(NodeForce):
     viscosity: float = 0.0
 
     above_zero: ClassVar[tuple[str, ...]] = ("length", "diameter", "clearance", "viscosity")
+
+    @property
+    def parameters(self) -> Sequence[float]:
+        """C and c, as `short_film` takes them, whether of the line of centres, a spring, whether it turns."""
+        C = self.viscosity * self.length**3 * self.diameter / 2 / self.clearance**3
+        by_line = getattr(self, "film", "") == "line of centres"
+        spring = getattr(self, "centring_stiffness", 0.0)
+        return C, self.clearance, by_line, spring, isinstance(self, JournalBearing)
 
 
 @dataclass(frozen=True)
@@ -266,6 +274,11 @@ class InternalDamping(NodeForce):
 
     damping: float = 0.0
 
+    @property
+    def parameters(self) -> Sequence[float]:
+        """Those of a seal whose fluid turns with the shaft, without a wall."""
+        return 0.0, self.damping, 0.0, 1.0, math.inf, 0.0, 0.0
+
 
 FORCES: tuple[Method[Any], ...] = (
     Method("journal_bearing", "a short plain journal bearing (Ocvirk)", JournalBearing),
@@ -276,7 +289,7 @@ FORCES: tuple[Method[Any], ...] = (
     Method("internal_damping", "damping that turns with the shaft", InternalDamping),
 )
 """Kinds of forces as rotor files name them, in the order in which rotors keep and `law` numbers them."""
-_SQUEEZE, _SEAL, _SPRING, _STOP, _INTERNAL = 1, 2, 3, 4, 5
+_SQUEEZE, _SPRING, _STOP = 1, 3, 4
 _WALL = 1e-14  # of 1 − ε², below which it is rounding
 
 
@@ -288,28 +301,18 @@ def kind_of(force: NodeForce) -> str:
     ValueError
         For what is none of them.
     """
-    for method in FORCES:
-        if type(force) is method.function:
-            return method.name
-    raise ValueError(f"{attachment(force)} is no force: one of {', '.join(names(FORCES))} is")
+    return FORCES[code_of(force)].name
 
 
 def code_of(force: NodeForce) -> int:
     """Its place in `FORCES`; ValueError as `kind_of`."""
-    return names(FORCES).index(kind_of(force))
+    return [method.function for method in FORCES].index(type(force))
 
 
 def tables(forces: Sequence[NodeForce]) -> tuple[IndexArray, FloatArray]:
     """Code of the law of each force, shape (f,), and its parameters, shape (f, 7), as `law` takes them."""
-    values = np.zeros((len(forces), 7))
-    for row, force in zip(values, forces, strict=True):
-        if isinstance(force, ShortFilm):
-            C = force.viscosity * force.length**3 * force.diameter / 2 / force.clearance**3
-            by_line = getattr(force, "film", "") == "line of centres"
-            row[:4] = C, force.clearance, by_line, getattr(force, "centring_stiffness", 0.0)
-        else:
-            row[: len(force.parameters)] = force.parameters
-    return np.array([code_of(force) for force in forces], dtype=np.intp), values
+    values = [np.resize([*force.parameters, *7 * (0.0,)], 7) for force in forces]
+    return np.array([code_of(force) for force in forces], dtype=np.intp), np.reshape(values, (-1, 7))
 
 
 @compiled_part
@@ -329,10 +332,9 @@ def law(
         the wall.
     """
     if code <= _SQUEEZE:
-        turns = 0.0 if code == _SQUEEZE else 1.0
-        short_film(v[0], v[1], x, y, vx, vy, omega * turns, v[2] > 0.0, out)
+        short_film(v[0], v[1], x, y, vx, vy, omega * v[4], v[2] > 0.0, out)
         for i in range(2):
-            out[i, 5] *= turns
+            out[i, 5] *= v[4]
             out[i, 0] -= v[3] * (x if i == 0 else y)
             out[i, 1 + i] -= v[3]
         return
@@ -341,11 +343,9 @@ def law(
         return
     # A, B and their derivatives by |z|² (_e) and Ω (_o)
     z, dz, e2 = complex(x, y), complex(vx, vy), x * x + y * y
-    A, B, A_e, B_e, A_o, B_o = 0j, 0j, 0j, 0j, 0j, 0j
     if code == _SPRING:
         A, A_e = v[0] + v[1] * e2 + 0j, v[1] + 0j
-    elif code == _INTERNAL:
-        A, B, A_o = -1j * omega * v[0], v[0] + 0j, -1j * v[0]
+        B = B_e = A_o = B_o = 0j
     else:
         K0, D0, m, tau0, c, n, b = v[0], v[1], v[2], v[3], v[4], v[5], v[6]
         E = e2 / (c * c)
@@ -364,26 +364,36 @@ def law(
         B_e = grow * D + B_s * less * omega
         A_o, B_o = A_s * tau, B_s * tau
     F_e = -A_e * z - B_e * dz
-    _put(out, 0, -A * z - B * dz)
-    _put(out, 1, 2.0 * x * F_e - A)
-    _put(out, 2, 2.0 * y * F_e - 1j * A)
-    _put(out, 3, -B)
-    _put(out, 4, -1j * B)
-    _put(out, 5, -A_o * z - B_o * dz)
+    _write(
+        out,
+        1 + 0j,
+        -A * z - B * dz,
+        2.0 * x * F_e - A,
+        2.0 * y * F_e - 1j * A,
+        -B,
+        -1j * B,
+        -A_o * z - B_o * dz,
+    )
 
 
 @compiled_part
-def _put(out: FloatArray, column: int, value: complex) -> None:
-    """Write F_x + i F_y or its derivative."""
-    out[0, column], out[1, column] = value.real, value.imag
-
-
-@compiled_part
-def _turn_back(out: FloatArray, column: int, n: complex, along: complex, across: complex) -> None:
-    """Write derivatives by x and y, from those of F n̄ by the components along n and across it."""
-    by_x, by_y = n * (along * n.real - across * n.imag), n * (along * n.imag + across * n.real)
-    out[0, column], out[1, column] = by_x.real, by_x.imag
-    out[0, column + 1], out[1, column + 1] = by_y.real, by_y.imag
+def _write(
+    out: FloatArray,
+    n: complex,
+    F: complex,
+    along: complex,
+    across: complex,
+    along_v: complex,
+    across_v: complex,
+    by_omega: complex,
+) -> None:
+    """Write a force and its derivatives, from F n̄ and those by the components along n and across it."""
+    c, s = n.real, n.imag
+    by_place = c * along - s * across, s * along + c * across
+    by_flow = c * along_v - s * across_v, s * along_v + c * across_v
+    for i, value in enumerate((F, *by_place, *by_flow, by_omega)):
+        turned = n * value
+        out[0, i], out[1, i] = turned.real, turned.imag
 
 
 @compiled_part
@@ -422,35 +432,30 @@ def short_film(  # noqa: PLR0913  what is compiled takes no objects
     place, flow = complex(X, Y) * n.conjugate(), complex(a, b) * n.conjugate()
     p, q, u, w = place.real, place.imag, flow.real, flow.imag
 
-    k = math.sqrt(k2)
+    k = math.sqrt(k2)  # J and its derivatives times −C / 2
     r = 1.0 / k2
-    J = 2.0 / k * math.atan2(k, -p)
+    J = -C / k * math.atan2(k, -p)
     d = 1.0 / (1.0 - q * q)
-    Jp = (2.0 + p * J) * r
-    Jq = q * (2.0 * p * d + J) * r
+    ends = -2.0 * C * q * (3.0 + q * q) * d * d * d
+    Jp = (p * J - C) * r
+    Jq = q * (J - C * p * d) * r
     Jpp = (J + 3.0 * p * Jp) * r
     Jpq = (p * Jq + 2.0 * q * Jp) * r
-    Jqq = (2.0 * p * (1.0 + q * q) * d * d + J + 3.0 * q * Jq) * r
+    Jqq = (J + 3.0 * q * Jq - C * p * (1.0 + q * q) * d * d) * r
     Jppp = (4.0 * Jp + 5.0 * p * Jpp) * r
     Jppq = (Jq + 3.0 * p * Jpq + 2.0 * q * Jpp) * r
     Jpqq = (p * Jqq + 2.0 * Jp + 4.0 * q * Jpq) * r
-    # d³J/dq³ of Jqq = (N + 3 q Jq) / k², N = 2 p (1 + q²) / (1 − q²)² + J
-    Jqqq = (4.0 * p * q * (3.0 + q * q) * d * d * d + 4.0 * Jq + 5.0 * q * Jqq) * r
+    Jqqq = (p * ends + 4.0 * Jq + 5.0 * q * Jqq) * r
 
-    h = -0.5 * C
     at_line = line_of_centres and q > 0.0
     sign = -1.0 if at_line and u < 0.0 else 1.0
-    by_u, by_w = h * complex(Jpp, sign * Jpq), h * complex(Jpq, Jqq)
-    by_p = h / c * (u * complex(Jppp, sign * Jppq) + w * complex(Jppq, Jpqq))
-    by_q = h / c * (u * complex(Jppq, sign * Jpqq) + w * complex(Jpqq, Jqqq))
+    by_u, by_w = complex(Jpp, sign * Jpq), complex(Jpq, Jqq)
+    by_p = u * complex(Jppp, sign * Jppq) + w * complex(Jppq, Jpqq)
+    by_q = u * complex(Jppq, sign * Jpqq) + w * complex(Jpqq, Jqqq)
     if at_line:
-        by_beta = complex(0.0, 4.0 * h * w * q * (3.0 + q * q) * d * d * d)
-        if u < 0.0:
-            by_beta -= 2.0 * h * complex(-u * Jpq, w * Jpq + u * q * Jppq)
-        by_p -= by_beta / (q * c)
-    _put(out, 0, n * (u * by_u + w * by_w))
-    _turn_back(out, 1, n, by_p, by_q)
-    _turn_back(out, 3, n, by_u, by_w)
+        pulled = (1.0 - sign) * complex(-u * Jpq, w * Jpq + u * q * Jppq)
+        by_p -= (complex(0.0, w * ends) - pulled) / q
+    _write(out, n, u * by_u + w * by_w, by_p / c, by_q / c, by_u, by_w, 0j)
     for i in range(2):  # a and b change with x, y and Ω
         out[i, 1] -= 0.5 * omega * out[i, 4]
         out[i, 2] += 0.5 * omega * out[i, 3]
@@ -475,7 +480,4 @@ def _stop(v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float,
     by_slip = complex(0.0, -friction * N * (1.0 - f * f) / v0)
     # along an arc n turns, and z' n̄ the other way
     by_arc = (c * speed.imag * push - speed.real * by_slip + 1j * N * push) / r
-    _put(out, 0, N * push * n)
-    _turn_back(out, 1, n, k * push, by_arc)
-    _turn_back(out, 3, n, c * push, by_slip)
-    _put(out, 5, R * by_slip * n)
+    _write(out, n, N * push, k * push, by_arc, c * push, by_slip, R * by_slip)

@@ -1,7 +1,7 @@
 """Numbers of a rotor by name, such as `bearing[1].kxx` or `disc.scale`; other values of them; error bands.
 
 A path names a kind, which of its items, one of their numbers, and what to do with it: set, `.scale` or
-`.offset`. Numbers of an item are read as arrays by key, changed there, and an item is built of them again.
+`.offset`. All numbers of a rotor are read as arrays, changed there, and the rotor is built of them again.
 """
 
 from __future__ import annotations
@@ -10,24 +10,21 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from fem.rotor import KINDS, Calibration, Disc, Pedestal, Rotor, Support, is_reading
+from fem.rotor import KINDS, Pedestal, Rotor, is_reading
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.registry import names
 from rotorid.base.suggestions import one_of
 
 __all__ = [
-    "NORMAL_95",
-    "Calibration",
     "as_change",
     "as_they_stand",
     "band",
     "expand",
-    "is_reading",
     "nearest_modes",
     "numbers_of",
     "parameter_value",
@@ -37,37 +34,31 @@ __all__ = [
     "with_parameters",
 ]
 
-NORMAL_95 = 1.959964
-"""Standard deviations from the middle to the ends of 95 %."""
 _TABLED = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
 _STAND = ("pedestal_mass", *(f"pedestal_{name}_{axis}" for name in ("stiffness", "damping") for axis in "xy"))
 _DISC = ("mass", "polar_inertia", "diametral_inertia")
 _MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "material_damping")
-_SUPPORT = {
-    **{name: (name,) for name in (*_TABLED, "tilting_stiffness", *_STAND)},
-    "stiffness": ("kxx", "kyy"),
-    "damping": ("cxx", "cyy"),
-    "pedestal_stiffness": _STAND[1:3],
-    "pedestal_damping": _STAND[3:],
-}
+_SUPPORT = (*_TABLED, "tilting_stiffness", *_STAND)
 _KEYS: dict[str, dict[str, tuple[str, ...]]] = {
-    **dict.fromkeys(names(KINDS), _SUPPORT),
+    **dict.fromkeys(
+        names(KINDS),
+        {name: (name,) for name in _SUPPORT}
+        | {"stiffness": ("kxx", "kyy"), "damping": ("cxx", "cyy")}
+        | {"pedestal_stiffness": _STAND[1:3], "pedestal_damping": _STAND[3:]},
+    ),
     "disc": {name: (name,) for name in _DISC} | {"scale": _DISC},
     "material": {name: (name,) for name in _MATERIAL},
 }
-"""By kind and name: keys of `_numbers`."""
+"""By kind and name: keys of numbers."""
 _READINGS = ("probe[NAME].angle", "probe[NAME].gain", "key_phasor.angle")
-_SUFFIXES = ("", "scale", "offset")  # in the order in which they act
+_ACTS: dict[str, Callable[..., FloatArray]] = {"": np.full_like, "scale": np.multiply, "offset": np.add}
+"""What a suffix does to a number with a value, in the order in which they act."""
+_Numbers = dict[tuple[str, int], dict[str, Any]]
+"""By kind and place in `rotor.supports` or `rotor.discs`, and by key: rows of a table, elements, or one."""
 
 
-class _Parameter(NamedTuple):
-    """A path, read: items of its kind by place in `rotor.supports` or `rotor.discs`, keys, and the suffix."""
-
-    path: str
-    kind: str
-    items: dict[int, Any]
-    keys: tuple[str, ...]
-    suffix: str
+_Parameter = tuple[dict[tuple[str, int, str], Any], str]
+"""The numbers that a path is of, by kind, place and key, as they stand, and its suffix."""
 
 
 def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
@@ -97,25 +88,33 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
     Raises
     ------
     ValueError
-        In one sentence: for a path that the rotor does not have, a plain value of a tabulated coefficient
-        or of a material that differs along the shaft, a number given twice, an impossible value.
+        In one sentence: for a path that the rotor does not have, a plain value where a table or a material
+        along the shaft has several, a number given twice, an impossible value.
     """
-    changes: dict[tuple[str, int], list[tuple[_Parameter, float]]] = defaultdict(list)
-    for path, value in values.items():
-        parameter = _parameter(rotor, path)
-        for i in parameter.items:
-            changes[parameter.kind, i].append((parameter, number(value, path, signed=True)))
-    new: dict[str, Any] = {"discs": list(rotor.discs), "supports": list(rotor.supports)}
-    for (kind, i), of_item in changes.items():
-        item = _items(rotor, kind)[i]
-        numbers = _changed(_numbers(item), of_item)
-        if kind == "material":
-            new |= numbers
-        elif kind == "disc":
-            new["discs"][i] = replace(item, **{name: value[0] for name, value in numbers.items()})
-        else:
-            new["supports"][i] = _support(item, numbers)
-    return replace(rotor, **new)
+    numbers, given = _numbers(rotor), set[tuple[str, int, str]]()
+    changes = [
+        (path, number(value, path, signed=True), *_parameter(rotor, path)) for path, value in values.items()
+    ]
+    for path, value, before, suffix in sorted(changes, key=lambda change: [*_ACTS].index(change[3])):
+        if not suffix:
+            for each in before.values():
+                _one(path, each)
+            if given & before.keys():
+                raise ValueError(f"{path}: another parameter has this number, too")
+            given |= before.keys()
+        for kind, i, key in before:
+            item = numbers[kind, i]
+            item[key] = _ACTS[suffix](item[key], value)
+    discs = [replace(disc, **numbers["disc", i]) for i, disc in enumerate(rotor.discs)]
+    supports = []
+    for i, support in enumerate(rotor.supports):
+        its = tuple(numbers[support.kind, i].values())
+        table = np.moveaxis(np.reshape(its[:8], (2, 2, 2, -1)), -1, 1)
+        k, c = table if support.speeds else table[:, 0]
+        pedestal = Pedestal(its[9], its[10:12], its[12:]) if support.pedestal else None
+        new = replace(support, stiffness=k, damping=c, pedestal=pedestal, tilting_stiffness=its[8])
+        supports.append(new)
+    return replace(rotor, discs=discs, supports=supports, **numbers["material", 0])
 
 
 def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
@@ -135,8 +134,9 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 
 def as_change(rotor: Rotor, path: str) -> str:
     """The parameter by which this one can be changed from where it stands: `.offset` of a coefficient."""
-    parameter = _parameter(rotor, path)
-    return f"{path}.offset" if not parameter.suffix and parameter.keys[0] in _TABLED else path
+    numbers, suffix = _parameter(rotor, path)
+    tabled = any(key in _TABLED for _, _, key in numbers)
+    return f"{path}.offset" if tabled and not suffix else path
 
 
 def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
@@ -153,22 +153,19 @@ def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
     T = np.eye(len(values))
     numbers = [numbers_of(rotor, path) for path in values]
     for j, (path, scale) in enumerate(values.items()):
-        if not path.endswith(".scale"):
-            continue
-        scale = scale or 1.0  # with nothing left of the numbers
-        T[j, j] = 1 / scale
-        for i, (other, added) in enumerate(values.items()):
-            if other.endswith(".offset") and numbers[i] & numbers[j]:
-                if not numbers[i] <= numbers[j]:
-                    raise ValueError(f"{other} adds to more numbers than {path} multiplies")
-                T[i, j] = -added / scale
+        if path.endswith(".scale"):
+            T[j, j] = 1 / (scale or 1.0)  # with nothing left of the numbers
+            for i, (other, added) in enumerate(values.items()):
+                if other.endswith(".offset") and numbers[i] & numbers[j]:
+                    if not numbers[i] <= numbers[j]:
+                        raise ValueError(f"{other} adds to more numbers than {path} multiplies")
+                    T[i, j] = -added * T[j, j]
     return T
 
 
 def numbers_of(rotor: Rotor, path: str) -> frozenset[tuple[str, int, str]]:
     """Which numbers a parameter sets, scales or adds to: kind, place, name of each; none of a reading."""
-    parameter = _parameter(rotor, path)
-    return frozenset((parameter.kind, i, key) for i in parameter.items for key in parameter.keys)
+    return frozenset(_parameter(rotor, path)[0])
 
 
 def parameter_value(rotor: Rotor, path: str) -> float:
@@ -177,16 +174,21 @@ def parameter_value(rotor: Rotor, path: str) -> float:
     Raises
     ------
     ValueError
-        For a path that the rotor does not have, a table, and several numbers that are not the same.
+        For a path that the rotor does not have, and several numbers that are not the same.
     """
-    parameter = _parameter(rotor, path)
-    if parameter.suffix:
-        return float(parameter.suffix == "scale")
-    items = [_numbers(item) for item in parameter.items.values()]
-    values = [_single(path, key, numbers) for numbers in items for key in parameter.keys]
-    if max(values) > min(values):
-        raise ValueError(f"{path} is several numbers, {min(values):.6g} to {max(values):.6g}: {path}.scale")
-    return values[0]
+    numbers, suffix = _parameter(rotor, path)
+    if suffix:
+        return float(suffix == "scale")
+    return _one(path, np.hstack([*numbers.values()]))
+
+
+def _one(path: str, values: FloatArray) -> float:
+    """The value that all of these have; refused where they differ."""
+    if np.ptp(values):
+        raise ValueError(
+            f"{path} is several numbers, {np.min(values):.6g} to {np.max(values):.6g}: {path}.scale"
+        )
+    return float(np.max(values))
 
 
 def typical_size(rotor: Rotor, path: str) -> float:
@@ -200,15 +202,13 @@ def typical_size(rotor: Rotor, path: str) -> float:
     ValueError
         For a path that the rotor does not have.
     """
-    parameter = _parameter(rotor, path)
-    if parameter.suffix == "scale" or not parameter.keys:
+    numbers, suffix = _parameter(rotor, path)
+    if suffix == "scale" or not numbers:
         return 1.0
-    items = [_numbers(item) for item in parameter.items.values()]
-    sizes = (
-        max(float(np.abs(numbers[key]).max()) for numbers in items for key in keys)
-        for keys in (parameter.keys, _alike(parameter.keys))
-    )
-    return next(filter(None, sizes), 1.0)
+    around = _numbers(rotor)
+    alike = [around[kind, i][other] for kind, i, key in numbers for other in _alike((key,))]
+    size, around_it = (np.abs(np.hstack(each)).max() for each in ([*numbers.values()], alike))
+    return float(size or around_it or 1.0)
 
 
 def expand(rotor: Rotor, path: str, probes: Sequence[str] = ()) -> tuple[str, ...]:
@@ -228,21 +228,23 @@ def expand(rotor: Rotor, path: str, probes: Sequence[str] = ()) -> tuple[str, ..
     ValueError
         For a path that the rotor does not have, or a probe that is not there.
     """
-    if probes and is_reading(path.replace("[*]", "[any]")) and "]" in path:
-        name, rest = path.removeprefix("probe[").split("]")
+    match = re.fullmatch(r"probe\[(.+)\](\.angle|\.gain)", path)
+    if probes and match:
+        name, rest = match.groups()
         one_of(name, f"{path}: the probe", ("*", *probes))
         return tuple(f"probe[{probe}]{rest}" for probe in probes if name in ("*", probe))
-    parameter = _parameter(rotor, path)
+    numbers, _ = _parameter(rotor, path)
     if "[*]" not in path:
         return (path,)
-    places = list(_items(rotor, parameter.kind))
-    return tuple(path.replace("*", str(places.index(i) + 1)) for i in parameter.items)
+    places = [i for kind, i in _numbers(rotor) if path.startswith(f"{kind}[")]
+    chosen = {i for _, i, _ in numbers}
+    return tuple(path.replace("*", str(n)) for n, i in enumerate(places, start=1) if i in chosen)
 
 
 def _parameter(rotor: Rotor, path: str) -> _Parameter:
     """A path, read and checked."""
     if is_reading(path):
-        return _Parameter(path, "", {}, (), "scale" if path.endswith("gain") else "offset")
+        return {}, "scale" if path.endswith("gain") else "offset"
     match = re.fullmatch(r"([^.\[\]]+)(?:\[(.*)\])?\.([^.\[\]]+)(?:\.([^\[\]]+))?", path)
     if match is None:
         raise ValueError(f"{path!r} is no parameter: one looks like bearing[1].kxx or material.density.scale")
@@ -250,100 +252,42 @@ def _parameter(rotor: Rotor, path: str) -> _Parameter:
     of_kind = _KEYS[one_of(kind, f"{path}: the kind", (*_KEYS, *_READINGS))]
     keys = of_kind[one_of(name, f"{path}: of a {kind},", tuple(of_kind))]
     if suffix:
-        one_of(suffix, f"{path}: the suffix", _SUFFIXES[1:] if keys[0] in _TABLED else ("scale",))
-    if name == "scale":
-        suffix = name
-    elif suffix == "scale" and len(keys) > 1:
+        one_of(suffix, f"{path}: the suffix", tuple(_ACTS)[1:] if keys[0] in _TABLED else ("scale",))
+    if suffix == "scale" and len(keys) > 1:
         keys = _alike(keys)
-    return _Parameter(path, kind, _selected(rotor, path, kind, selection, keys), keys, suffix)
+    numbers = _numbers(rotor)
+    places = [i for each, i in numbers if each == kind]
+    if selection not in ("", "*"):
+        items = {"material": [rotor], "disc": rotor.discs}.get(kind, rotor.supports)
+        called = [getattr(items[i], "name", "") for i in places]
+        numbered = {str(n): i for n, i in enumerate(places, start=1)}
+        named = {name: i for name, i in zip(called, places, strict=True) if name and called.count(name) == 1}
+        places_of = numbered | named | numbered
+        parts = map(str.strip, selection.split(","))
+        places = [places_of[one_of(part, f"{path}: the {kind}", tuple(places_of))] for part in parts]
+    chosen = {
+        (kind, i, key): numbers[kind, i][key] for i in places for key in keys if key in numbers[kind, i]
+    }
+    if not chosen:
+        raise ValueError(f"{path}: the rotor has no {kind} with this number")
+    return chosen, "scale" if name == "scale" else suffix
 
 
 def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:
     """All entries of the stiffness or damping that a key is of, or the keys as they are."""
-    return tuple(key for key in _TABLED if key[0] == keys[0][0]) if keys[0] in _TABLED else keys
+    return tuple(key for key in _TABLED if key[0] == keys[0][0]) or keys
 
 
-def _items(rotor: Rotor, kind: str) -> dict[int, Any]:
-    """All of a kind by their place in `rotor.discs` or `rotor.supports`; the rotor itself: its material."""
-    items = {"material": [rotor], "disc": rotor.discs}.get(kind, rotor.supports)
-    return {i: item for i, item in enumerate(items) if getattr(item, "kind", kind) == kind}
-
-
-def _selected(rotor: Rotor, path: str, kind: str, selection: str, keys: tuple[str, ...]) -> dict[int, Any]:
-    """Items that stand in brackets, by number or a name that comes once; all without or with *."""
-    items = _items(rotor, kind)
-    if not items:
-        raise ValueError(f"{path}: the rotor has no {kind}")
-    if selection not in ("", "*"):
-        called = {str(n): i for n, i in enumerate(items, start=1)}
-        by_name = [getattr(item, "name", "") for item in items.values()]
-        for i, name in zip(items, by_name, strict=True):
-            if name and by_name.count(name) == 1:
-                called.setdefault(name, i)
-        parts = [selection] if selection in called else map(str.strip, selection.split(","))
-        places = [called[one_of(part, f"{path}: the {kind}", tuple(called))] for part in parts]
-        items = {i: items[i] for i in places}
-    if keys[0] in _STAND:
-        items = {i: support for i, support in items.items() if support.pedestal}
-        if not items:
-            raise ValueError(f"{path}: the {kind} stands on no pedestal")
-    return items
-
-
-def _numbers(item: Any) -> dict[str, FloatArray]:  # noqa: ANN401
-    """Numbers of an item by key, each of shape (n,): rows of a table, elements of the shaft, or one."""
-    if not isinstance(item, Support):
-        keys = _DISC if isinstance(item, Disc) else _MATERIAL
-        return {name: np.atleast_1d(getattr(item, name)) for name in keys}
-    table = np.moveaxis(np.array(item.at(item.speeds or (0.0,))), 1, -1)
-    numbers = dict(zip(_TABLED, table.reshape(8, -1), strict=True))
-    numbers["tilting_stiffness"] = np.array([item.tilting_stiffness])
-    if stand := item.pedestal:
-        values = (stand.mass, *stand.xy("stiffness"), *stand.xy("damping"))
-        numbers |= zip(_STAND, np.reshape(values, (5, 1)), strict=True)
+def _numbers(rotor: Rotor) -> _Numbers:
+    numbers = {("material", 0): {key: getattr(rotor, key) for key in _MATERIAL}}
+    for i, disc in enumerate(rotor.discs):
+        numbers["disc", i] = {key: getattr(disc, key) for key in _DISC}
+    for i, support in enumerate(rotor.supports):
+        values = [*np.moveaxis(support.table, 1, -1).reshape(8, -1), support.tilting_stiffness]
+        if stand := support.pedestal:
+            values += [stand.mass, *stand.xy("stiffness"), *stand.xy("damping")]
+        numbers[support.kind, i] = dict(zip(_SUPPORT, values, strict=False))
     return numbers
-
-
-def _single(path: str, key: str, numbers: Mapping[str, FloatArray]) -> float:
-    """The one value of a number; refused where no plain value can stand for it."""
-    values = numbers[key]
-    if key in _TABLED and values.size > 1:
-        raise ValueError(f"{path} is a table: {path}.scale")
-    if np.ptp(values):
-        raise ValueError(f"{path} differs along the shaft: {path}.scale")
-    return float(values[0])
-
-
-def _changed(
-    numbers: dict[str, FloatArray], changes: Sequence[tuple[_Parameter, float]]
-) -> dict[str, FloatArray]:
-    """Numbers of an item with values set, then scaled, then added to."""
-    given: set[str] = set()
-    for parameter, value in sorted(changes, key=lambda change: _SUFFIXES.index(change[0].suffix)):
-        for key in parameter.keys:
-            if parameter.suffix == "scale":
-                numbers[key] = numbers[key] * value
-            elif parameter.suffix == "offset":
-                numbers[key] = numbers[key] + value
-            elif key in given:
-                raise ValueError(f"{parameter.path}: another parameter has this number, too")
-            else:
-                _single(parameter.path, key, numbers)
-                numbers[key] = np.full_like(numbers[key], value)
-                given.add(key)
-    return numbers
-
-
-def _support(support: Support, numbers: Mapping[str, FloatArray]) -> Support:
-    """The support with these numbers."""
-    table = np.moveaxis(np.reshape([numbers[key] for key in _TABLED], (2, 2, 2, -1)), -1, 1)
-    stiffness, damping = table if support.speeds else table[:, 0]
-    stand = support.pedestal
-    if stand:
-        mass, kx, ky, cx, cy = (numbers[key][0] for key in _STAND)
-        stand = Pedestal(mass, (kx, ky), (cx, cy))
-    tilting = numbers["tilting_stiffness"][0]
-    return replace(support, stiffness=stiffness, damping=damping, pedestal=stand, tilting_stiffness=tilting)
 
 
 def spread(rotor: Rotor, evaluate: Callable[[Rotor], AnyArray]) -> FloatArray:
@@ -370,12 +314,11 @@ def spread(rotor: Rotor, evaluate: Callable[[Rotor], AnyArray]) -> FloatArray:
     """
     if rotor.calibration is None:
         raise ValueError("the rotor has no calibration")
-    paths, middle = rotor.calibration.names, np.asarray(evaluate(rotor))
+    paths, middle = rotor.calibration.names, evaluate(rotor)
     variance = np.zeros(middle.shape)
     for column in np.sqrt(3.0) * rotor.calibration.columns().T:
         up, down = (
-            np.asarray(evaluate(with_changes(rotor, dict(zip(paths, step, strict=True)))))
-            for step in (column, -column)
+            evaluate(with_changes(rotor, dict(zip(paths, step, strict=True)))) for step in (column, -column)
         )
         if not up.shape == down.shape == middle.shape:
             raise ValueError("their number changes")
@@ -386,7 +329,7 @@ def spread(rotor: Rotor, evaluate: Callable[[Rotor], AnyArray]) -> FloatArray:
 def band(
     rotor: Rotor, what: str, evaluate: Callable[[Rotor], AnyArray]
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
-    """`spread`, or None without a calibration and where it cannot be given, and what is to be said.
+    """`spread`, or None without a calibration and where it cannot be given, and a warning.
 
     Parameters
     ----------
@@ -401,26 +344,17 @@ def band(
         std = spread(rotor, evaluate)
     except ValueError as error:
         return None, (f"no error bands of {what}: within the errors of the calibration, {error}",)
-    sentences = []
     if rotor.calibration.needs_trial_run:
-        sentences.append("the readings of the calibration contradict the model: its errors exceed the bands")
-    rough = np.count_nonzero(std > 0.15 * np.abs(evaluate(rotor)))  # no longer linear nor symmetric
-    if rough:
-        sentences.append(
-            f"{rough} of {std.size} error bands of {what} are wider than ±30 % and rough: a "
-            "resonance that moves with the parameters is not linear in them"
-        )
-    return std, tuple(sentences)
+        return std, ("the readings of the calibration contradict the model: its errors exceed the bands",)
+    return std, ()
 
 
 def nearest_modes(middle: FloatArray, other: FloatArray) -> FloatArray:
     """Frequencies of modes over speed, shape (S, n), in the order of those that they are nearest to.
 
-    Two modes that exchange their numbers with the parameters keep them so. As they are if n differs.
+    Two modes that exchange their numbers with the parameters keep them so.
     """
     from scipy.optimize import linear_sum_assignment
 
-    if other.shape != middle.shape:
-        return other
     apart = np.nan_to_num(middle[:, :, None] - other[:, None, :]) ** 2
     return np.asarray(other[:, linear_sum_assignment(apart.sum(axis=0))[1]])

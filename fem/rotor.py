@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -112,15 +112,14 @@ class Disc:
         >>> round(disc.mass, 3), round(disc.polar_inertia, 4), round(disc.diametral_inertia, 4)
         (32.548, 0.3291, 0.1779)
         """
-        what = f"disc{f' {name!r}' if name else ''} at node {node}"
-        w = number(width, f"{what}: width")
-        D = number(outer_diameter, f"{what}: outer_diameter")
-        d = number(inner_diameter, f"{what}: inner_diameter")
-        if d >= D:
-            raise ValueError(f"{what}: the inner diameter, {d} m, must be smaller than the outer, {D} m")
-        mass = number(density, f"{what}: density") * w * math.pi / 4 * (D * D - d * d)
+        D, d = outer_diameter, inner_diameter
+        if not 0 <= d < D:
+            raise ValueError(
+                f"disc at node {node}: the inner diameter, {d} m, must be smaller than the outer"
+            )
+        mass = density * width * math.pi / 4 * (D * D - d * d)
         polar = mass * (D * D + d * d) / 8
-        return cls(node, mass, polar, polar / 2 + mass * w * w / 12, name)
+        return cls(node, mass, polar, polar / 2 + mass * width * width / 12, name)
 
 
 @dataclass(frozen=True)
@@ -149,19 +148,15 @@ class Pedestal:
     def __post_init__(self) -> None:
         check_numbers(self, "pedestal")
         for name in ("stiffness", "damping"):
-            object.__setattr__(self, name, _pair(getattr(self, name), f"pedestal: {name}"))
+            value = _canonical(getattr(self, name), np.ones(2), f"pedestal: {name}")
+            object.__setattr__(self, name, value)
         if min(self.xy("stiffness")) <= 0:
             raise ValueError("pedestal: stiffness must be above 0 in x and y; leave out a rigid pedestal")
 
-    def xy(self, name: Literal["stiffness", "damping"]) -> tuple[float, float]:
+    def xy(self, name: str) -> tuple[float, float]:
         """Stiffness or damping in x and in y."""
         value = getattr(self, name)
         return value if isinstance(value, tuple) else (value, value)
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether both directions are equal."""
-        return not isinstance(self.stiffness, tuple) and not isinstance(self.damping, tuple)
 
 
 @dataclass(frozen=True)
@@ -211,12 +206,19 @@ class Support:
         what = attachment(self)
         check_numbers(self, what)
         signed = find(KINDS, self.kind, f"{what}: kind").function < 0
-        if not isinstance(self.pedestal, Pedestal | None):
-            raise ValueError(f"{what}: pedestal must be a Pedestal, not {self.pedestal!r}")
-        object.__setattr__(self, "speeds", _table_speeds(self.speeds, what))
+        speeds = tuple(map(float, self.speeds))
+        if speeds and not (0 <= speeds[0] < speeds[-1] < math.inf and (np.diff(speeds) > 0).all()):
+            raise ValueError(f"{what}: speeds must be at least two, not negative and ascending, in rad/s")
+        object.__setattr__(self, "speeds", speeds)
+        n = max(1, len(speeds))
         for name in ("stiffness", "damping"):
-            value = _coefficients(getattr(self, name), len(self.speeds), f"{what}: {name}", signed)
-            object.__setattr__(self, name, value)
+            value, its = getattr(self, name), f"{what}: {name}"
+            if not speeds or np.isscalar(value) or any(np.ndim(row) == 1 for row in value):
+                value = [value] * n
+            if len(value) != n:
+                raise ValueError(f"{its} has {len(value)} values for {n} speeds")
+            values = tuple(_canonical(entry, np.eye(2), its, signed) for entry in value)
+            object.__setattr__(self, name, values if speeds else values[0])
 
     @property
     def constant(self) -> bool:
@@ -226,26 +228,25 @@ class Support:
     @property
     def symmetric(self) -> bool:
         """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
-        turned = self._table[..., ::-1, ::-1] * ((1, -1), (-1, 1))
-        return np.array_equal(self._table, turned) and (self.pedestal is None or self.pedestal.symmetric)
+        turned = self.table[..., ::-1, ::-1] * ((1, -1), (-1, 1))
+        stand = self.pedestal
+        alike = stand is None or {type(stand.stiffness), type(stand.damping)} == {float}
+        return alike and np.array_equal(self.table, turned)
 
     @property
     def plain(self) -> bool:
         """Whether one stiffness and one damping are all: isotropic, constant, on the ground."""
-        numbers = isinstance(self.stiffness, float) and isinstance(self.damping, float)
-        return numbers and self.pedestal is None
+        return {type(self.stiffness), type(self.damping)} == {float} and self.pedestal is None
 
     @property
     def coupled(self) -> bool:
         """Whether any stiffness or damping couples x and y."""
-        return bool(self._table[..., (0, 1), (1, 0)].any())
+        return bool(self.table[..., (0, 1), (1, 0)].any())
 
     @property
     def damped(self) -> bool:
         """Whether it has any damping, that of the pedestal included."""
-        return bool(self._table[1].any()) or (
-            self.pedestal is not None and max(self.pedestal.xy("damping")) > 0
-        )
+        return bool(self.table[1].any() or (self.pedestal and any(self.pedestal.xy("damping"))))
 
     def at(self, omega: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Stiffness and damping matrices at speeds in rad/s, each of shape (…, 2, 2), without the pedestal.
@@ -257,20 +258,19 @@ class Support:
         """
         omega = np.asarray(omega, dtype=float)
         if self.constant:
-            k, c = (np.broadcast_to(matrix, (*omega.shape, 2, 2)) for matrix in self._table[:, 0])
+            k, c = self.table[:, np.zeros(omega.shape, dtype=int)]
             return k, c
-        first, last = self.speeds[0], self.speeds[-1]
-        low, high = omega.min(initial=last), omega.max(initial=first)
-        if not (low >= first - ROUNDED * last and high <= last + ROUNDED * last):
+        speeds = np.array(self.speeds)
+        first, last = speeds[[0, -1]]
+        near = np.clip(omega, first, last)
+        outside = omega[~(np.abs(omega - near) <= ROUNDED * last)]
+        if outside.size:
             raise ValueError(
                 f"{attachment(self)}: its table holds {first:.6g} to {last:.6g} rad/s, not "
-                f"{high if high > last else low:.6g} rad/s; it is not extrapolated, extend the table or stay "
-                "inside"
+                f"{outside[0]:.6g} rad/s; it is not extrapolated"
             )
-        place = np.interp(omega, self.speeds, np.arange(len(self.speeds)))
-        below = np.floor(place).astype(int)
-        share = (place - below)[..., None, None]
-        k, c = (1 - share) * self._table[:, below] + share * self._table[:, np.ceil(place).astype(int)]
+        hats = np.array([np.interp(near, speeds, row) for row in np.eye(speeds.size)])
+        k, c = np.einsum("n...,knij->k...ij", hats, self.table)
         return k, c
 
     def dynamic_stiffness(self, omega: ArrayLike, speed: ArrayLike | None = None) -> ComplexArray:
@@ -291,72 +291,36 @@ class Support:
         k, c = self.at(omega if speed is None else speed)
         w = np.asarray(omega, dtype=float)[..., None, None]
         bearing = k + 1j * w * c
-        if self.pedestal is None:
+        stand = self.pedestal
+        if stand is None:
             return bearing, None
-        k, c = np.diag(self.pedestal.xy("stiffness")), np.diag(self.pedestal.xy("damping"))
-        return bearing, k - w * w * self.pedestal.mass * np.eye(2) + 1j * w * c
+        k, c = np.diag(stand.xy("stiffness")), np.diag(stand.xy("damping"))
+        return bearing, k - w * w * stand.mass * np.eye(2) + 1j * w * c
 
     @cached_property
-    def _table(self) -> FloatArray:
+    def table(self) -> FloatArray:
         """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
-        both = (self.stiffness, self.damping) if self.speeds else ([self.stiffness], [self.damping])
-        return np.array(
-            [[v if isinstance(v, tuple) else ((v, 0.0), (0.0, v)) for v in rows] for rows in both]
+        rows = (*self.stiffness, *self.damping) if self.speeds else (self.stiffness, self.damping)
+        matrices = [row if isinstance(row, tuple) else row * np.eye(2) for row in rows]
+        return np.reshape(matrices, (2, -1, 2, 2))
+
+
+def _canonical(value: Any, isotropic: FloatArray, what: str, signed: bool = False) -> Any:  # noqa: ANN401
+    """A number where it is the same in all directions, else tuples, in the shape of what is isotropic."""
+    array = np.array(value, dtype=float) + 0.0  # no negative zero
+    if not array.ndim:
+        array = np.where(isotropic, array, 0.0)
+    if array.shape != isotropic.shape:
+        raise ValueError(f"{what} must be a number or of the shape {isotropic.shape}, not {value!r}")
+    right = np.isfinite(array) & (signed | (array >= 0) | (isotropic == 0))
+    if not right.all():
+        raise ValueError(
+            f"{what} must be finite{'' if signed else ' and not negative'}, not {array[~right][0]}"
         )
-
-
-def _shape(value: Any) -> tuple[int, ...] | None:  # noqa: ANN401
-    """Of an array-like; None: entries of different shape, as of a table of numbers and matrices."""
-    try:
-        return tuple(np.shape(value))
-    except ValueError:
-        return None
-
-
-def _pair(value: Any, what: str) -> Pair:  # noqa: ANN401
-    """In canonical form: a number where both directions are equal."""
-    if _shape(value) == ():
-        return number(value, what)
-    if _shape(value) != (2,):
-        raise ValueError(f"{what} must be a number or a pair (x, y), not {value!r}")
-    x, y = number(value[0], f"{what} in x"), number(value[1], f"{what} in y")
-    return x if x == y else (x, y)
-
-
-def _table_speeds(speeds: Iterable[float], what: str) -> tuple[float, ...]:
-    try:
-        values = tuple(map(float, speeds))
-    except (TypeError, ValueError):
-        raise ValueError(f"{what}: speeds must be a list of numbers in rad/s, not {speeds!r}") from None
-    ascending = len(values) > 1 and (np.diff(values) > 0).all()
-    if values and not (ascending and values[0] >= 0 and values[-1] < math.inf):
-        raise ValueError(f"{what}: speeds must be at least two, not negative and ascending, in rad/s")
-    return values
-
-
-def _coefficients(value: Any, n: int, what: str, signed: bool) -> object:  # noqa: ANN401
-    """One coefficient, or n of them for a table."""
-    if not n or _shape(value) in ((), (2, 2)):
-        one = _coefficient(value, what, signed)
-        return (one,) * n if n else one
-    if len(value) != n:
-        raise ValueError(f"{what} has {len(value)} values for {n} speeds; give one for each speed, or one")
-    return tuple(_coefficient(entry, f"{what} {i}", signed) for i, entry in enumerate(value, start=1))
-
-
-def _coefficient(value: Any, what: str, signed: bool) -> Coefficient:  # noqa: ANN401
-    """In canonical form: a number where it is isotropic."""
-    shape = _shape(value)
-    if shape == ():
-        return number(value, what, signed=signed)
-    if shape != (2, 2):
-        raise ValueError(f"{what} must be a number or 2 × 2, ((xx, xy), (yx, yy)), not {value!r}")
-    xx, xy, yx, yy = (
-        number(value[i][j], f"{what} {'xy'[i]}{'xy'[j]}", signed=signed or i != j)
-        for i in (0, 1)
-        for j in (0, 1)
-    )
-    return xx if xx == yy and xy == yx == 0 else ((xx, xy), (yx, yy))
+    first = float(array.flat[0])
+    if np.array_equal(array, first * isotropic):
+        return first
+    return tuple(tuple(row) if isinstance(row, list) else row for row in array.tolist())
 
 
 @dataclass(frozen=True)
@@ -376,13 +340,6 @@ class Model:
     shear: bool = False
     rotary_inertia: bool = False
     gyroscopic: bool = False
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            if not isinstance(getattr(self, item.name), bool):
-                raise ValueError(
-                    f"model: {item.name} must be True or False, not {getattr(self, item.name)!r}"
-                )
 
 
 def is_reading(path: str) -> bool:
@@ -428,9 +385,9 @@ class Calibration:
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
-    speeds: FloatArray = field(default_factory=lambda: np.zeros(0))
+    speeds: FloatArray = ()  # type: ignore[assignment]
     sensors: tuple[str, ...] = ()
-    lack_of_fit: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    lack_of_fit: FloatArray = ()  # type: ignore[assignment]
     needs_trial_run: bool = False
     data: Mapping[str, str] = field(default_factory=dict)
 
@@ -441,29 +398,31 @@ class Calibration:
             if len({*labels}) < len(labels):
                 raise ValueError(f"calibration: one of its {name} comes twice")
         n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
-        shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
-        for name, shape in shapes.items():
+        for name, shape in {
+            "values": (n,),
+            "covariance": (n, n),
+            "speeds": (S,),
+            "lack_of_fit": (S, C),
+        }.items():
             array = np.array(getattr(self, name), dtype=float)
-            if array.shape != shape and (array.size or np.prod(shape)):
-                raise ValueError(f"calibration: {name} must have the shape {shape}, not {array.shape}")
-            lowest = 0.0 if name in ("speeds", "lack_of_fit") else -np.inf
-            if not (np.isfinite(array) & (array >= lowest)).all():
-                raise ValueError(f"calibration: {name} must be finite, speeds and lack of fit not negative")
+            if (array.size and array.shape != shape) or not np.isfinite(array).all():
+                raise ValueError(f"calibration: {name} must be finite and of the shape {shape}")
             array = array.reshape(shape)
             read_only(array)
             object.__setattr__(self, name, array)
-        object.__setattr__(self, "data", dict(self.data))
         R = self.correlation
         if not np.allclose(R, R.T, rtol=0.0, atol=1e-9):
             raise ValueError("calibration: the covariance must be symmetric")
-        if (np.linalg.eigvalsh(R) < -1e-9).any():
-            raise ValueError("calibration: the covariance must not be negative in any direction")
+        if (np.linalg.eigvalsh(R) < -1e-9).any() or (self.lack_of_fit < 0).any():
+            raise ValueError(
+                "calibration: lack_of_fit not negative, covariance must not be negative in any direction"
+            )
 
     @property
     def readings(self) -> dict[str, float]:
         """Those of the parameters that are no numbers of a rotor: angles in degrees, and gains."""
-        pairs = zip(self.names, self.values.tolist(), strict=True)
-        return {name: value for name, value in pairs if is_reading(name)}
+        values = dict(zip(self.names, self.values.tolist(), strict=True))
+        return {name: values[name] for name in filter(is_reading, values)}
 
     @property
     def std(self) -> FloatArray:
@@ -490,12 +449,12 @@ class Calibration:
 
         That of the nearest speed; of a sensor that was not compared the largest of all; 0 where nothing was.
         """
-        omega = np.atleast_1d(np.asarray(speeds, dtype=float))
+        omega = np.atleast_1d(speeds)
         if not self.lack_of_fit.size:
             return np.zeros((omega.size, len(sensors)))
-        rows = self.lack_of_fit[np.abs(omega[:, None] - self.speeds).argmin(axis=1)]
-        rows = np.column_stack((rows, rows.max(axis=1)))
-        return rows[:, [self.sensors.index(c) if c in self.sensors else -1 for c in sensors]]
+        lack = np.column_stack((self.lack_of_fit, self.lack_of_fit.max(axis=1)))
+        columns = [self.sensors.index(c) if c in self.sensors else -1 for c in sensors]
+        return np.asarray(lack[np.abs(omega[:, None] - self.speeds).argmin(axis=1)][:, columns])
 
 
 @dataclass(frozen=True, eq=False)
@@ -537,30 +496,45 @@ class Rotor:
 
     length: FloatArray
     outer_diameter: FloatArray
-    inner_diameter: FloatArray = field(default_factory=lambda: np.array(0.0))
-    youngs_modulus: FloatArray = field(default_factory=lambda: np.array(STEEL_MODULUS))
-    density: FloatArray = field(default_factory=lambda: np.array(STEEL_DENSITY))
+    inner_diameter: FloatArray = 0.0  # type: ignore[assignment]
+    youngs_modulus: FloatArray = STEEL_MODULUS  # type: ignore[assignment]
+    density: FloatArray = STEEL_DENSITY  # type: ignore[assignment]
     discs: Sequence[Disc] = ()
     supports: Sequence[Support] = ()
     stations: Mapping[str, int] = field(default_factory=dict)
-    poisson_ratio: FloatArray = field(default_factory=lambda: np.array(STEEL_POISSON))
-    material_damping: FloatArray = field(default_factory=lambda: np.array(0.0))
+    poisson_ratio: FloatArray = STEEL_POISSON  # type: ignore[assignment]
+    material_damping: FloatArray = 0.0  # type: ignore[assignment]
     model: Model = Model()
     forces: Sequence[NodeForce] = ()
     calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
-        for name, array in _per_element(self).items():
+        n = max(1, *(np.size(getattr(self, name)) for name in PER_ELEMENT))
+        for name, (low, high, limit) in PER_ELEMENT.items():
+            array = np.empty(n)
+            try:
+                array[:] = getattr(self, name)
+            except (TypeError, ValueError):
+                raise ValueError(f"{name} must be a number, or one for each of {n} elements") from None
+            _every((array >= low) & (array <= high) & np.isfinite(array), name, array, f"finite and {limit}")
+            read_only(array)
             object.__setattr__(self, name, array)
-        kinds: tuple[type[Any], ...] = (Disc, Support, NodeForce)
-        for name, kind in zip(("discs", "supports", "forces"), kinds, strict=True):
-            object.__setattr__(self, name, _attached(getattr(self, name), kind, name[:-1], self.n_nodes))
+        least = f"1/{SHORTEST} of its longer neighbour's at least, for float64 (join the two)"
+        _every(~too_short(self.length), "length", self.length, least)
+        thinner = self.inner_diameter < self.outer_diameter
+        _every(thinner, "inner_diameter", self.inner_diameter, "smaller than outer_diameter")
+        for name, kind in (("discs", Disc), ("supports", Support), ("forces", NodeForce)):
+            items = tuple(getattr(self, name))
+            for i, item in enumerate(items, start=1):
+                if not isinstance(item, kind):
+                    raise ValueError(f"{name[:-1]} {i} must be a {kind.__name__}, not {item!r}")
+                self._node(item.node, f"{name[:-1]} {i}: ")
+            object.__setattr__(self, name, items)
         object.__setattr__(self, "forces", tuple(sorted(self.forces, key=code_of)))
-        object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
-        if not isinstance(self.model, Model):
-            raise ValueError(f"model must be a Model, not {self.model!r}")
-        if not isinstance(self.calibration, Calibration | None):
-            raise ValueError(f"calibration must be a Calibration, not {self.calibration!r}")
+        stations = {
+            str(name): self._node(node, f"station {name!r}: ") for name, node in self.stations.items()
+        }
+        object.__setattr__(self, "stations", MappingProxyType(stations))
 
     __hash__ = None  # type: ignore[assignment]  # compared by value, and arrays have no hash
 
@@ -600,9 +574,12 @@ class Rotor:
                     f"give one of these or a node number from 1 to {self.n_nodes}"
                 )
             name_or_number = int(name_or_number)
-        node = whole(name_or_number, "a node number")
+        return self._node(name_or_number)
+
+    def _node(self, number: int, of: str = "") -> int:
+        node = whole(number, f"{of}a node number")
         if not 1 <= node <= self.n_nodes:
-            raise ValueError(f"node {node} does not exist: the rotor has nodes 1 to {self.n_nodes}")
+            raise ValueError(f"{of}node {node} does not exist: the rotor has nodes 1 to {self.n_nodes}")
         return node
 
     @property
@@ -618,7 +595,7 @@ class Rotor:
     @property
     def positions(self) -> FloatArray:
         """Axial position of each node from the left end, m, shape (n + 1,)."""
-        return np.concatenate(([0.0], np.cumsum(self.length)))
+        return np.append(0.0, np.cumsum(self.length))
 
     @property
     def area(self) -> FloatArray:
@@ -628,8 +605,7 @@ class Rotor:
     @property
     def second_moment(self) -> FloatArray:
         """Second moment of area of each element about a diameter, m⁴, shape (n,)."""
-        outer, inner = self.outer_diameter**2, self.inner_diameter**2
-        return np.asarray(math.pi / 64 * (outer - inner) * (outer + inner))
+        return np.asarray(self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16)
 
     @property
     def shear_modulus(self) -> FloatArray:
@@ -670,92 +646,35 @@ class Rotor:
     @property
     def total_mass(self) -> float:
         """Mass of shaft and discs, kg."""
-        shaft = float(np.sum(self.density * self.area * self.length))
-        return shaft + math.fsum(disc.mass for disc in self.discs)
+        shaft = self.density * self.area @ self.length
+        return float(shaft) + sum(disc.mass for disc in self.discs)
 
 
-_FROM_ZERO = ("inner_diameter", "density", "material_damping")
-PER_ELEMENT = ("length", "outer_diameter", "youngs_modulus", "poisson_ratio", *_FROM_ZERO)
+_ABOVE_ZERO = math.ulp(0.0), math.inf, "greater than zero"
+_FROM_ZERO = 0.0, math.inf, "not negative"
+PER_ELEMENT = {
+    "length": _ABOVE_ZERO,
+    "outer_diameter": _ABOVE_ZERO,
+    "youngs_modulus": _ABOVE_ZERO,
+    "poisson_ratio": (math.nextafter(-1, 0), 0.5, "above -1, at most 0.5"),
+    "inner_diameter": _FROM_ZERO,
+    "density": _FROM_ZERO,
+    "material_damping": _FROM_ZERO,
+}
+"""What is given for each element: its limits, and their words."""
 
 
 def too_short(length: FloatArray) -> BoolArray:
     """Which elements are too short beside their longer neighbour, from lengths of shape (n,)."""
-    beside = np.concatenate(([0.0], length, [0.0]))
+    beside = np.pad(length, 1)
     return np.asarray(SHORTEST * length < np.maximum(beside[:-2], beside[2:]))
 
 
-def _per_element(rotor: Rotor) -> dict[str, FloatArray]:
-    """Checked, read-only copies, of one length, of what was given for each element."""
-    arrays = {}
-    for name in PER_ELEMENT:
-        try:
-            arrays[name] = np.array(getattr(rotor, name), dtype=float, ndmin=1)
-        except (TypeError, ValueError):
-            raise ValueError(f"{name} must be a number or one number per element") from None
-        if (shape := arrays[name].shape)[1:]:
-            raise ValueError(f"{name} must be one number per element, not an array of shape {shape}")
-    n = max(array.size for array in arrays.values())
-    for name, array in arrays.items():
-        if array.size not in (1, n) or not n:
-            raise ValueError(f"{name} has {array.size} values for {n} elements; give one value, or {n}")
-        if name == "poisson_ratio":
-            right, limit = (array > -1) & (array <= 0.5), "above -1, at most 0.5"
-        elif name in _FROM_ZERO:
-            right, limit = array >= 0, "not negative"
-        else:
-            right, limit = array > 0, "greater than zero"
-        right &= np.isfinite(array)
-        _all(right, lambda i: f"{name} must be finite and {limit}, not {array[i]}")  # noqa: B023  at once
-        arrays[name] = np.resize(array, n)
-    read_only(*arrays.values())
-    length, outer, inner = (arrays[name] for name in ("length", "outer_diameter", "inner_diameter"))
-    _all(
-        ~too_short(length),
-        lambda i: (
-            f"its length, {length[i]:g} m, is less than 1/{SHORTEST} of its longer neighbour's, too "
-            "short for float64; join it with this neighbour"
-        ),
-    )
-    _all(
-        inner < outer,
-        lambda i: f"the inner diameter, {inner[i]} m, must be smaller than the outer, {outer[i]} m",
-    )
-    return arrays
-
-
-def _all(right: BoolArray, wrong: Callable[[int], str]) -> None:
+def _every(right: BoolArray, name: str, values: FloatArray, limit: str) -> None:
     """Refuse the first element that is not right."""
     if not right.all():
         i = int(np.argmin(right))
-        raise ValueError(f"element {i + 1}: {wrong(i)}")
-
-
-def _attached(
-    items: Iterable[Any], kind: type[NodeForce | Disc | Support], what: str, n_nodes: int
-) -> tuple[Any, ...]:
-    try:
-        attached = tuple(items)
-    except TypeError:
-        raise ValueError(f"{what}s must be a list of {kind.__name__} objects, not {items!r}") from None
-    for i, item in enumerate(attached, start=1):
-        if not isinstance(item, kind):
-            raise ValueError(f"{what} {i} must be a {kind.__name__}, not {item!r}")
-        if item.node > n_nodes:
-            raise ValueError(
-                f"{what} {i} stands at node {item.node}, but the rotor has nodes 1 to {n_nodes} only"
-            )
-    return attached
-
-
-def _stations(stations: Mapping[str, int], n_nodes: int) -> Mapping[str, int]:
-    checked = {}
-    for name, node in dict(stations).items():
-        checked[str(name)] = whole(node, f"the node of station {name!r}")
-        if not 1 <= checked[str(name)] <= n_nodes:
-            raise ValueError(
-                f"station {name!r} stands at node {node}, but the rotor has nodes 1 to {n_nodes}"
-            )
-    return MappingProxyType(checked)
+        raise ValueError(f"element {i + 1}: {name} must be {limit}, not {values[i]}")
 
 
 def refined(rotor: Rotor, times: int) -> Rotor:
@@ -771,18 +690,17 @@ def refined(rotor: Rotor, times: int) -> Rotor:
     Raises
     ------
     ValueError
-        If `times` is no whole number from 1.
+        If `times` is below 1.
     """
-    times = whole(times, "the number of parts")
-    if times < 1:
-        raise ValueError(f"the number of parts must be at least 1, not {times}")
+
+    def moved(node: int) -> int:
+        return times * (node - 1) + 1
 
     new: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
     new["length"] /= times
     for name in ("discs", "supports", "forces"):
-        new[name] = [replace(item, node=times * (item.node - 1) + 1) for item in getattr(rotor, name)]
-    stations = {name: times * (node - 1) + 1 for name, node in rotor.stations.items()}
-    return replace(rotor, **new, stations=stations)
+        new[name] = [replace(item, node=moved(item.node)) for item in getattr(rotor, name)]
+    return replace(rotor, **new, stations={name: moved(node) for name, node in rotor.stations.items()})
 
 
 @dataclass(frozen=True)
@@ -806,8 +724,8 @@ class Sensor:
     angle: float = 0.0
 
     def __post_init__(self) -> None:
-        what = f"sensor at {self.node!r}: angle"
-        object.__setattr__(self, "angle", number(self.angle, what, signed=True))
+        angle = number(self.angle, f"sensor at {self.node!r}: angle", signed=True)
+        object.__setattr__(self, "angle", angle)
 
     def __str__(self) -> str:
         return f"{self.node} at {self.angle:g}°" if self.angle else str(self.node)
@@ -832,7 +750,7 @@ def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
     if isinstance(sensor, tuple) and len(sensor) != 2:
         raise ValueError(f"a sensor is a node or a pair (node, angle in degrees), not {sensor!r}")
     if not isinstance(sensor, Sensor):
-        sensor = Sensor(*sensor) if isinstance(sensor, tuple) else Sensor(sensor)
+        sensor = Sensor(*(sensor if isinstance(sensor, tuple) else (sensor,)))
     rotor.node(sensor.node)
     return sensor
 

@@ -77,5 +77,5 @@ def test_cutting_elements_moves_everything_along():
     assert finer.model == rotor.model
     assert finer.total_mass == pytest.approx(rotor.total_mass, rel=1e-14)
     assert fem.refined(rotor, 1) == rotor
-    with pytest.raises(ValueError, match="must be at least 1, not 0"):
+    with pytest.raises(ValueError, match="one for each of 1 elements"):
         fem.refined(rotor, 0)

