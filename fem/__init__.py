@@ -71,7 +71,15 @@ from fem.rotor import (
     too_short,
 )
 from fem.speed_map import SpeedMap, speed_map
-from fem.stability import Stability, Window, judge, range_of_speeds, runs_away, stability_threshold, threshold_of
+from fem.stability import (
+    Stability,
+    Window,
+    judge,
+    range_of_speeds,
+    runs_away,
+    stability_threshold,
+    threshold_of,
+)
 from fem.state_space import Motion, StateSpace, equations_of_motion, state_space
 from fem.static import GRAVITY, StaticDeflection, compliance, static_deflection
 from fem.undamped import (

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
-from fem.parameters import NORMAL_95
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -78,7 +77,7 @@ def draw_campbell(
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
     if campbell.std is not None:
-        half = NORMAL_95 * RPM * campbell.std
+        half = 1.96 * RPM * campbell.std
         shade_bands(ax, campbell.speeds * RPM, frequencies, half, cycle(COLORS))
     note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top", fontsize=11)
     if campbell.criticals:

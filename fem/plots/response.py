@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.orbits import DIRECTION_NAMES, orbits
-from fem.parameters import NORMAL_95
 from fem.peaks import smooth_curves
 from fem.plots.rotor import draw_rotor
 from fem.rotor import SensorLike, as_sensor, label
@@ -127,7 +126,7 @@ def bode_figure(
     _amplitudes(above, omega, 1e6 * Z, labels, "amplitude, µm peak", response.windows).set_xlabel("")
     _phases(below, omega, Z, labels, response.windows)
     if std is not None:
-        middle, half = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan), NORMAL_95 * 1e6 * std
+        middle, half = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan), 1.96 * 1e6 * std
         shade_bands(above, omega * RPM, middle, half, cycle(COLORS))
         above.set_ylim(top=np.nanmax(middle + half, initial=above.get_ylim()[1]))
     for k, each in enumerate(peaks):
