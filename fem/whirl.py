@@ -29,6 +29,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem.orbits import DIRECTION_NAMES, whirl_direction
@@ -94,6 +95,10 @@ class Whirl:
     real: tuple[FloatArray, ...]
     still: IndexArray
     error: float = 0.0
+
+    def at(self, *speeds: ArrayLike) -> Whirl:
+        """The same at other speeds, rad/s, in this basis."""
+        return solve(self.Q, np.hstack(speeds), self.values.shape[1], self.scale)
 
 
 def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
@@ -384,6 +389,17 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     real = whirl.real[0]
     warnings = missing_modes(real, int(whirl.still[0]), values.size, n)
     return WhirlModes(float(speeds[0]), values, x.T / size, y.T / size, real, whirl.error, rotor, warnings)
+
+
+def decrements_of(lam: ComplexArray) -> FloatArray:
+    """Logarithmic decrements; 0 of what neither grows nor decays, but for rounding."""
+    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+
+
+def whirling(Q: Reduced, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
+    lam, x, y = in_both_planes(values, Q.nodes(np.nan_to_num(vectors)))
+    return lam, np.where(np.isnan(lam), 0.0, whirl_direction(x, y))
 
 
 def in_both_planes(
