@@ -138,9 +138,8 @@ class Campbell(Result):
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
         errors = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
-        whole = self.tables()[0]
-        keys = [column.key.rpartition(".")[2] for column in whole.columns]
-        rows = [dict(zip(keys, row, strict=True)) for row in whole.rows]
+        criticals = self.tables()[0]
+        keys = [column.key.rpartition(".")[2] for column in criticals.columns]
         return plain(
             {
                 "speeds_rad_s": self.speeds,
@@ -149,7 +148,7 @@ class Campbell(Result):
                 "log_decrements": self.log_decrements.T,
                 "direction": _words(self.direction, self.frequencies).T,
                 "damped_critical_speeds_rad_s": self.critical_speeds,
-                "damped_critical_speeds": rows,
+                "damped_critical_speeds": [dict(zip(keys, row, strict=True)) for row in criticals.rows],
                 "damped_critical_speeds_cut": self.cut or None,
                 "unstable": [self._growing(window) for window in self.unstable],
                 "unstable_speeds": [window.to_dict() for window in self.windows],
@@ -405,7 +404,8 @@ def _chained(
     from scipy.optimize import linear_sum_assignment
 
     S, m = values.shape
-    states = np.concatenate((X, X * (values / np.abs(values))[..., None]), axis=2) / np.sqrt(2)
+    lam = np.nan_to_num(values, nan=1.0)[..., None]
+    states = np.concatenate((X, X * lam / np.abs(lam)), axis=2) / np.sqrt(2)
     mac = np.nan_to_num(np.abs(states[:-1].conj() @ states[1:].swapaxes(1, 2))) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
     mac = np.take_along_axis(mac, partner[:, None], axis=2)
@@ -435,10 +435,11 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     that are heavily damped at half of the speeds come last.
     """
     light, there = decrements_of(values) <= heavy, np.isfinite(values)
-    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    far = 1e9 * speeds[-1]
+    size = np.where(there, np.abs(values.imag), far)
     meets = [
         np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
-        for mode in np.where(light, size, 1e9 * speeds[-1]).T
+        for mode in np.where(light, size, far).T
     ]
     begins = there.argmax(axis=0)
     start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl

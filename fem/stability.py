@@ -117,15 +117,14 @@ class Window:
         cause = "the rotor runs away without oscillating; check negative stiffness"
         if self.mode is not None:
             cause = f"mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows"
-        return f"the steady response does not exist {self.where(speed_text)}: there {cause}"
+        last = f" up to the last speed, {speed_text(self.last)}" if self.begins and not self.ends else ""
+        return f"the steady response does not exist {self.where(speed_text)}{last}: there {cause}"
 
 
 def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:
     """Which speeds, shape (S,), lie in one of the windows."""
-    inside: BoolArray = np.zeros(speeds.shape, dtype=bool)
-    for window in windows:
-        inside |= (speeds >= window.first) & (speeds <= window.last)
-    return inside
+    inside = ((window.first <= speeds) & (speeds <= window.last) for window in windows)
+    return sum(inside, np.zeros(speeds.shape, dtype=bool))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -169,8 +168,8 @@ class Stability(Result):
     @property
     def whirl_ratio(self) -> float | None:
         """Whirl frequency by speed where stability is lost."""
-        speed = self.threshold if self.status == "threshold" else self.lowest
-        return self.frequency / speed if self.frequency is not None and speed else None
+        speed = self.threshold or self.lowest
+        return self.frequency / speed if self.frequency and speed else None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; unknown values are None."""
@@ -192,8 +191,8 @@ class Stability(Result):
 
     def tables(self) -> tuple[Table, ...]:
         """One row, all but the warnings."""
-        row = {key: value for key, value in self.to_dict().items() if key != "warnings"}
-        return (Table("stability", tuple(Column(key, (value,), key=key) for key, value in row.items())),)
+        *row, _ = self.to_dict().items()
+        return (Table("stability", tuple(Column(key, (value,), key=key) for key, value in row)),)
 
     def to_frame(self) -> pd.DataFrame:
         """The same as a DataFrame."""
@@ -239,8 +238,9 @@ def grid_of(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     """Speeds, ascending, and the knots of tables between them; over tables at least so many."""
     if rotor.constant:
         return speeds
-    knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
-    return np.unique(np.concatenate((speeds, knots, np.linspace(speeds[0], speeds[-1], _PARTS + 1))))
+    first, last = speeds[[0, -1]]
+    knots = np.clip(rotor.knots, first, last)
+    return np.unique(np.concatenate((speeds, knots, np.linspace(first, last, _PARTS + 1))))
 
 
 def covering(whirl: Whirl) -> Whirl:
@@ -290,10 +290,11 @@ def refuse_pushed(whirl: Whirl) -> None:
 
 def near_level(values: FloatArray, level: float) -> IndexArray:
     """Steps beside values that are the nearest to a level, where one more such step would pass it."""
-    near, crossed = -np.abs(values - level), np.diff(values > level)
-    before, here, after = near[:-2], near[1:-1], near[2:]
-    close = (here >= np.maximum(before, after)) & (2 * here > np.minimum(before, after))
-    k = np.flatnonzero(close & ~crossed[:-1] & ~crossed[1:])
+    gap = values - level
+    side = np.where(gap > 0, 1.0, -1.0)[1:-1]
+    before, after = side * (gap[:-2] - gap[1:-1]), side * (gap[2:] - gap[1:-1])
+    near = (np.minimum(before, after) >= 0) & (np.maximum(before, after) > side * gap[1:-1])
+    k = np.flatnonzero(near)
     return np.union1d(k, k + 1)
 
 

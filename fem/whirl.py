@@ -105,14 +105,13 @@ def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`."""
     D, K = Q.at(speeds)
     lam = _eigenvalues(Q.M, D, K, scale)
-    size, frequency = np.abs(lam), np.abs(lam.imag)
+    size = np.abs(lam)
     still = size < _STILL * scale
-    oscillates = ~still & (frequency > _REAL * size)
-    wanted = oscillates if Q.P.planes == 1 else oscillates & (lam.imag > 0)
-    key = np.where(wanted, frequency, np.inf)
-    rows, order = np.arange(len(lam))[:, None], np.argsort(key, axis=1, kind="stable")[:, :m]
-    missing = ~wanted[rows, order]
-    values = lam[rows, order]
+    oscillates = ~still & (np.abs(lam.imag) > _REAL * size)
+    modes = np.where(oscillates & ((lam.imag > 0) | (Q.P.planes == 1)), lam, NONE)
+    order = np.argsort(np.abs(modes.imag), axis=1, kind="stable")[:, :m]
+    values = np.take_along_axis(modes, order, axis=1)
+    missing = np.isnan(values)
     values[missing] = 1j * scale
     # Something of every unknown, so that no mode is left out, and apart for modes of one frequency.
     phases = np.outer(np.arange(1, m + 1), np.arange(Q.size) ** 1.5)
@@ -172,10 +171,8 @@ def _answers(
     M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, loads: ComplexArray
 ) -> ComplexArray:
     """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
-    terms = np.stack(np.broadcast_arrays(M, D, K), axis=1).reshape(len(D), 3, M.size)
-    lam = values * (1 + 1e-14)  # beside an eigenvalue: there the matrix is not singular to the last bit
-    powers = np.stack((lam * lam, lam, np.ones_like(lam)), axis=2)
-    dynamic = (powers @ terms).reshape(*lam.shape, *M.shape)
+    lam = values[..., None, None] * (1 + 1e-14)  # beside an eigenvalue, where the matrix is singular
+    dynamic = lam * (lam * M + D[:, None]) + K[:, None]
     return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads, dynamic.shape[:-1])[..., None])[..., 0])
 
 
@@ -304,7 +301,7 @@ class WhirlModes(Result):
     @property
     def log_decrements(self) -> FloatArray:
         """Logarithmic decrements −2π Re λ / |Im λ|, shape (n,); negative: unstable."""
-        return -2 * np.pi * self.eigenvalues.real / self.frequencies
+        return decrements_of(self.eigenvalues)
 
     @property
     def direction(self) -> FloatArray:
