@@ -11,7 +11,7 @@ step; where it slips to another mode the step is halved, too.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,13 +23,10 @@ from fem.parameters import nearest_modes
 from fem.rotor import Rotor, refined
 from fem.stability import (
     Window,
-    covering,
     grid_of,
-    holding,
     near_level,
-    refuse_pushed,
     root,
-    windows_of,
+    unstable_windows,
     within,
 )
 from fem.undamped import Result
@@ -256,13 +253,12 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     """
     speeds = checked_speeds(speeds, ascending=True)
     asked_for = checked_number(rotor, None) if n is None else whole(n, "the number of modes")
-    paths = _followed(
-        rotor, grid_of(rotor, speeds), checked_number(rotor, min(asked_for, available_modes(rotor))), heavy
-    )
+    n = checked_number(rotor, min(asked_for, available_modes(rotor)))
+    paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
     whirl, asked = paths.whirl, np.searchsorted(paths.speeds, speeds)
     if not paths.values.size:
         raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
-    refuse_pushed(whirl)
+    windows = unstable_windows(whirl, speeds)
     lam, direction = whirling(whirl.Q, paths.values[asked], paths.vectors[asked])
     crossings = [one for one in paths.crossings if decrements_of(one.value) <= _SWINGS]
     crossings.sort(key=lambda one: (float(f"{one.speed:.9e}"), one.mode))  # equal but for rounding: by mode
@@ -272,7 +268,6 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         np.array([one.vector for one in crossings]).reshape(-1, whirl.Q.size),
     )
     unstable, texts, decrements = [], [], decrements_of(lam)
-    windows = holding(windows_of(covering(whirl)), speeds)
     for window in windows:
         k = int(np.searchsorted(speeds, window.first))
         grows = np.flatnonzero(decrements[k] < 0)
@@ -281,7 +276,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
             unstable.append(replace(window, mode=int(mode) + 1))
             texts.append(unstable[-1].sentence())
         else:
-            texts.append(f"{window.sentence()} (not listed: ask for more modes)")
+            texts.append(window.sentence())
     result = Campbell(
         speeds=speeds,
         frequencies=lam.imag,
@@ -326,18 +321,17 @@ class _Paths:
     vectors: ComplexArray
     doubtful: BoolArray
     others: ComplexArray
-    crossings: tuple[_Crossing, ...] = ()
+    crossings: list[_Crossing] = field(default_factory=list)
 
-    def crossed(self) -> tuple[tuple[_Crossing, ...], list[int]]:
-        """Crossings of the 1× line, and steps in which a mode was lost."""
+    def cross(self) -> None:
+        """Find the crossings of the 1× line; where a mode was lost its step is doubtful."""
         f = off_synchronous(self.values, self.speeds)
-        steps = np.argwhere(((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])).tolist()
-        crossings = [self._crossing(k, mode, f[k : k + 2, mode]) for k, mode in steps]
-        lost = [k for (k, _), one in zip(steps, crossings, strict=True) if one is None]
-        return tuple(one for one in crossings if one), lost
+        changes = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
+        for k, mode in np.argwhere(changes).tolist():
+            self._cross(k, mode, f[k : k + 2, mode])
 
-    def _crossing(self, k: int, mode: int, f: FloatArray) -> _Crossing | None:
-        """The crossing of a mode in a step, followed from the nearer end; None if it was lost."""
+    def _cross(self, k: int, mode: int, f: FloatArray) -> None:
+        """The crossing of a mode in a step, followed from the nearer end."""
         near = [k + int(np.abs(f).argmin())]
         value, vector = self.values[near, mode], self.vectors[near, mode]
 
@@ -350,8 +344,10 @@ class _Paths:
             return float(abs(value[0].imag) - speed)
 
         speed = root(excess, self.speeds[k : k + 2], f)
-        lost = abs(excess(speed)) > _VANISHES * np.abs(f).max()
-        return None if lost else _Crossing(speed, mode, value[0], vector[0])
+        if abs(excess(speed)) > _VANISHES * np.abs(f).max():
+            self.doubtful[k, mode] = True
+        else:
+            self.crossings.append(_Crossing(speed, mode, value[0], vector[0]))
 
 
 def off_synchronous(lam: ComplexArray, speeds: FloatArray) -> FloatArray:
@@ -384,14 +380,12 @@ def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
     speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
     while True:
         paths = _chained(whirl, speeds, values, X, n, heavy)
-        crossings, lost = paths.crossed()
-        unclear = paths.doubtful.any(axis=1)
-        unclear[lost] = True
-        for gap in off_synchronous(paths.values, speeds).T:
-            unclear[near_level(np.nan_to_num(gap), 0.0)] = True
-        k = np.flatnonzero(unclear & (np.diff(speeds) > _NARROW * speeds[-1]))
+        paths.cross()
+        near = [near_level(np.nan_to_num(gap), 0.0) for gap in off_synchronous(paths.values, speeds).T]
+        k = np.unique(np.concatenate((np.flatnonzero(paths.doubtful.any(axis=1)), *near)))
+        k = k[np.diff(speeds)[k] > _NARROW * speeds[-1]]
         if not k.size or speeds.size > _DENSE * whirl.speeds.size:
-            return replace(paths, crossings=crossings)
+            return paths
         more = whirl.at((speeds[k] + speeds[k + 1]) / 2)
         speeds = np.insert(speeds, k + 1, more.speeds)
         values, X = np.insert(values, k + 1, more.values, 0), np.insert(X, k + 1, more.vectors, 0)
@@ -409,8 +403,8 @@ def _chained(
     mac = np.nan_to_num(np.abs(states[:-1].conj() @ states[1:].swapaxes(1, 2))) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
     mac = np.take_along_axis(mac, partner[:, None], axis=2)
-    best, others = mac.diagonal(axis1=1, axis2=2), mac * (1 - np.eye(m))
-    clear = (best >= _ALIKE) & (np.maximum(others.max(axis=1), others.max(axis=2)) <= _OTHER * best)
+    best, rivals = mac.diagonal(axis1=1, axis2=2), mac * (1 - np.eye(m))
+    clear = (best >= _ALIKE) & (np.maximum(rivals.max(axis=1), rivals.max(axis=2)) <= _OTHER * best)
     clear |= (best == 0) | ~(decrements_of(values[:-1]) <= heavy)
     labels, count = np.tile(np.arange(m), (S, 1)), m
     for k, mine in enumerate(partner):

@@ -279,15 +279,6 @@ def runs_away(whirl: Whirl) -> BoolArray:
     return _largest_real(whirl) > AWAY
 
 
-def refuse_pushed(whirl: Whirl) -> None:
-    """Raise ValueError where the rotor runs away without oscillating at every speed."""
-    if runs_away(whirl).all():
-        raise ValueError(
-            "the rotor on its supports is statically unstable at these speeds: a support has negative "
-            "stiffness; check its sign and size"
-        )
-
-
 def near_level(values: FloatArray, level: float) -> IndexArray:
     """Steps beside values that are the nearest to a level, where one more such step would pass it."""
     gap = values - level
@@ -359,9 +350,20 @@ def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     )
 
 
-def holding(windows: Iterable[Window], speeds: FloatArray) -> tuple[Window, ...]:
-    """Those that hold one of the speeds."""
-    return tuple(window for window in windows if within((window,), speeds).any())
+def unstable_windows(whirl: Whirl, asked: FloatArray) -> tuple[Window, ...]:
+    """Ranges of growth that hold one of the speeds asked for.
+
+    Raises
+    ------
+    ValueError
+        If the rotor is pushed aside by negative stiffness at every speed.
+    """
+    if runs_away(whirl).all():
+        raise ValueError(
+            "the rotor on its supports is statically unstable at these speeds: a support has negative "
+            "stiffness; check its sign and size"
+        )
+    return tuple(window for window in windows_of(covering(whirl)) if within((window,), asked).any())
 
 
 def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
@@ -391,8 +393,7 @@ def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[s
         whirl = covering(solve_whirl(both_planes(rotor), grid, checked_number(rotor, None)))
     except ValueError as problem:
         return (), (f"whether the rotor is stable at these speeds is not known: {problem}",)
-    refuse_pushed(whirl)
-    windows = holding(windows_of(whirl), asked)
+    windows = unstable_windows(whirl, asked)
     return windows, tuple(window.sentence() for window in windows)
 
 
