@@ -206,11 +206,11 @@ class Stability(Result):
         text = f"unstable already at {self.lowest:.6g} rad/s, where the search began"
         if self.threshold is not None:
             text = f"stable up to {speed_text(self.threshold)}"
-        if self.mode is None or self.frequency is None or self.direction is None:
+        if self.mode is None:
             return f"{text}; there the rotor runs away without oscillating"
         ratio = f", {self.whirl_ratio:.4g} × speed" if self.whirl_ratio else ""
         return (
-            f"{text}; there mode {self.mode} grows, {DIRECTION_NAMES[self.direction]} whirl at "
+            f"{text}; there mode {self.mode} grows, {self.to_dict()['direction']} whirl at "
             f"{self.frequency:.6g} rad/s{ratio}"
         )
 

@@ -235,20 +235,19 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
         loads = np.hstack([multiply(band, Q.basis) for band in (A.mass, A.gyroscopic, A.material)])
         images = dtbtrs(U, loads, trans="T")[0]
         outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
-        while True:
-            whirl = solve(Q, some, m, scale)
-            left = _loads(whirl, spectrum.shift) @ triangle.T
-            errors = (left**2).sum(axis=(2, 3))
-            wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
-            if wrong.any() or some.size == speeds.size:
-                break
+        whirl = solve(Q, some, m, scale)
+        left = _loads(whirl, spectrum.shift) @ triangle.T
+        errors = (left**2).sum(axis=(2, 3))
+        wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
+        if wrong.any():
+            columns = left[wrong].reshape(-1, len(triangle))
+            sizes, directions = np.linalg.eigh(columns.T @ columns)
+            new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
+            Y = np.hstack((Y, new - Y @ (Y.T @ new)))
+        elif some.size < speeds.size:
             some = speeds
-        if not wrong.any():
+        else:
             return replace(whirl, error=float(errors.max()))
-        columns = left[wrong].reshape(-1, len(triangle))
-        sizes, directions = np.linalg.eigh(columns.T @ columns)
-        new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
-        Y = np.hstack((Y, new - Y @ (Y.T @ new)))
 
 
 def _loads(whirl: Whirl, shift: float) -> FloatArray:
@@ -405,11 +404,10 @@ def in_both_planes(
     """Eigenvalues with Im λ > 0 and their x and y, from (…) and (…, planes, N)."""
     if shapes.shape[-2] == 2:
         return values, shapes[..., 0, :], shapes[..., 1, :]
-    z = shapes[..., 0, :]
-    back = values.imag < 0
     # z = φ e^{λt}: x is its real part, y its imaginary part; the conjugate of λ has the positive frequency.
-    x = np.where(back[..., None], z.conj(), z)
-    return np.where(back, values.conj(), values), x, np.where(back[..., None], 1j, -1j) * x
+    z, way = shapes[..., 0, :], np.copysign(1.0, values.imag)[..., None]
+    x = z.real + 1j * way * z.imag
+    return values.real + 1j * np.abs(values.imag), x, -1j * way * x
 
 
 def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
