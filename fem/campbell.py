@@ -11,37 +11,35 @@ step; where it slips to another mode the step is halved, too.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.assembly import both_planes
+from fem.orbits import DIRECTION_NAMES
 from fem.parameters import nearest_modes
-from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.rotor import Rotor, refined
 from fem.stability import (
     Window,
-    covering,
     grid_of,
-    holding,
     near_level,
-    runs_away,
-    windows_of,
+    root,
+    unstable_windows,
     within,
 )
 from fem.undamped import Result
 from fem.whirl import (
-    GROWTH,
     NONE,
     Whirl,
     available_modes,
     checked_number,
-    in_both_planes,
+    decrements_of,
+    missing_modes,
     polish,
-    solve,
     solve_whirl,
+    whirling,
 )
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
@@ -137,9 +135,8 @@ class Campbell(Result):
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
         errors = {} if self.std is None else {"frequencies_std_rad_s": self.std.T}
-        whole = self.tables()[0]
-        keys = [column.key.rpartition(".")[2] for column in whole.columns]
-        rows = [dict(zip(keys, row, strict=True)) for row in whole.rows]
+        criticals = self.tables()[0]
+        keys = [column.key.rpartition(".")[2] for column in criticals.columns]
         return plain(
             {
                 "speeds_rad_s": self.speeds,
@@ -148,7 +145,7 @@ class Campbell(Result):
                 "log_decrements": self.log_decrements.T,
                 "direction": _words(self.direction, self.frequencies).T,
                 "damped_critical_speeds_rad_s": self.critical_speeds,
-                "damped_critical_speeds": rows,
+                "damped_critical_speeds": [dict(zip(keys, row, strict=True)) for row in criticals.rows],
                 "damped_critical_speeds_cut": self.cut or None,
                 "unstable": [self._growing(window) for window in self.unstable],
                 "unstable_speeds": [window.to_dict() for window in self.windows],
@@ -258,42 +255,40 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     asked_for = checked_number(rotor, None) if n is None else whole(n, "the number of modes")
     n = checked_number(rotor, min(asked_for, available_modes(rotor)))
     paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
-    columns, whirl = paths.columns, paths.whirl
-    if not columns.size:
+    whirl, asked = paths.whirl, np.searchsorted(paths.speeds, speeds)
+    if not paths.values.size:
         raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
-    if all(runs_away(whirl)):
-        raise ValueError(
-            "the rotor on its supports is statically unstable at these speeds: a support has negative "
-            "stiffness; check its sign and size"
-        )
-    asked = np.searchsorted(paths.speeds, speeds)
-    lam, direction = _whirling(whirl, paths.values[asked][:, columns], paths.vectors[asked][:, columns])
-    roots = [root for root in paths.crossings if _light(root.value, _SWINGS)]
-    roots.sort(key=lambda root: (float(f"{root.speed:.9e}"), root.mode))  # equal but for rounding: by mode
-    vectors = np.array([root.vector for root in roots]).reshape(len(roots), whirl.Q.size)
-    there, ways = _whirling(whirl, np.array([root.value for root in roots], dtype=complex), vectors)
-    unstable, texts, decrements = [], [], _decrements(lam)
-    windows = holding(windows_of(covering(whirl)), speeds)
+    windows = unstable_windows(whirl, speeds)
+    lam, direction = whirling(whirl.Q, paths.values[asked], paths.vectors[asked])
+    crossings = [one for one in paths.crossings if decrements_of(one.value) <= _SWINGS]
+    crossings.sort(key=lambda one: (float(f"{one.speed:.9e}"), one.mode))  # equal but for rounding: by mode
+    there, ways = whirling(
+        whirl.Q,
+        np.array([one.value for one in crossings], dtype=complex),
+        np.array([one.vector for one in crossings]).reshape(-1, whirl.Q.size),
+    )
+    unstable, texts, decrements = [], [], decrements_of(lam)
     for window in windows:
         k = int(np.searchsorted(speeds, window.first))
-        apart = np.where(decrements[k] < 0, np.abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
-        if np.isfinite(apart).any():
-            unstable.append(replace(window, mode=int(np.nanargmin(apart)) + 1))
+        grows = np.flatnonzero(decrements[k] < 0)
+        if window.frequency and grows.size:
+            mode = grows[np.abs(lam[k, grows].imag - window.frequency).argmin()]
+            unstable.append(replace(window, mode=int(mode) + 1))
             texts.append(unstable[-1].sentence())
         else:
-            texts.append(f"{window.sentence()} (not listed: ask for more modes)")
+            texts.append(window.sentence())
     result = Campbell(
         speeds=speeds,
         frequencies=lam.imag,
         log_decrements=decrements,
         direction=direction,
-        critical_speeds=np.array([root.speed for root in roots]),
-        critical_modes=np.array([root.mode + 1 for root in roots], dtype=np.intp),
-        critical_log_decrements=_decrements(there),
+        critical_speeds=np.array([one.speed for one in crossings]),
+        critical_modes=np.array([one.mode + 1 for one in crossings], dtype=np.intp),
+        critical_log_decrements=decrements_of(there),
         critical_direction=ways,
         error=whirl.error,
         rotor=rotor,
-        warnings=(*texts, *_warnings(paths, asked_for, asked)),
+        warnings=(*texts, *_warnings(paths, asked_for, np.isnan(lam))),
         unstable=tuple(unstable),
         windows=windows,
         cut=_cut(paths),
@@ -303,21 +298,21 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     return result
 
 
-class _Root(NamedTuple):
+class _Crossing(NamedTuple):
     """A mode (column, from 0) at a speed, rad/s, where it crosses the 1× line: eigenvalue, vector (R,)."""
 
     speed: float
     mode: int
-    value: complex
+    value: ComplexArray
     vector: ComplexArray
 
 
 @dataclass(frozen=True, eq=False)
 class _Paths:
-    """Modes over speeds (S,) in the basis of `whirl`, the columns of those asked for, and their crossings.
+    """The modes listed, over speeds (S,) in the basis of `whirl`, and their crossings of the 1× line.
 
-    λ, shape (S, c), NONE where a mode is missing, and vectors (S, c, R); `doubtful`, shape (S − 1, c): in
-    which steps shapes do not tell a mode apart from others.
+    λ, shape (S, n), NONE where a mode is missing, and vectors (S, n, R); `doubtful`, shape (S − 1, n): in
+    which steps shapes do not tell a mode apart from others; λ of the `others` that were followed, (S, c − n).
     """
 
     whirl: Whirl
@@ -325,55 +320,39 @@ class _Paths:
     values: ComplexArray
     vectors: ComplexArray
     doubtful: BoolArray
-    columns: IndexArray
-    crossings: list[_Root]
+    others: ComplexArray
+    crossings: list[_Crossing] = field(default_factory=list)
 
-    def roots(self) -> tuple[list[_Root], list[int]]:
-        """Crossings of the 1× line, and steps in which a mode was lost."""
-        f = off_synchronous(self.values[:, self.columns], self.speeds[:, None])
-        change = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
-        steps = np.argwhere(change).tolist()
-        roots = [self._root(k, mode, f[k : k + 2, mode]) for k, mode in steps]
-        lost = [k for (k, _), root in zip(steps, roots, strict=True) if root is None]
-        return [root for root in roots if root], lost
+    def cross(self) -> None:
+        """Find the crossings of the 1× line; where a mode was lost its step is doubtful."""
+        f = off_synchronous(self.values, self.speeds)
+        changes = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
+        for k, mode in np.argwhere(changes).tolist():
+            self._cross(k, mode, f[k : k + 2, mode])
 
-    def _root(self, k: int, mode: int, f: FloatArray) -> _Root | None:
-        """The crossing of a mode in a step, followed from the nearer end; None if it was lost."""
-        from scipy.optimize import brentq
-
-        column, ends = self.columns[mode], [k, k + 1]
-        at = self.speeds[ends].tolist()
-        states = list(zip(f, self.values[ends, column], self.vectors[ends, column], strict=True))
-        there, last = dict(zip(at, states, strict=True)), states[int(np.abs(f).argmin())]
+    def _cross(self, k: int, mode: int, f: FloatArray) -> None:
+        """The crossing of a mode in a step, followed from the nearer end."""
+        near = [k + int(np.abs(f).argmin())]
+        value, vector = self.values[near, mode], self.vectors[near, mode]
 
         def excess(speed: float) -> float:
-            nonlocal last
-            if speed not in there:
-                lam, X = np.array([last[1]]), last[2][None]
-                with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
-                    lam, X = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), lam, X, 2)
-                last = there[speed] = off_synchronous(lam, speed)[0], lam[0], X[0]
-            return float(there[speed][0])
+            nonlocal value, vector
+            with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
+                value, vector = polish(
+                    self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), value, vector, 2
+                )
+            return float(abs(value[0].imag) - speed)
 
-        speed = float(brentq(excess, *at, xtol=1e-14 * at[1], rtol=1e-15))
-        left, value, vector = there[speed]
-        return None if abs(left) > _VANISHES * np.abs(f).max() else _Root(speed, mode, complex(value), vector)
-
-
-def off_synchronous(lam: ComplexArray, speed: FloatArray | float) -> FloatArray:
-    """Whirl frequency less the speed."""
-    return np.asarray(np.abs(lam.imag) - speed)
+        speed = root(excess, self.speeds[k : k + 2], f)
+        if abs(excess(speed)) > _VANISHES * np.abs(f).max():
+            self.doubtful[k, mode] = True
+        else:
+            self.crossings.append(_Crossing(speed, mode, value[0], vector[0]))
 
 
-def _decrements(lam: ComplexArray) -> FloatArray:
-    """Of what neither grows nor decays, but for rounding, 0."""
-    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
-
-
-def _whirling(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-    """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
-    lam, x, y = in_both_planes(values, whirl.Q.nodes(np.nan_to_num(vectors)))
-    return lam, np.where(np.isnan(lam), 0.0, whirl_direction(x, y))
+def off_synchronous(lam: ComplexArray, speeds: FloatArray) -> FloatArray:
+    """Whirl frequencies less the speed, of modes (S, …)."""
+    return np.asarray(np.abs(lam.imag) - speeds[:, None])
 
 
 def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
@@ -384,13 +363,13 @@ def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
 
 
 def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
-    """Modes over speed, n (or fewer) of them asked for."""
+    """Modes over speed, n (or fewer) of them listed."""
     P, available = both_planes(rotor), available_modes(rotor)
     m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
     while True:
         paths = _closely(solve_whirl(P, speeds, m), n, heavy)
-        listed = paths.values[:, paths.columns]
-        full = np.isfinite(listed).all() and (_light(listed, heavy).mean(axis=0) >= 0.5).sum() == n
+        light = (decrements_of(paths.values) <= heavy).mean(axis=0) >= 0.5
+        full = light.sum() == n and np.isfinite(paths.values).all()
         if full or m >= min(_MOST * n + 16, available):
             return paths
         m = min(2 * m, available)
@@ -401,18 +380,13 @@ def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
     speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
     while True:
         paths = _chained(whirl, speeds, values, X, n, heavy)
-        steps: BoolArray = np.asarray(paths.doubtful[:, paths.columns].any(axis=1))
-        for gap in off_synchronous(paths.values[:, paths.columns], speeds[:, None]).T:
-            steps[near_level(np.nan_to_num(gap), 0.0)] = True
-        wide = np.diff(speeds) > _NARROW * speeds[-1]
-        dense = speeds.size > _DENSE * whirl.speeds.size
-        if dense or not (steps & wide).any():
-            crossings, lost = paths.roots()
-            steps[lost] = True
-            if dense or not (steps & wide).any():
-                return replace(paths, crossings=crossings)
-        k = np.flatnonzero(steps & wide)
-        more = solve(whirl.Q, (speeds[k] + speeds[k + 1]) / 2, values.shape[1], whirl.scale)
+        paths.cross()
+        near = [near_level(np.nan_to_num(gap), 0.0) for gap in off_synchronous(paths.values, speeds).T]
+        k = np.unique(np.concatenate((np.flatnonzero(paths.doubtful.any(axis=1)), *near)))
+        k = k[np.diff(speeds)[k] > _NARROW * speeds[-1]]
+        if not k.size or speeds.size > _DENSE * whirl.speeds.size:
+            return paths
+        more = whirl.at((speeds[k] + speeds[k + 1]) / 2)
         speeds = np.insert(speeds, k + 1, more.speeds)
         values, X = np.insert(values, k + 1, more.values, 0), np.insert(X, k + 1, more.vectors, 0)
 
@@ -424,17 +398,15 @@ def _chained(
     from scipy.optimize import linear_sum_assignment
 
     S, m = values.shape
-    phase = np.nan_to_num(values, nan=1.0)
-    phase /= np.abs(phase)
-    states = (1 + phase[:-1, :, None].conj() * phase[1:, None]) / 2
-    mac = np.nan_to_num(np.abs(X[:-1].conj() @ X[1:].swapaxes(1, 2) * states)) ** 2
+    lam = np.nan_to_num(values, nan=1.0)[..., None]
+    states = np.concatenate((X, X * lam / np.abs(lam)), axis=2) / np.sqrt(2)
+    mac = np.nan_to_num(np.abs(states[:-1].conj() @ states[1:].swapaxes(1, 2))) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
-    best, others = np.take_along_axis(mac, partner[..., None], axis=2)[..., 0], mac.copy()
-    np.put_along_axis(others, partner[..., None], 0.0, axis=2)
-    rivals = np.maximum(others.max(axis=2), np.take_along_axis(others.max(axis=1), partner, axis=1))
-    clear = (best >= _ALIKE) & (rivals <= _OTHER * best)
-    labels = np.tile(np.arange(m), (S, 1))
-    count = m
+    mac = np.take_along_axis(mac, partner[:, None], axis=2)
+    best, rivals = mac.diagonal(axis1=1, axis2=2), mac * (1 - np.eye(m))
+    clear = (best >= _ALIKE) & (np.maximum(rivals.max(axis=1), rivals.max(axis=2)) <= _OTHER * best)
+    clear |= (best == 0) | ~(decrements_of(values[:-1]) <= heavy)
+    labels, count = np.tile(np.arange(m), (S, 1)), m
     for k, mine in enumerate(partner):
         # What is hardly alike is another mode that came while this one went.
         new = best[k] < _HARDLY
@@ -443,14 +415,10 @@ def _chained(
     rows = np.arange(S)[:, None]
     paths, vectors = np.full((S, count), NONE), np.full((S, count, X.shape[2]), NONE)
     doubtful: BoolArray = np.zeros((S - 1, count), dtype=bool)
-    paths[rows, labels], vectors[rows, labels] = values, X
-    doubtful[rows[:-1], labels[:-1]] = ~clear & (best > 0) & _light(values[:-1], heavy)
-    return _Paths(whirl, speeds, paths, vectors, doubtful, _choice(speeds, paths, n, heavy), [])
-
-
-def _light(values: ComplexArray | complex, heavy: float) -> BoolArray:
-    """Which oscillate without heavy damping."""
-    return np.asarray(-2 * np.pi * values.real <= heavy * np.abs(values.imag))
+    paths[rows, labels], vectors[rows, labels], doubtful[rows[:-1], labels[:-1]] = values, X, ~clear
+    listed = _choice(speeds, paths, n, heavy)
+    others = np.delete(paths, listed, axis=1)
+    return _Paths(whirl, speeds, paths[:, listed], vectors[:, listed], doubtful[:, listed], others)
 
 
 def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> IndexArray:
@@ -460,49 +428,45 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     speed is left out below that of another; then those of the lowest frequency on the whole. Those
     that are heavily damped at half of the speeds come last.
     """
-    light, there = _light(values, heavy), np.isfinite(values)
-    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    light, there = decrements_of(values) <= heavy, np.isfinite(values)
+    far = 1e9 * speeds[-1]
+    size = np.where(there, np.abs(values.imag), far)
     meets = [
         np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
-        for mode in np.where(light, size, 1e9 * speeds[-1]).T
+        for mode in np.where(light, size, far).T
     ]
     begins = there.argmax(axis=0)
     start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
     best = np.lexsort((start, size.mean(axis=0), meets, light.mean(axis=0) < 0.5))[:n]
-    return np.asarray(best[np.lexsort((start[best], begins[best]))])
+    best = best[there[:, best].any(axis=0)]
+    return best[np.lexsort((start[best], begins[best]))]
 
 
 def _cut(paths: _Paths) -> str:
     """What to say where modes that are not listed have critical speeds in the range, or may have."""
-    others = np.delete(paths.values, paths.columns, axis=1)
-    f = np.where(_light(others, _SWINGS), off_synchronous(others, paths.speeds[:, None]), np.nan)
-    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
-    if k.size:
-        where = (
-            f"from {paths.speeds[k[0]]:.6g} rad/s on there are {k.size} more, of modes that are not listed"
-        )
-    elif np.nan_to_num(np.abs(paths.values[-1].imag)).max() < paths.speeds[-1] and others.size:
-        where = f"no mode was followed that reaches {paths.speeds[-1]:.6g} rad/s there"
-    else:
+    speeds, lam = paths.speeds, paths.others
+    f = np.where(decrements_of(lam) <= _SWINGS, off_synchronous(lam, speeds), np.nan)
+    size = np.abs(np.hstack((paths.values, lam)).imag)
+    more = (f[:-1] * f[1:] < 0).any(axis=1) | (np.fmax.reduce(size, axis=1) < speeds)[1:]
+    if not (lam.size and more.any()):
         return ""
-    return f"the list of critical speeds is cut: {where}; ask for more modes (-n)"
+    return (
+        f"the list of critical speeds is cut: from {speeds[more.argmax()]:.6g} rad/s on modes that are not "
+        "listed have more, or may have; ask for more modes (-n)"
+    )
 
 
-def _warnings(paths: _Paths, n: int, asked: IndexArray) -> tuple[str, ...]:
-    gone = np.isnan(paths.values[asked][:, paths.columns])
+def _warnings(paths: _Paths, n: int, gone: BoolArray) -> tuple[str, ...]:
+    """What the modes listed are not; `gone`, shape (S, n): where they do not oscillate."""
+    count = gone.sum(axis=0)
     texts = [
-        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {gone[:, mode].sum()} of "
-        f"{len(gone)} speeds, the first {paths.speeds[asked[gone[:, mode].argmax()]]:.6g} rad/s"
-        for mode in np.flatnonzero(gone.any(axis=0)).tolist()
+        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {count[mode]} of "
+        f"{len(gone)} speeds"
+        for mode in np.flatnonzero(count)
     ]
-    if paths.columns.size < n:
-        texts.append(f"only {paths.columns.size} of {n} modes oscillate")
-    if (paths.whirl.still > 1).any():
-        texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
-    doubt = paths.speeds[:-1][paths.doubtful[:, paths.columns].any(axis=1)]
-    if doubt.size:
-        texts.append(
-            f"modes could not be told apart by shape above {doubt[0]:.6g} rad/s: two curves may be exchanged"
-        )
+    texts += missing_modes(np.zeros(0), int(paths.whirl.still.max()), count.size, n)
+    if paths.doubtful.any():
+        first = paths.speeds[paths.doubtful.any(axis=1).argmax()]
+        texts.append(f"modes could not be told apart by shape above {first:.6g} rad/s: two may be exchanged")
     return tuple(texts)

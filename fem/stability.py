@@ -22,17 +22,18 @@ import numpy as np
 
 from fem.assembly import both_planes
 from fem.forces import InternalDamping
-from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.orbits import DIRECTION_NAMES
 from fem.rotor import Rotor
 from fem.undamped import Result
 from fem.whirl import (
     GROWTH,
+    NONE,
     Whirl,
     available_modes,
     checked_number,
-    in_both_planes,
-    solve,
+    decrements_of,
     solve_whirl,
+    whirling,
 )
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
@@ -48,6 +49,7 @@ AWAY = 1e-6
 """Part of the lowest frequency above which a real eigenvalue runs away."""
 _BESIDE = 0.1  # weight of such an eigenvalue beside the growth of motions that oscillate
 _SLACK = 1e-12  # of the largest entry of a matrix: rounding
+_NO_DAMPING = 1e-100  # N s/m, below which none is divided by
 _TIMES = 2.0  # the highest speed: up to there modes are looked at, where no bound says how far
 _GRID = 60  # speeds of a grid at most, before it is halved
 _PARTS = 20  # of a range over tables, at least
@@ -115,15 +117,14 @@ class Window:
         cause = "the rotor runs away without oscillating; check negative stiffness"
         if self.mode is not None:
             cause = f"mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows"
-        return f"the steady response does not exist {self.where(speed_text)}: there {cause}"
+        last = f" up to the last speed, {speed_text(self.last)}" if self.begins and not self.ends else ""
+        return f"the steady response does not exist {self.where(speed_text)}{last}: there {cause}"
 
 
 def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:
     """Which speeds, shape (S,), lie in one of the windows."""
-    inside: BoolArray = np.zeros(speeds.shape, dtype=bool)
-    for window in windows:
-        inside |= (speeds >= window.first) & (speeds <= window.last)
-    return inside
+    inside = ((window.first <= speeds) & (speeds <= window.last) for window in windows)
+    return sum(inside, np.zeros(speeds.shape, dtype=bool))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -167,8 +168,8 @@ class Stability(Result):
     @property
     def whirl_ratio(self) -> float | None:
         """Whirl frequency by speed where stability is lost."""
-        speed = self.threshold if self.status == "threshold" else self.lowest
-        return self.frequency / speed if self.frequency is not None and speed else None
+        speed = self.threshold or self.lowest
+        return self.frequency / speed if self.frequency and speed else None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; unknown values are None."""
@@ -190,8 +191,8 @@ class Stability(Result):
 
     def tables(self) -> tuple[Table, ...]:
         """One row, all but the warnings."""
-        row = {key: value for key, value in self.to_dict().items() if key != "warnings"}
-        return (Table("stability", tuple(Column(key, (value,), key=key) for key, value in row.items())),)
+        *row, _ = self.to_dict().items()
+        return (Table("stability", tuple(Column(key, (value,), key=key) for key, value in row)),)
 
     def to_frame(self) -> pd.DataFrame:
         """The same as a DataFrame."""
@@ -205,11 +206,11 @@ class Stability(Result):
         text = f"unstable already at {self.lowest:.6g} rad/s, where the search began"
         if self.threshold is not None:
             text = f"stable up to {speed_text(self.threshold)}"
-        if self.mode is None or self.frequency is None or self.direction is None:
+        if self.mode is None:
             return f"{text}; there the rotor runs away without oscillating"
         ratio = f", {self.whirl_ratio:.4g} × speed" if self.whirl_ratio else ""
         return (
-            f"{text}; there mode {self.mode} grows, {DIRECTION_NAMES[self.direction]} whirl at "
+            f"{text}; there mode {self.mode} grows, {self.to_dict()['direction']} whirl at "
             f"{self.frequency:.6g} rad/s{ratio}"
         )
 
@@ -228,18 +229,18 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
         tiny, slack = (_SLACK * np.abs(one).max(axis=(1, 2)) for one in (k, c))
         stiffness, damping = (np.linalg.eigvalsh(one + one.swapaxes(1, 2))[:, 0] / 2 for one in (k, c))
         driving = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            highest = np.where(driving > tiny, driving / np.maximum(damping, 0.0), 0.0)
+        highest = np.where(driving > tiny, driving / np.maximum(damping, _NO_DAMPING), 0.0)
         bound = np.maximum(bound, np.where((stiffness < -tiny) | (damping < -slack), np.inf, highest))
-    return np.asarray(bound)
+    return bound
 
 
 def grid_of(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     """Speeds, ascending, and the knots of tables between them; over tables at least so many."""
     if rotor.constant:
         return speeds
-    knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
-    return np.unique(np.concatenate((speeds, knots, np.linspace(speeds[0], speeds[-1], _PARTS + 1))))
+    first, last = speeds[[0, -1]]
+    knots = np.clip(rotor.knots, first, last)
+    return np.unique(np.concatenate((speeds, knots, np.linspace(first, last, _PARTS + 1))))
 
 
 def covering(whirl: Whirl) -> Whirl:
@@ -256,10 +257,6 @@ def covering(whirl: Whirl) -> Whirl:
     return whirl
 
 
-def _at(whirl: Whirl, *speeds: float) -> Whirl:
-    return solve(whirl.Q, np.array(speeds), whirl.values.shape[1], whirl.scale)
-
-
 def fastest(whirl: Whirl) -> tuple[ComplexArray, FloatArray]:
     """Eigenvalue of the motion that grows fastest at each speed, and its growth, shape (S,) each.
 
@@ -267,17 +264,28 @@ def fastest(whirl: Whirl) -> tuple[ComplexArray, FloatArray]:
     """
     rates = np.nan_to_num(whirl.values.real / np.abs(whirl.values), nan=-1.0)
     rows, k = np.arange(len(rates)), rates.argmax(axis=1)
-    real = np.array([one.max(initial=-whirl.scale) for one in whirl.real])
-    away = _BESIDE * (real / whirl.scale - AWAY)
-    return np.where(away > rates[rows, k], real, whirl.values[rows, k]), np.maximum(away, rates[rows, k])
+    away = _BESIDE * (_largest_real(whirl) - AWAY)
+    value = np.where(away > rates[rows, k], _largest_real(whirl) * whirl.scale, whirl.values[rows, k])
+    return value, np.maximum(away, rates[rows, k])
+
+
+def _largest_real(whirl: Whirl) -> FloatArray:
+    """Largest eigenvalue of what does not oscillate at each speed, by the scale, shape (S,)."""
+    return np.array([real.max(initial=-whirl.scale) for real in whirl.real]) / whirl.scale
+
+
+def runs_away(whirl: Whirl) -> BoolArray:
+    """At which speeds a motion grows without oscillating, shape (S,)."""
+    return _largest_real(whirl) > AWAY
 
 
 def near_level(values: FloatArray, level: float) -> IndexArray:
     """Steps beside values that are the nearest to a level, where one more such step would pass it."""
-    near, crossed = -np.abs(values - level), np.diff(values > level)
-    before, here, after = near[:-2], near[1:-1], near[2:]
-    close = (here >= np.maximum(before, after)) & (2 * here > np.minimum(before, after))
-    k = np.flatnonzero(close & ~crossed[:-1] & ~crossed[1:])
+    gap = values - level
+    side = np.where(gap > 0, 1.0, -1.0)[1:-1]
+    before, after = side * (gap[:-2] - gap[1:-1]), side * (gap[2:] - gap[1:-1])
+    near = (np.minimum(before, after) >= 0) & (np.maximum(before, after) > side * gap[1:-1])
+    k = np.flatnonzero(near)
     return np.union1d(k, k + 1)
 
 
@@ -289,61 +297,73 @@ def _scan(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
         if not k.size:
             break
         more = (grid[k] + grid[k + 1]) / 2
-        rates = np.insert(rates, k + 1, fastest(_at(whirl, *more))[1])
+        rates = np.insert(rates, k + 1, fastest(whirl.at(more))[1])
         grid = np.insert(grid, k + 1, more)
     return grid, rates
 
 
-def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, complex]:
-    """Speed between an unstable and a stable one where growth ends, and the eigenvalue there."""
+def root(function: Callable[[float], float], ends: FloatArray, values: FloatArray) -> float:
+    """Where a function of speed vanishes between two ends with these values, which it need not repeat."""
     from scipy.optimize import brentq
 
-    there = dict(zip(ends.tolist(), rates.tolist(), strict=True))
+    there = dict(zip(ends.tolist(), values.tolist(), strict=True))
 
-    def excess(speed: float) -> float:
-        return (there[speed] if speed in there else float(fastest(_at(whirl, speed))[1][0])) - GROWTH
+    def value(speed: float) -> float:
+        return there[speed] if speed in there else function(speed)
 
-    speed = float(brentq(excess, *ends, xtol=1e-13 * max(ends), rtol=1e-15))
-    step = _BACK * (ends[0] - speed)
-    value, other = fastest(_at(whirl, speed, speed + step))[0]
+    return float(brentq(value, *ends, xtol=1e-14 * max(ends), rtol=1e-15))
+
+
+def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, bool, complex]:
+    """Speed between a stable and an unstable one where growth begins or ends, and the eigenvalue there."""
+    speed = root(lambda speed: float(fastest(whirl.at(speed))[1][0]) - GROWTH, ends, rates - GROWTH)
+    step = _BACK * (ends[rates.argmax()] - speed)
+    value, other = fastest(whirl.at(speed, speed + step))[0]
     rise = (other - value).real
     back = step * value.real / rise if rise > 0 else 0.0
-    return float(np.clip(speed - back, min(ends), max(ends))), value
+    return float(np.clip(speed - back, *ends)), True, value
 
 
 def _mode(whirl: Whirl, speed: float, value: complex) -> tuple[int, float, float] | tuple[None, None, None]:
     """Number by frequency, whirl frequency and direction of a mode, as `Window` has them."""
     if not value.imag:
         return None, None, None
-    pairs = _at(whirl, speed)
-    lam, size = pairs.values[0], np.abs(pairs.values[0].imag)
-    k = int(np.nanargmin(np.abs(lam - value)))
-    way = np.sign(lam[k].imag)  # in a complex coordinate −1 of backward whirl
-    number = (size < size[k] * (1 + way * _PAIR)).sum() + (way < 0)
-    _, x, y = in_both_planes(lam[k : k + 1], whirl.Q.nodes(pairs.vectors[:1, k]))
-    return int(number), float(size[k]), float(whirl_direction(x, y)[0])
+    pairs = whirl.at(speed)
+    k = int(np.nanargmin(np.abs(pairs.values[0] - value)))
+    lam, direction = whirling(whirl.Q, pairs.values[0], pairs.vectors[0])
+    rank = lam.imag * (1 + _PAIR * direction)
+    return int((rank <= rank[k]).sum()), float(lam[k].imag), float(direction[k])
 
 
 def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     """Ranges of growth of a whirl that has all modes that may grow."""
     grid, rates = _scan(whirl)
-    changes = np.flatnonzero(np.diff(rates > GROWTH, prepend=False, append=False)).tolist()
-    out = []
-    for i, j in zip(changes[::2], changes[1::2], strict=True):
-        first, last = grid[i], grid[j - 1]
-        if i:
-            first, value = _edge(whirl, grid[[i, i - 1]], rates[[i, i - 1]])
-        else:
-            value = fastest(whirl)[0][0]
-        if j < grid.size:
-            last, _ = _edge(whirl, grid[[j - 1, j]], rates[[j - 1, j]])
-        out.append(Window(float(first), float(last), i > 0, j < grid.size, *_mode(whirl, first, value)))
-    return tuple(out)
+    grows = rates > GROWTH
+    edges = [_edge(whirl, grid[k : k + 2], rates[k : k + 2]) for k in np.flatnonzero(np.diff(grows))]
+    if grows[0]:
+        edges.insert(0, (float(grid[0]), False, fastest(whirl)[0][0]))
+    if grows[-1]:
+        edges.append((float(grid[-1]), False, NONE))
+    return tuple(
+        Window(first, last, begins, ends, *_mode(whirl, first, value))
+        for (first, begins, value), (last, ends, _) in zip(edges[::2], edges[1::2], strict=True)
+    )
 
 
-def holding(windows: Iterable[Window], speeds: FloatArray) -> tuple[Window, ...]:
-    """Those that hold one of the speeds."""
-    return tuple(window for window in windows if within((window,), speeds).any())
+def unstable_windows(whirl: Whirl, asked: FloatArray) -> tuple[Window, ...]:
+    """Ranges of growth that hold one of the speeds asked for.
+
+    Raises
+    ------
+    ValueError
+        If the rotor is pushed aside by negative stiffness at every speed.
+    """
+    if runs_away(whirl).all():
+        raise ValueError(
+            "the rotor on its supports is statically unstable at these speeds: a support has negative "
+            "stiffness; check its sign and size"
+        )
+    return tuple(window for window in windows_of(covering(whirl)) if within((window,), asked).any())
 
 
 def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
@@ -359,16 +379,21 @@ def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[s
     Returns
     -------
     The ranges, and a sentence of each; or none, and why stability cannot be judged.
+
+    Raises
+    ------
+    ValueError
+        If the rotor is pushed aside by negative stiffness at every speed.
     """
     asked = np.unique(speeds)
     try:
         grid = grid_of(rotor, asked if asked.size <= _GRID else np.linspace(asked[0], asked[-1], _GRID))
         if not growth_bound(rotor, grid).any():
             return (), ()
-        whirl = solve_whirl(both_planes(rotor), grid, checked_number(rotor, None))
-        windows = holding(windows_of(covering(whirl)), asked)
+        whirl = covering(solve_whirl(both_planes(rotor), grid, checked_number(rotor, None)))
     except ValueError as problem:
         return (), (f"whether the rotor is stable at these speeds is not known: {problem}",)
+    windows = unstable_windows(whirl, asked)
     return windows, tuple(window.sentence() for window in windows)
 
 
@@ -423,7 +448,6 @@ def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
     speeds, windows = whirl.speeds, windows_of(whirl)
     first = windows[0] if windows else Window(np.inf, np.inf, False, False)
     lam = whirl.values[: max(1, int((speeds < first.first).sum())), :n]
-    margin = np.nan_to_num(-2 * np.pi * lam.real / np.abs(lam.imag), nan=np.inf).min()
     return Stability(
         "threshold" if first.begins else "unstable" if windows else "stable",
         float(speeds[0]),
@@ -432,11 +456,6 @@ def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
         first.mode,
         first.frequency,
         first.direction,
-        margin if np.isfinite(margin) else float("nan"),
+        float(np.fmin.reduce(decrements_of(lam), axis=None)),
         whirl.Q.P.rotor,
     )
-
-
-def runs_away(whirl: Whirl) -> list[bool]:
-    """At which speeds a motion grows without oscillating, length S."""
-    return [bool(real.max(initial=-np.inf) > AWAY * whirl.scale) for real in whirl.real]

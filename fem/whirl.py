@@ -29,6 +29,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem.orbits import DIRECTION_NAMES, whirl_direction
@@ -95,19 +96,22 @@ class Whirl:
     still: IndexArray
     error: float = 0.0
 
+    def at(self, *speeds: ArrayLike) -> Whirl:
+        """The same at other speeds, rad/s, in this basis."""
+        return solve(self.Q, np.hstack(speeds), self.values.shape[1], self.scale)
+
 
 def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`."""
     D, K = Q.at(speeds)
     lam = _eigenvalues(Q.M, D, K, scale)
-    size, frequency = np.abs(lam), np.abs(lam.imag)
+    size = np.abs(lam)
     still = size < _STILL * scale
-    oscillates = ~still & (frequency > _REAL * size)
-    wanted = oscillates if Q.P.planes == 1 else oscillates & (lam.imag > 0)
-    key = np.where(wanted, frequency, np.inf)
-    rows, order = np.arange(len(lam))[:, None], np.argsort(key, axis=1, kind="stable")[:, :m]
-    missing = ~wanted[rows, order]
-    values = lam[rows, order]
+    oscillates = ~still & (np.abs(lam.imag) > _REAL * size)
+    modes = np.where(oscillates & ((lam.imag > 0) | (Q.P.planes == 1)), lam, NONE)
+    order = np.argsort(np.abs(modes.imag), axis=1, kind="stable")[:, :m]
+    values = np.take_along_axis(modes, order, axis=1)
+    missing = np.isnan(values)
     values[missing] = 1j * scale
     # Something of every unknown, so that no mode is left out, and apart for modes of one frequency.
     phases = np.outer(np.arange(1, m + 1), np.arange(Q.size) ** 1.5)
@@ -167,10 +171,8 @@ def _answers(
     M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, loads: ComplexArray
 ) -> ComplexArray:
     """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
-    terms = np.stack(np.broadcast_arrays(M, D, K), axis=1).reshape(len(D), 3, M.size)
-    lam = values * (1 + 1e-14)  # beside an eigenvalue: there the matrix is not singular to the last bit
-    powers = np.stack((lam * lam, lam, np.ones_like(lam)), axis=2)
-    dynamic = (powers @ terms).reshape(*lam.shape, *M.shape)
+    lam = values[..., None, None] * (1 + 1e-14)  # beside an eigenvalue, where the matrix is singular
+    dynamic = lam * (lam * M + D[:, None]) + K[:, None]
     return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads, dynamic.shape[:-1])[..., None])[..., 0])
 
 
@@ -233,20 +235,19 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
         loads = np.hstack([multiply(band, Q.basis) for band in (A.mass, A.gyroscopic, A.material)])
         images = dtbtrs(U, loads, trans="T")[0]
         outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
-        while True:
-            whirl = solve(Q, some, m, scale)
-            left = _loads(whirl, spectrum.shift) @ triangle.T
-            errors = (left**2).sum(axis=(2, 3))
-            wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
-            if wrong.any() or some.size == speeds.size:
-                break
+        whirl = solve(Q, some, m, scale)
+        left = _loads(whirl, spectrum.shift) @ triangle.T
+        errors = (left**2).sum(axis=(2, 3))
+        wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
+        if wrong.any():
+            columns = left[wrong].reshape(-1, len(triangle))
+            sizes, directions = np.linalg.eigh(columns.T @ columns)
+            new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
+            Y = np.hstack((Y, new - Y @ (Y.T @ new)))
+        elif some.size < speeds.size:
             some = speeds
-        if not wrong.any():
+        else:
             return replace(whirl, error=float(errors.max()))
-        columns = left[wrong].reshape(-1, len(triangle))
-        sizes, directions = np.linalg.eigh(columns.T @ columns)
-        new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
-        Y = np.hstack((Y, new - Y @ (Y.T @ new)))
 
 
 def _loads(whirl: Whirl, shift: float) -> FloatArray:
@@ -299,7 +300,7 @@ class WhirlModes(Result):
     @property
     def log_decrements(self) -> FloatArray:
         """Logarithmic decrements −2π Re λ / |Im λ|, shape (n,); negative: unstable."""
-        return -2 * np.pi * self.eigenvalues.real / self.frequencies
+        return decrements_of(self.eigenvalues)
 
     @property
     def direction(self) -> FloatArray:
@@ -386,17 +387,27 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     return WhirlModes(float(speeds[0]), values, x.T / size, y.T / size, real, whirl.error, rotor, warnings)
 
 
+def decrements_of(lam: ComplexArray) -> FloatArray:
+    """Logarithmic decrements; 0 of what neither grows nor decays, but for rounding."""
+    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+
+
+def whirling(Q: Reduced, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """λ with Im λ > 0 and directions of modes (…) with vectors (…, R); NaN and 0 of none."""
+    lam, x, y = in_both_planes(values, Q.nodes(np.nan_to_num(vectors)))
+    return lam, np.where(np.isnan(lam), 0.0, whirl_direction(x, y))
+
+
 def in_both_planes(
     values: ComplexArray, shapes: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Eigenvalues with Im λ > 0 and their x and y, from (…) and (…, planes, N)."""
     if shapes.shape[-2] == 2:
         return values, shapes[..., 0, :], shapes[..., 1, :]
-    z = shapes[..., 0, :]
-    back = values.imag < 0
     # z = φ e^{λt}: x is its real part, y its imaginary part; the conjugate of λ has the positive frequency.
-    x = np.where(back[..., None], z.conj(), z)
-    return np.where(back, values.conj(), values), x, np.where(back[..., None], 1j, -1j) * x
+    z, way = shapes[..., 0, :], np.copysign(1.0, values.imag)[..., None]
+    x = z.real + 1j * way * z.imag
+    return values.real + 1j * np.abs(values.imag), x, -1j * way * x
 
 
 def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:

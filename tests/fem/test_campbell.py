@@ -254,7 +254,7 @@ def test_by_default_all_modes_of_a_small_model():
     assert fem.campbell(rotor, [10.0, 20.0]).frequencies.shape == (2, 2)
     assert fem.whirl_modes(rotor, 10.0).frequencies.shape == (2,)
     assert fem.critical_speeds(rotor).frequencies.size == 1
-    assert fem.campbell(rotor, [10.0], 3).warnings[-1] == "only 2 of 3 modes oscillate"
+    assert fem.campbell(rotor, [10.0], 3).warnings[-1].startswith("only 2 of 3 modes oscillate")
 
 
 def test_a_rotor_that_is_pushed_aside_is_refused():

@@ -46,7 +46,7 @@ def test_whirl_without_shear(data, method):
 
 @pytest.mark.parametrize("data", ross_rotors.NO_SHEAR, ids=ross_rotors.label)
 def test_campbell_without_shear(data):
-    diagram = campbell(ross_rotors.build(data), data["speeds"], 8)
+    diagram = campbell(ross_rotors.build(data), data["speeds"], 8, heavy=np.inf)
     for values, answer in zip(diagram.eigenvalues, data["answers"], strict=True):
         # Heavily damped modes may come and go between speeds; a diagram need not show them.
         expected = ross_rotors.eigenvalues(answer)[np.array(answer["log_dec"]) < 10]

@@ -439,7 +439,7 @@ def pushed_at_rest():
     return fem.Rotor([0.3, 0.3], 0.04, discs=[disc], supports=[*bearings, seal], model=model)
 
 
-@pytest.mark.parametrize("speeds", [[0.0], [0.0, 400.0], [0.0, 1.0, 100.0, 400.0]])
+@pytest.mark.parametrize("speeds", [[0.0, 400.0], [0.0, 1.0, 100.0, 400.0]])
 def test_a_rotor_that_is_pushed_aside_at_rest(speeds):
     rotor = pushed_at_rest()
     assert largest_growth(rotor, 0.0) > 0.5
@@ -449,9 +449,10 @@ def test_a_rotor_that_is_pushed_aside_at_rest(speeds):
     assert not window.begins
     assert window.mode is None
     assert window.last < 400.0
-    if len(speeds) > 1:
-        said = [text for text in fem.campbell(rotor, speeds).warnings if "runs away" in text]
-        assert [f"to {window.last:.6g} rad/s" in text for text in said] == [True]
+    said = [text for text in fem.campbell(rotor, speeds).warnings if "runs away" in text]
+    assert [f"to {window.last:.6g} rad/s" in text for text in said] == [True]
+    with pytest.raises(ValueError, match="statically unstable"):
+        unstable_windows(rotor, np.array([0.0]))
 
 
 def of_many_elements(rng):

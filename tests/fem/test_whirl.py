@@ -280,6 +280,8 @@ def test_overdamped_motions_are_said():
     )
     with pytest.raises(ValueError, match="no oscillating mode"):
         fem.whirl_modes(rotor, 10.0, 1)
+    with pytest.raises(ValueError, match="no oscillating mode"):
+        fem.campbell(rotor, [10.0], 1)
 
 
 def test_a_rotor_that_runs_away_is_said():
