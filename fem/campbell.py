@@ -62,7 +62,6 @@ _DENSE = 8  # times the speeds asked for: so many are computed at most
 _SWINGS = 14.0  # log decrement above which a critical speed has no meaning
 _VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
 _PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
-_SPARE, _MOST = 2, 3  # modes above those asked for, which may come down; computed for one asked for, at most
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -364,15 +363,14 @@ def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
 
 def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
     """Modes over speed, n (or fewer) of them listed."""
-    P, available = both_planes(rotor), available_modes(rotor)
-    m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
+    P, most = both_planes(rotor), min(2 * n + 8, available_modes(rotor))
+    m = min(n + n % 2 + 2, most)  # even: modes come in pairs, a forward and a backward one
     while True:
         paths = _closely(solve_whirl(P, speeds, m), n, heavy)
         light = (decrements_of(paths.values) <= heavy).mean(axis=0) >= 0.5
-        full = light.sum() == n and np.isfinite(paths.values).all()
-        if full or m >= min(_MOST * n + 16, available):
+        if light.sum() == n or m == most:
             return paths
-        m = min(2 * m, available)
+        m = most
 
 
 def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
