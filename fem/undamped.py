@@ -61,7 +61,7 @@ _UNSTABLE = (
     "negative stiffness, elements are far too short, or thin discs (polar inertia above diametral) turn a "
     "free rotor, which soft supports at two nodes would hold"
 )
-_PARTS = 8  # of each interval of the bearing tables, between which a mode crosses the speed once or twice
+_PARTS = (1 - np.cos(np.linspace(0, np.pi, 11))) / 2  # of an interval of the tables: fine at its ends
 _NORMAL_95 = 1.959964
 
 
@@ -330,6 +330,8 @@ def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
 
 def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
     """`critical_speeds`: the `most` lowest, or all there are, where there are not fewer than `least`."""
+    if most < 1:
+        raise ValueError(f"{most} critical speeds cannot be found: ask for 1 or more")
     A, warnings, cut = assemble(rotor), ignored_inertia(rotor), ""
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
@@ -413,57 +415,68 @@ def critical_speeds_near(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 
 
 def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Spectrum], tuple[str, ...], str]:
-    """The n lowest crossings of natural frequency and speed in the tables, warnings, and what is cut off.
-
-    |λ − Ω²| of a mode is convex near 0 in an interval of the tables: two crossings in one part of it, without a
-    change of sign, are possible only where the lines of the parts beside it fall below 0 from both sides.
-    """
-    from scipy.optimize import brentq, minimize_scalar
+    """The n lowest crossings of natural frequency and speed in the tables, warnings, and what is cut off."""
+    from scipy.optimize import brentq
 
     tables = [support.speeds for support in rotor.supports if support.speeds]
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
         raise ValueError("the tables of the supports have no speed in common: extend them")
-    top = (1.01 * last) ** 2
-
-    def gap(speed: float, k: int, sign: float = 1.0) -> float:
-        squares = _positive(whole_rotor(rotor, A, speed), k + 1).squares
-        return sign * float((squares[k] if k < squares.size else top) - speed**2)
-
-    brackets: list[tuple[float, float, int]] = []
-    squares = lowest = _positive(whole_rotor(rotor, A, first), 1, top).squares
-    for ends in itertools.pairwise(rotor.knots[(rotor.knots >= first) & (rotor.knots <= last)]):
-        speeds, lists = np.linspace(*ends, _PARTS + 1), [squares]
-        for speed in speeds[1:]:
-            squares = _positive(whole_rotor(rotor, A, speed), squares.size, top).squares
-            lists.append(squares)
-        for k, mode in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
-            gaps = mode - speeds**2
-            points, size = list(zip(speeds, gaps > 0, strict=True)), [np.inf, *np.abs(gaps), np.inf]
-            for i, (a, b) in enumerate(itertools.pairwise(speeds)):
-                sign = np.sign(gaps[i])
-                if sign * gaps[i + 1] > 0 and 2 * size[i + 1] < size[i] and 2 * size[i + 2] < size[i + 3]:
-                    turn = minimize_scalar(gap, bounds=(a, b), args=(k, sign), options={"xatol": 1e-7 * b})
-                    points.append((turn.x, sign * turn.fun > 0))
-            for (a, above), (b, other) in itertools.pairwise(sorted(points)):
-                if above != other:
-                    brackets.append((b, a, k))
-    count, begin = len(brackets), math.sqrt(lowest[0])
+    knots = rotor.knots[(rotor.knots >= first) & (rotor.knots <= last)]
+    lowest, brackets = _brackets(rotor, A, knots)
+    count = len(brackets)
     band = f"between {first:.6g} and {last:.6g} rad/s, where the bearing tables hold"
-    beginning = f"the lowest natural frequency at {first:.6g} rad/s is {begin:.6g} rad/s"
+    beginning = f"the lowest natural frequency at {first:.6g} rad/s is {lowest:.6g} rad/s"
     if not count:
         raise ValueError(f"no critical speed lies {band}; {beginning}: extend the tables")
     warnings: tuple[str, ...] = ()
     if count < n:
         warnings += (f"there are only {count} of {n} critical speeds {band}; extend them to find more",)
-    if begin < first:
+    if lowest < first:
         warnings += (f"{beginning}, where the bearing tables begin: {NOT_COUNTED}",)
-    brackets.sort()
     low = [bracket for bracket in brackets if bracket[1] < brackets[min(n, count) - 1][0]]
-    crossings = sorted((brentq(gap, a, b, (k,), 1e-11 * b, 1e-14), k) for b, a, k in low)[:n]
+    crossings = sorted((brentq(_gap, a, b, (rotor, A, k), 1e-11 * b, 1e-14), k) for b, a, k in low)[:n]
     modes = [_positive(whole_rotor(rotor, A, speed), k + 1).only(slice(k, k + 1)) for speed, k in crossings]
     cut = f"the list is cut: {counted(count - n, 'more critical speed')} in this range; -n {count} lists all"
     return modes, warnings, cut if count > n else ""
+
+
+def _gap(speed: float, rotor: Rotor, A: Matrices, k: int, sign: float = 1.0) -> float:
+    """λ − Ω² of mode k, from 0; one that a thin disc takes away lies above the speed."""
+    squares = _positive(whole_rotor(rotor, A, speed), k + 1).squares
+    return sign * float((squares[k] if k < squares.size else 4 * speed**2) - speed**2)
+
+
+def _brackets(rotor: Rotor, A: Matrices, knots: FloatArray) -> tuple[float, list[tuple[float, float, int]]]:
+    """Lowest natural frequency at the first knot, and every (upper end, lower end, mode) with one crossing.
+
+    |λ − Ω²| of a mode is nearly convex where it is small, between knots: without a change of sign, a part of
+    this can hold two crossings only if the lines through the parts beside it fall below 0 in it.
+    """
+    from scipy.optimize import minimize_scalar
+
+    top = (1.01 * knots[-1]) ** 2
+    squares = _positive(whole_rotor(rotor, A, knots[0]), 1, top).squares
+    lowest, brackets = math.sqrt(squares[0]), []
+    for low, high in itertools.pairwise(knots):
+        speeds, lists = low + (high - low) * _PARTS, [squares]
+        for speed in speeds[1:]:
+            squares = _positive(whole_rotor(rotor, A, speed), squares.size, top).squares
+            lists.append(squares)
+        steps = np.diff(speeds)
+        for k, mode in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
+            gaps = mode - speeds**2
+            slopes, signs, points = np.diff(gaps) / steps, np.sign(gaps), dict(zip(speeds, gaps, strict=True))
+            right, left = gaps[1:-2] + slopes[:-2] * steps[1:-1], gaps[2:-1] - slopes[2:] * steps[1:-1]
+            inside = np.array([gaps[2:-1], -right, -left]) * signs[1:-2]
+            for i in 1 + np.flatnonzero((inside > 0).all(axis=0)):
+                ends, args = speeds[i : i + 2], (rotor, A, k, signs[i])
+                turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * high})
+                points[turn.x] = signs[i] * turn.fun
+            for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
+                if (one > 0) != (other > 0):
+                    brackets.append((b, a, k))
+    return lowest, sorted(brackets)
 
 
 def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
@@ -488,8 +501,10 @@ class Pencil:
         What it describes.
     stiffness, mass
         Upper bands, shape (width + 1, size); Hermitian, the stiffness not negative.
+    waves, tilts
+        Unknowns of the shaft that are deflections and slopes, shape (w, N): forward and backward.
     shaft
-        All unknowns of the shaft, shape (w, size of its matrices): forward and backward wave.
+        All unknowns of the shaft, shape (w, size of its matrices).
     springs
         Unknowns, shape (u,), and their Hermitian stiffness, shape (u, u).
     hold
@@ -502,6 +517,8 @@ class Pencil:
     matrices: Matrices
     stiffness: AnyArray
     mass: AnyArray
+    waves: IndexArray
+    tilts: IndexArray
     shaft: IndexArray
     springs: list[tuple[IndexArray, AnyArray]]
     hold: float
@@ -511,16 +528,6 @@ class Pencil:
     def size(self) -> int:
         """Number of unknowns."""
         return int(self.mass.shape[1])
-
-    @property
-    def waves(self) -> IndexArray:
-        """Unknowns that are deflections, shape (w, N)."""
-        return self.shaft[:, self.matrices.deflections]
-
-    @property
-    def tilts(self) -> IndexArray:
-        """Unknowns that are slopes, shape (w, N)."""
-        return self.shaft[:, self.matrices.deflections + 1]
 
     def energy(self, X: AnyArray) -> AnyArray:
         """Xᴴ K X, shape (m, m), summed from strains: few digits are lost."""
@@ -552,15 +559,16 @@ def _pencil(
     planes, w = len(whirls), A.deflections
     feet = [(A.deflection(node), pedestal) for node, _, pedestal in held if pedestal]
     order = np.append(np.arange(A.size), [at + 0.5 for at, _ in feet]).argsort(kind="stable")
-    places = (
-        planes * order.argsort() + np.arange(planes)[:, None]
-    )  # a foot stands behind its node's deflection
+    # Waves alternate, and a foot stands behind the deflection of its node.
+    places = planes * order.argsort() + np.arange(planes)[:, None]
     shaft, stands = places[:, : A.size], iter(range(A.size, order.size))
     springs: list[tuple[IndexArray, AnyArray]] = []
 
     def spring(k: FloatArray, *ends: int) -> None:
-        form, sides = np.real_if_close((FROM_XY @ k @ TO_XY)[:planes, :planes]), (1, -1)[: len(ends)]
-        springs.append((places[:, ends].T.ravel(), np.kron(np.outer(sides, sides), form)))
+        form = np.real_if_close((FROM_XY @ k @ TO_XY)[:planes, :planes])
+        springs.append(
+            (places[:, ends].T.ravel(), form if len(ends) < 2 else np.kron([[1, -1], [-1, 1]], form))
+        )
 
     for node, k, pedestal in held:
         foot = [next(stands)] if pedestal else []
@@ -581,15 +589,15 @@ def _pencil(
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
             spring(support.tilting_stiffness * np.eye(2), A.deflection(support.node) + 1)
-    s, motions = rotor.positions / rotor.positions[-1], np.zeros((order.size, 2))
-    motions[w], motions[w + 1, 1] = np.column_stack((s**0, s)), 1 / rotor.positions[-1]
-    R = np.zeros((places.size, 2 * planes))
-    R[places.T.ravel()] = np.kron(motions, np.eye(planes))
+    s, R = rotor.positions / rotor.positions[-1], np.zeros((places.size, 2 * planes))
+    for wave, row in enumerate(shaft):
+        turn = wave - planes
+        R[row[w], wave], R[row[w], turn], R[row[w + 1], turn] = 1.0, s, 1 / rotor.positions[-1]
     energies = [(R[u].T @ form @ R[u], np.abs(form).max()) for u, form in springs]
     hold = float(sum(np.trace(E).real for E, _ in energies)) / planes
     values, V = np.linalg.eigh(sum((E / largest for E, largest in energies), np.zeros((2 * planes,) * 2)))
     rigid = R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
-    return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
+    return Pencil(rotor, A, K, M, shaft[:, w], shaft[:, w + 1], shaft, springs, hold, rigid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -627,9 +635,7 @@ class Spectrum:
     def only(self, which: slice | IndexArray) -> Spectrum:
         """Some modes."""
         squares, signs, rounding = (array[which] for array in (self.squares, self.signs, self.rounding))
-        return Spectrum(
-            squares, self.vectors[:, which], signs, self.shift, self.factor, rounding, self.pencil
-        )
+        return replace(self, squares=squares, vectors=self.vectors[:, which], signs=signs, rounding=rounding)
 
     @property
     def motion(self) -> ComplexArray:
@@ -733,7 +739,8 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int) -> AnyArray:
     from scipy.linalg import lapack
 
     tbtrs, adjoint = (lapack.ztbtrs, "C") if np.iscomplexobj(U) else (lapack.dtbtrs, "T")
-    size, block = pencil.size, m + 1
+    size, block = pencil.size, 4  # equal frequencies are not missed
+    most = min(m + 1, size - pencil.rigid.shape[1])
     loads = multiply(pencil.mass, pencil.rigid).astype(U.dtype)
     rigid = np.linalg.qr(tbtrs(U, loads, trans=adjoint)[0])[0] if loads.size else loads
 
@@ -752,10 +759,12 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int) -> AnyArray:
             for _ in range(2):
                 Z = Z - basis @ (basis.conj().T @ Z)
             V, beta = np.linalg.qr(Z)
-            mu, Q = _largest(basis.conj().T @ image, block)
+            if basis.shape[1] < 2 * m + block:
+                continue
+            mu, Q = _largest(basis.conj().T @ image, most)
             # What the operator adds outside the basis; on fine meshes rounding stops it before the tolerance.
             outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / np.abs(mu[:m])
             last, residual = residual, outside.max(initial=0.0)
             if residual < 3e-10 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, basis @ Q)[0])
-    return np.asarray(tbtrs(U, _largest(operator(np.eye(size, dtype=U.dtype)), block)[1])[0])
+    return np.asarray(tbtrs(U, _largest(operator(np.eye(size, dtype=U.dtype)), most)[1])[0])
