@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +14,7 @@ from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
-from rotorid.base.tables import Column, Table, frame
-
-if TYPE_CHECKING:
-    import pandas as pd
+from rotorid.base.tables import Column, Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,10 +66,6 @@ class SpeedMap(Result):
             *(Column(f"critical_speed_{k}_rad_s", v) for k, v in enumerate(self.speeds.T, start=1)),
         )
         return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per stiffness, one column per critical speed."""
-        return frame(self.tables()[1])
 
     def sentence(self) -> str:
         """What the map is of."""
@@ -132,9 +125,9 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
 
 def _curves(support: Support, name: str) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
     """Label, stiffness with its pedestal, and the speeds at which the support has it."""
-    k, where = support.at(support.speeds or (0.0,))[0][:, [0, 1], [0, 1]], np.array(support.speeds)
-    if support.pedestal is not None:
-        k = k * support.pedestal.xy("stiffness") / (k + support.pedestal.xy("stiffness"))
+    where = np.array(support.speeds)
+    K = support.dynamic_stiffness(np.zeros(max(where.size, 1)), where if where.size else 0.0).real
+    k = K[:, [0, 1], [0, 1]]
     if np.array_equal(*k.T):
         return ((name, k[:, 0], where),)
     return tuple((f"{name}, {direction}", curve, where) for direction, curve in zip("xy", k.T, strict=True))

@@ -72,6 +72,10 @@ class Result(Answered):
         """The numbers."""
         raise NotImplementedError
 
+    def to_frame(self) -> pd.DataFrame:
+        """The last of the tables: of modes, a row per node."""
+        return frame(self.tables()[-1])
+
     def sentence(self) -> str:
         """The answer."""
         raise NotImplementedError
@@ -159,30 +163,26 @@ class Modes(Result):
 
     def tables(self) -> tuple[Table, ...]:
         """The critical speeds; and the shapes, a row for each node."""
-        ways = zip(self.frequencies, self.direction, strict=True)
-        rpm, speed = "critical_speeds_rpm.*", "critical_speeds_rad_s.*"
+        shown, hertz = "{:.4f}".format, self.frequencies / math.tau
+        whirl = np.where(self.frequencies > 0, self.direction, "rigid body")
         errors = () if self.std is None else (_NORMAL_95 * RPM * self.std,)
         speeds = (
             Column("mode", range(1, self.frequencies.size + 1)),
-            Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways]),
-            Column("rpm", self.rpm, "{:.2f}".format, rpm),
+            Column("whirl", whirl.tolist()),
+            Column("rpm", self.rpm, "{:.2f}".format, "critical_speeds_rpm.*"),
             *(Column("± (95 %)", values, error_figures) for values in errors),
-            Column("Hz", self.frequencies / math.tau, "{:.4f}".format, speed, 1 / math.tau),
-            Column("rad/s", self.frequencies, "{:.4f}".format, speed),
+            Column("Hz", hertz, shown, "critical_speeds_rad_s.*", 1 / math.tau),
+            Column("rad/s", self.frequencies, shown, "critical_speeds_rad_s.*"),
         )
         shapes = (
             Column("node", range(1, self.rotor.n_nodes + 1)),
             Column("position_m", self.positions, "{:.6g}".format, "positions_m.*"),
             *(
-                Column(f"mode_{k + 1}", shape, "{:.4f}".format, f"mode_shapes.{k}.*")
+                Column(f"mode_{k + 1}", shape, shown, f"mode_shapes.{k}.*")
                 for k, shape in enumerate(self.shapes.T)
             ),
         )
         return (Table("critical speeds", speeds), Table("mode shapes", shapes))
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per node: number, position and the deflection in each mode."""
-        return frame(self.tables()[1])
 
     def sentence(self) -> str:
         """How many critical speeds there are, and the first, in rpm."""
@@ -242,10 +242,6 @@ class MeshCheck(Result):
             Column("rate (none: rounding)", self.rates, "{:.2f}".format, "rate.*"),
         )
         return (Table("errors of the mesh", columns),)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per critical speed."""
-        return frame(self.tables()[0])
 
     def sentence(self) -> str:
         """Whether the mesh is fine enough for 0.1 %, and what would be."""
@@ -463,6 +459,8 @@ def _brackets(rotor: Rotor, A: Matrices, knots: FloatArray) -> tuple[float, list
         for speed in speeds[1:]:
             squares = _positive(whole_rotor(rotor, A, speed), squares.size, top).squares
             lists.append(squares)
+        if 0 < squares[0] < 1e-12 * top:
+            raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
         steps = np.diff(speeds)
         for k, mode in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
             gaps = mode - speeds**2
@@ -484,10 +482,9 @@ def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
     finite, m = finite_modes(pencil), n
     while True:
         spectrum = lowest_modes(pencil.rotor, pencil.matrices, min(m, finite), pencil)
-        order = np.argsort(spectrum.squares, kind="stable")
-        positive = order[spectrum.squares[order] >= 0]
-        if m >= finite or (positive.size >= n and spectrum.squares.max() > top):
-            return spectrum.only(positive)
+        negative = np.count_nonzero(spectrum.squares < 0)
+        if m >= finite or (m - negative >= n and spectrum.squares.max() > top):
+            return spectrum.only(np.argsort(spectrum.squares, kind="stable")[negative:])
         m = 2 * m + 2
 
 
@@ -693,7 +690,7 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
         np.linalg.solve(np.linalg.cholesky(G), R.conj().T).conj().T
     )  # first the translation, then the turn
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
-    moving = _vectors(pencil, U, elastic)
+    moving = _vectors(pencil, U, elastic, multiply(pencil.mass, fixed))
     try:
         L = np.linalg.inv(np.linalg.cholesky(pencil.energy(moving)))
     except np.linalg.LinAlgError:
@@ -731,22 +728,21 @@ def _largest(T: AnyArray, m: int) -> tuple[FloatArray, AnyArray]:
     return mu[order], Q[:, order]
 
 
-def _vectors(pencil: Pencil, U: AnyArray, m: int) -> AnyArray:
+def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> AnyArray:
     """U⁻¹ times eigenvectors of U⁻ᴴ M U⁻¹ of the largest eigenvalues: m, and one that may be less exact.
 
-    Rigid motions are none of them.
+    None of them is a rigid motion: `rigid` is M times these.
     """
     from scipy.linalg import lapack
 
     tbtrs, adjoint = (lapack.ztbtrs, "C") if np.iscomplexobj(U) else (lapack.dtbtrs, "T")
     size, block = pencil.size, 4  # equal frequencies are not missed
-    most = min(m + 1, size - pencil.rigid.shape[1])
-    loads = multiply(pencil.mass, pencil.rigid).astype(U.dtype)
-    rigid = np.linalg.qr(tbtrs(U, loads, trans=adjoint)[0])[0] if loads.size else loads
+    most = min(m + 1, size - rigid.shape[1])
 
     def operator(V: AnyArray) -> AnyArray:
-        Z = tbtrs(U, multiply(pencil.mass, tbtrs(U, V)[0]), trans=adjoint)[0]
-        return Z - rigid @ (rigid.conj().T @ Z)
+        W = tbtrs(U, V)[0]
+        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
+        return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
 
     if size > DENSE:
         V = np.random.default_rng(0).standard_normal((block, size)).astype(U.dtype).T
