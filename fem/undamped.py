@@ -32,6 +32,7 @@ from fem.assembly import (
     TO_XY,
     Matrices,
     assemble,
+    dense,
     ignored_inertia,
     multiply,
     rounding_error,
@@ -763,4 +764,7 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> AnyArray:
             last, residual = residual, outside.max(initial=0.0)
             if residual < 3e-10 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, basis @ Q)[0])
-    return np.asarray(tbtrs(U, _largest(operator(np.eye(size, dtype=U.dtype)), most)[1])[0])
+    T = dense(pencil.mass) - rigid @ rigid.conj().T
+    for _ in range(2):
+        T = tbtrs(U, T, trans=adjoint)[0].conj().T
+    return np.asarray(tbtrs(U, _largest(T, most)[1])[0])
