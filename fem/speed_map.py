@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +14,7 @@ from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
-from rotorid.base.tables import Column, Table, frame
-
-if TYPE_CHECKING:
-    import pandas as pd
+from rotorid.base.tables import Column, Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,10 +67,6 @@ class SpeedMap(Result):
         )
         return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per stiffness, one column per critical speed."""
-        return frame(self.tables()[1])
-
     def sentence(self) -> str:
         """What the map is of."""
         return (
@@ -108,8 +101,8 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     flexural = 48 * bending / rotor.positions[-1] ** 4
     if stiffness is None:
         stiffness = flexural * np.logspace(-4, 4, 33)
-    k = np.atleast_1d(np.array(stiffness, float))
-    if k.ndim != 1 or not k.size or not (np.isfinite(k) & (k > 0)).all() or (np.diff(k) <= 0).any():
+    k = np.array(stiffness, float, ndmin=1)
+    if k.ndim > 1 or not k.size or not (np.isfinite(k) & (np.diff(k, prepend=0.0) > 0)).all():
         raise ValueError("stiffness must be finite, above 0 and ascending, in N/m")
 
     def at(value: float) -> FloatArray:
@@ -119,22 +112,19 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
         lowest = lowest_critical_speeds(other, n, 1 if rotor.model.gyroscopic else n).frequencies
         return np.append(lowest, n * [np.nan])[:n]
 
-    speeds = np.array([at(value) for value in k.tolist()])
     # ω∞ (1 − c/k) for stiff supports; for soft ones ω₀ + c k, or, of rigid motions, the root of k.
-    stiff, soft = max(1e5 * flexural, 10 * k[-1]), 1e-4 * k[0]
-    pinned = 2 * at(2 * stiff) - at(stiff)
-    one, softer = at(soft), at(soft / 4)
-    free = np.where(np.abs(softer / one - 0.5) < 0.05, 0.0, softer - (one - softer) / 3)
-    read_only(k, speeds, free, pinned)
+    soft, stiff = 1e-4 * k[0], max(1e5 * flexural, 10 * k[-1])
+    softer, less, *speeds, more, stiffer = map(at, [soft / 4, soft, *k, stiff, 2 * stiff])
+    pinned, chart = 2 * stiffer - more, np.array(speeds)
+    free = np.where(np.abs(softer / less - 0.5) < 0.05, 0.0, softer - (less - softer) / 3)
+    read_only(k, chart, free, pinned)
     curves = (_curves(s, s.name or f"support {i}") for i, s in enumerate(rotor.supports, 1))
-    return SpeedMap(k, speeds, free, pinned, sum(curves, ()), rotor)
+    return SpeedMap(k, chart, free, pinned, sum(curves, ()), rotor)
 
 
 def _curves(support: Support, name: str) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
     """Label, stiffness with its pedestal, and the speeds at which the support has it."""
-    k, where = support.at(support.speeds or (0.0,))[0][:, [0, 1], [0, 1]], np.array(support.speeds)
-    if support.pedestal is not None:
-        k = k * support.pedestal.xy("stiffness") / (k + support.pedestal.xy("stiffness"))
-    if np.array_equal(*k.T):
-        return ((name, k[:, 0], where),)
-    return tuple((f"{name}, {direction}", curve, where) for direction, curve in zip("xy", k.T, strict=True))
+    K = np.array([support.dynamic_stiffness(0.0, speed).real for speed in support.speeds or (0.0,)])
+    x, y = K[:, 0, 0], K[:, 1, 1]
+    curves = {name: x} if np.array_equal(x, y) else {f"{name}, x": x, f"{name}, y": y}
+    return tuple((label, curve, np.array(support.speeds)) for label, curve in curves.items())

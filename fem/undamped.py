@@ -12,9 +12,6 @@ eigenvalues 1 / (λ + σ), the wanted ones the largest: from its block Krylov sp
 are not missed, or, of few unknowns, from all of them. These vectors span a Rayleigh–Ritz step with energies
 summed from the strains of the elements: they keep digits that the matrices lose, so that an element
 of 1/1000 of its neighbour costs 1e-8 of a frequency, not 1e-4.
-
-Measured for three modes with all else that `critical_speeds` does, milliseconds: 0.6 at 23 elements, 0.9 at
-92 and 1.8 at 460; `scipy.sparse.linalg.eigsh` on sparse matrices alone takes about five times as much.
 """
 
 from __future__ import annotations
@@ -32,12 +29,14 @@ from fem.assembly import (
     TO_XY,
     Matrices,
     assemble,
+    dense,
     ignored_inertia,
     multiply,
     rounding_error,
     static_stiffness,
 )
 from fem.elements import strains
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.rotor import Pedestal, Rotor, refined
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, read_only
@@ -60,7 +59,7 @@ _UNSTABLE = (
     "negative stiffness, elements are far too short, or thin discs (polar inertia above diametral) turn a "
     "free rotor, which soft supports at two nodes would hold"
 )
-_PARTS = 8  # of each interval of the bearing tables, between which a mode crosses the speed once or twice
+_PARTS = (1 - np.cos(np.linspace(0, np.pi, 11))) / 2  # of an interval of the tables: fine at its ends
 _NORMAL_95 = 1.959964
 
 
@@ -70,6 +69,10 @@ class Result(Answered):
     def tables(self) -> tuple[Table, ...]:
         """The numbers."""
         raise NotImplementedError
+
+    def to_frame(self) -> pd.DataFrame:
+        """The last of the tables: of modes, a row per node."""
+        return frame(self.tables()[-1])
 
     def sentence(self) -> str:
         """The answer."""
@@ -107,7 +110,8 @@ class Modes(Result):
         The rotor.
     direction
         Of each mode: "forward" (with the rotation), "backward", or "mixed" where the orbits of different
-        nodes turn in different directions or are straight lines. On rotationally symmetric supports
+        nodes turn in different directions or are straight lines, as `whirl_direction` has it: orbits of less
+        than 1 % of the largest area do not count. On rotationally symmetric supports
         only forward critical speeds are listed: unbalance does not excite the others.
     x, y
         Complex amplitudes of both lateral directions, shape (N, n), in the scale of `shapes`.
@@ -158,30 +162,26 @@ class Modes(Result):
 
     def tables(self) -> tuple[Table, ...]:
         """The critical speeds; and the shapes, a row for each node."""
-        ways = zip(self.frequencies, self.direction, strict=True)
-        rpm, speed = "critical_speeds_rpm.*", "critical_speeds_rad_s.*"
+        shown, hertz = "{:.4f}".format, self.frequencies / math.tau
+        whirl = np.where(self.frequencies > 0, self.direction, "rigid body")
         errors = () if self.std is None else (_NORMAL_95 * RPM * self.std,)
         speeds = (
             Column("mode", range(1, self.frequencies.size + 1)),
-            Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways]),
-            Column("rpm", self.rpm, "{:.2f}".format, rpm),
+            Column("whirl", whirl.tolist()),
+            Column("rpm", self.rpm, "{:.2f}".format, "critical_speeds_rpm.*"),
             *(Column("± (95 %)", values, error_figures) for values in errors),
-            Column("Hz", self.frequencies / math.tau, "{:.4f}".format, speed, 1 / math.tau),
-            Column("rad/s", self.frequencies, "{:.4f}".format, speed),
+            Column("Hz", hertz, shown, "critical_speeds_rad_s.*", 1 / math.tau),
+            Column("rad/s", self.frequencies, shown, "critical_speeds_rad_s.*"),
         )
         shapes = (
             Column("node", range(1, self.rotor.n_nodes + 1)),
             Column("position_m", self.positions, "{:.6g}".format, "positions_m.*"),
             *(
-                Column(f"mode_{k + 1}", shape, "{:.4f}".format, f"mode_shapes.{k}.*")
+                Column(f"mode_{k + 1}", shape, shown, f"mode_shapes.{k}.*")
                 for k, shape in enumerate(self.shapes.T)
             ),
         )
         return (Table("critical speeds", speeds), Table("mode shapes", shapes))
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per node: number, position and the deflection in each mode."""
-        return frame(self.tables()[1])
 
     def sentence(self) -> str:
         """How many critical speeds there are, and the first, in rpm."""
@@ -241,10 +241,6 @@ class MeshCheck(Result):
             Column("rate (none: rounding)", self.rates, "{:.2f}".format, "rate.*"),
         )
         return (Table("errors of the mesh", columns),)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per critical speed."""
-        return frame(self.tables()[0])
 
     def sentence(self) -> str:
         """Whether the mesh is fine enough for 0.1 %, and what would be."""
@@ -344,24 +340,16 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
     else:
         parts, beyond, cut = _over_speed(rotor, A, most)
         warnings = beyond + warnings
-    squares, rounding = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("squares", "rounding")
-    )
+    squares = np.concatenate([part.squares for part in parts])
     x, y, tilt_x, tilt_y = np.concatenate([part.motion for part in parts], axis=2)
     in_x = np.abs(x).max(axis=0) >= np.abs(y).max(axis=0) * (1 - 1e-6)
     major, tilt = np.where(in_x, (x, tilt_x), (y, tilt_y))
     largest = major[np.abs(major).argmax(axis=0), np.arange(squares.size)]
     scale = 1 / np.where(np.abs(major[0]) > 1e-6 * np.abs(largest), major[0], largest)
-    forward, backward = np.abs(x + 1j * y), np.abs(x - 1j * y)
-    size = forward + backward
-    turning = (forward - backward) / np.where(size > 1e-6 * size.max(axis=0), size, np.nan)
-    direction = tuple(
-        "forward" if least > 1e-6 else "backward" if largest < -1e-6 else "mixed"
-        for least, largest in zip(np.fmin.reduce(turning), np.fmax.reduce(turning), strict=True)
-    )
+    direction = tuple(DIRECTION_NAMES[way] for way in whirl_direction(x.T, y.T).tolist())
     arrays = np.sqrt(squares), (major * scale).real, (tilt * scale).real, x * scale, y * scale
     read_only(*arrays)
-    warnings += fine_mesh_warning(rotor, rounding)
+    warnings += fine_mesh_warning(rotor, np.concatenate([part.rounding for part in parts]))
     return Modes(*arrays[:3], rotor, direction, *arrays[3:], warnings, cut)
 
 
@@ -423,71 +411,69 @@ def critical_speeds_near(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 
 def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Spectrum], tuple[str, ...], str]:
     """The n lowest crossings of natural frequency and speed in the tables, warnings, and what is cut off."""
+    from scipy.optimize import brentq
+
     tables = [support.speeds for support in rotor.supports if support.speeds]
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
         raise ValueError("the tables of the supports have no speed in common: extend them")
-    begin, count, crossings = _crossings(
-        rotor, A, rotor.knots[(rotor.knots >= first) & (rotor.knots <= last)], n
-    )
+    knots = rotor.knots[(rotor.knots >= first) & (rotor.knots <= last)]
+    lowest, brackets = _brackets(rotor, A, knots)
+    count = len(brackets)
     band = f"between {first:.6g} and {last:.6g} rad/s, where the bearing tables hold"
-    lowest = f"the lowest natural frequency at {first:.6g} rad/s is {begin:.6g} rad/s"
+    beginning = f"the lowest natural frequency at {first:.6g} rad/s is {lowest:.6g} rad/s"
     if not count:
-        raise ValueError(f"no critical speed lies {band}; {lowest}: extend the tables")
+        raise ValueError(f"no critical speed lies {band}; {beginning}: extend the tables")
     warnings: tuple[str, ...] = ()
     if count < n:
         warnings += (f"there are only {count} of {n} critical speeds {band}; extend them to find more",)
-    if begin < first:
-        warnings += (f"{lowest}, where the bearing tables begin: {NOT_COUNTED}",)
-    cut = f"the list is cut: {counted(count - n, 'more critical speed')} in this range; -n {count} lists all"
+    if lowest < first:
+        warnings += (f"{beginning}, where the bearing tables begin: {NOT_COUNTED}",)
+    low = [bracket for bracket in brackets if bracket[1] < brackets[min(n, count) - 1][0]]
+    crossings = sorted((brentq(_gap, a, b, (rotor, A, k), 1e-11 * b, 1e-14), k) for b, a, k in low)[:n]
     modes = [_positive(whole_rotor(rotor, A, speed), k + 1).only(slice(k, k + 1)) for speed, k in crossings]
+    cut = f"the list is cut: {counted(count - n, 'more critical speed')} in this range; -n {count} lists all"
     return modes, warnings, cut if count > n else ""
 
 
-def _crossings(
-    rotor: Rotor, A: Matrices, knots: FloatArray, n: int
-) -> tuple[float, int, list[tuple[float, int]]]:
-    """Lowest natural frequency at the first knot, number of crossings, and the n lowest: speed, mode from 0.
+def _gap(speed: float, rotor: Rotor, A: Matrices, k: int, sign: float = 1.0) -> float:
+    """λ − Ω² of mode k, from 0; one that a thin disc takes away lies above the speed."""
+    squares = _positive(whole_rotor(rotor, A, speed), k + 1).squares
+    return sign * float((squares[k] if k < squares.size else 4 * speed**2) - speed**2)
 
-    λ − Ω² of a mode changes its sign between two speeds of a grid, or between one of them and a dip.
+
+def _brackets(rotor: Rotor, A: Matrices, knots: FloatArray) -> tuple[float, list[tuple[float, float, int]]]:
+    """Lowest natural frequency at the first knot, and every (upper end, lower end, mode) with one crossing.
+
+    |λ − Ω²| of a mode is nearly convex where it is small, between knots: without a change of sign, a part of
+    this can hold two crossings only if the lines through the parts beside it fall below 0 in it.
     """
-    from scipy.optimize import brentq, minimize_scalar
+    from scipy.optimize import minimize_scalar
 
-    speeds = np.interp(np.arange(_PARTS * (knots.size - 1) + 1) / _PARTS, np.arange(knots.size), knots)
     top = (1.01 * knots[-1]) ** 2
-
-    def gap(speed: float, k: int, sign: float = 1.0) -> float:
-        squares = _positive(whole_rotor(rotor, A, speed), k + 1).squares
-        return sign * float((squares[k] if k < squares.size else top) - speed**2)
-
-    lists: list[FloatArray] = []
-    for speed in speeds:
-        count = lists[-1].size if lists else 1
-        lists.append(_positive(whole_rotor(rotor, A, speed), count, top).squares)
-    if 0 < lists[-1][0] < 1e-12 * top:
-        raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
-    brackets = []
-    for k, squares in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
-        gaps = squares - speeds**2
-        points = dict(zip(speeds, gaps, strict=True))
-        for i, sign in enumerate(np.sign(gaps)):
-            beside = [j for j in (i - 1, i + 1) if 0 <= j < gaps.size and sign * gaps[j] > 0]
-            near = [i, *beside]
-            size = np.abs(gaps[near])
-            if size[0] == size.min() < np.ptp(size):
-                inside = speeds[i] + 0.01 * (speeds[beside[0]] - speeds[i])
-                if len(beside) > 1 or gap(inside, k, sign) < size[0]:
-                    ends = speeds[min(near)], speeds[max(near)]
-                    dip = minimize_scalar(gap, bounds=ends, args=(k, sign), options={"xatol": 1e-7 * ends[1]})
-                    points[dip.x] = sign * dip.fun
-        for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
-            if (one > 0) != (other > 0):
-                brackets.append((b, a, k))
-    brackets.sort()
-    count = len(brackets)
-    low = [bracket for bracket in brackets if bracket[1] < brackets[min(n, count) - 1][0]]
-    roots = sorted((brentq(gap, a, b, (k,), 1e-11 * b, 1e-14), k) for b, a, k in low)
-    return math.sqrt(lists[0][0]), count, roots[:n]
+    squares = _positive(whole_rotor(rotor, A, knots[0]), 1, top).squares
+    lowest, brackets = math.sqrt(squares[0]), []
+    for low, high in itertools.pairwise(knots):
+        speeds, lists = low + (high - low) * _PARTS, [squares]
+        for speed in speeds[1:]:
+            squares = _positive(whole_rotor(rotor, A, speed), squares.size, top).squares
+            lists.append(squares)
+        if 0 < squares[0] < 1e-12 * top:
+            raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
+        steps = np.diff(speeds)
+        for k, mode in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
+            gaps = mode - speeds**2
+            slopes, signs, points = np.diff(gaps) / steps, np.sign(gaps), dict(zip(speeds, gaps, strict=True))
+            right, left = gaps[1:-2] + slopes[:-2] * steps[1:-1], gaps[2:-1] - slopes[2:] * steps[1:-1]
+            inside = np.array([gaps[2:-1], -right, -left]) * signs[1:-2]
+            for i in 1 + np.flatnonzero((inside > 0).all(axis=0)):
+                ends, args = speeds[i : i + 2], (rotor, A, k, signs[i])
+                turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * high})
+                points[turn.x] = signs[i] * turn.fun
+            for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
+                if (one > 0) != (other > 0):
+                    brackets.append((b, a, k))
+    return lowest, sorted(brackets)
 
 
 def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
@@ -495,10 +481,9 @@ def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
     finite, m = finite_modes(pencil), n
     while True:
         spectrum = lowest_modes(pencil.rotor, pencil.matrices, min(m, finite), pencil)
-        order = np.argsort(spectrum.squares, kind="stable")
-        positive = order[spectrum.squares[order] >= 0]
-        if m >= finite or (positive.size >= n and spectrum.squares.max() > top):
-            return spectrum.only(positive)
+        negative = np.count_nonzero(spectrum.squares < 0)
+        if m >= finite or (m - negative >= n and spectrum.squares.max() > top):
+            return spectrum.only(np.argsort(spectrum.squares, kind="stable")[negative:])
         m = 2 * m + 2
 
 
@@ -567,60 +552,48 @@ def _pencil(
 ) -> Pencil:
     """Pencil on springs: node, stiffness in (x, y), shape (2, 2), and what they stand on."""
     held = [spring for spring in held if spring[1].any()]
-    planes, feet = len(whirls), [A.deflection(node) + 0.5 for node, _, pedestal in held if pedestal]
-    wave, order = np.arange(planes)[:, None], np.argsort(np.append(np.arange(A.size), feet), kind="stable")
-    places = planes * np.argsort(order) + wave  # a foot stands behind the deflection of its node
-    shaft, stands = places[:, : A.size], iter(places[:, A.size :].T)
-    waves, tilts = shaft[:, A.deflections], shaft[:, A.deflections + 1]
-    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
-    complex_form = planes > 1 and any(k[0, 1] for _, k, _ in held)
-    K, M = np.zeros((2, places.size, width + 1), complex if complex_form else float).transpose(0, 2, 1)
-    inertia = A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
-    if K.shape == A.shaft.shape:
-        K[:], M[:] = A.shaft, inertia[0]
-    else:
-        for row in range(A.width + 1):
-            i, j = shaft[:, : A.size - A.width + row], shaft[:, A.width - row :]
-            K[width + i - j, j] += A.shaft[row, A.width - row :]
-            M[width + i - j, j] += inertia[:, row, A.width - row :]
+    planes, w = len(whirls), A.deflections
+    feet = [(A.deflection(node), pedestal) for node, _, pedestal in held if pedestal]
+    order = np.append(np.arange(A.size), [at + 0.5 for at, _ in feet]).argsort(kind="stable")
+    # Waves alternate, and a foot stands behind the deflection of its node.
+    places = planes * order.argsort() + np.arange(planes)[:, None]
+    shaft, stands = places[:, : A.size], iter(range(A.size, order.size))
     springs: list[tuple[IndexArray, AnyArray]] = []
 
-    def spring(k: FloatArray, *ends: IndexArray) -> None:
-        form = (FROM_XY @ k @ TO_XY)[:planes, :planes]
-        if len(ends) > 1:
-            form = np.kron([[1, -1], [-1, 1]], form)
-        springs.append((np.concatenate(ends), form if complex_form else form.real))
+    def spring(k: FloatArray, *ends: int) -> None:
+        form = np.real_if_close((FROM_XY @ k @ TO_XY)[:planes, :planes])
+        springs.append(
+            (places[:, ends].T.ravel(), form if len(ends) < 2 else np.kron([[1, -1], [-1, 1]], form))
+        )
 
     for node, k, pedestal in held:
         foot = [next(stands)] if pedestal else []
-        spring(k, waves[:, node - 1], *foot)
+        spring(k, A.deflection(node), *foot)
         if pedestal:
             spring(np.diag(pedestal.xy("stiffness")), *foot)
-            M[-1, foot] += pedestal.mass
+    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
+    kind = np.result_type(float, *(form for _, form in springs))
+    K, M = np.zeros((2, places.size, width + 1), kind).transpose(0, 2, 1)
+    inertia = A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
+    for off in range(A.width + 1):
+        i, j = shaft[:, : A.size - off], shaft[:, off:]
+        K[width + i - j, j], M[width + i - j, j] = A.shaft[-1 - off, off:], inertia[:, -1 - off, off:]
+    M[-1, places[:, A.size :]] = [pedestal.mass for _, pedestal in feet]
     for u, form in springs:
-        for (a, i), (b, j) in itertools.combinations_with_replacement(enumerate(u), 2):
-            K[width + i - j, j] += form[a, b]
+        a, b = np.nonzero(u[:, None] <= u)
+        np.add.at(K, (width + u[a] - u[b], u[b]), form[a, b])
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
-            spring(support.tilting_stiffness * np.eye(2), tilts[:, support.node - 1])
-    motions, s = np.zeros((places.size, planes, 2)), rotor.positions / rotor.positions[-1]
-    motions[waves, wave], motions[tilts, wave, 1] = np.column_stack((s**0, s)), 1 / rotor.positions[-1]
-    R = motions.reshape(places.size, -1)
+            spring(support.tilting_stiffness * np.eye(2), A.deflection(support.node) + 1)
+    s, R = rotor.positions / rotor.positions[-1], np.zeros((places.size, 2 * planes))
+    for wave, row in enumerate(shaft):
+        turn = wave - planes
+        R[row[w], wave], R[row[w], turn], R[row[w + 1], turn] = 1.0, s, 1 / rotor.positions[-1]
     energies = [(R[u].T @ form @ R[u], np.abs(form).max()) for u, form in springs]
     hold = float(sum(np.trace(E).real for E, _ in energies)) / planes
     values, V = np.linalg.eigh(sum((E / largest for E, largest in energies), np.zeros((2 * planes,) * 2)))
-    return Pencil(
-        rotor,
-        A,
-        K,
-        M,
-        waves,
-        tilts,
-        shaft,
-        springs,
-        hold,
-        R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()],
-    )
+    rigid = R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
+    return Pencil(rotor, A, K, M, shaft[:, w], shaft[:, w + 1], shaft, springs, hold, rigid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -658,9 +631,7 @@ class Spectrum:
     def only(self, which: slice | IndexArray) -> Spectrum:
         """Some modes."""
         squares, signs, rounding = (array[which] for array in (self.squares, self.signs, self.rounding))
-        return Spectrum(
-            squares, self.vectors[:, which], signs, self.shift, self.factor, rounding, self.pencil
-        )
+        return replace(self, squares=squares, vectors=self.vectors[:, which], signs=signs, rounding=rounding)
 
     @property
     def motion(self) -> ComplexArray:
@@ -674,15 +645,10 @@ def finite_modes(A: Matrices | Pencil) -> int:
     return int(np.count_nonzero(A.mass[-1]))
 
 
-def rigid_scale(rotor: Rotor) -> float:
-    """About the square of the first bending frequency of the free rotor, rad²/s²."""
-    span = float(rotor.length.sum())
-    bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / span
-    return 500.0 * bending / (max(rotor.total_mass, np.finfo(float).tiny) * span**3)
-
-
 def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     """Shift σ and Cholesky factor of K + σ M; σ = 0 if the supports hold the rotor firmly.
+
+    Else σ is about the square of the first bending frequency of the free rotor.
 
     Raises
     ------
@@ -691,17 +657,17 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     """
     from scipy.linalg import lapack
 
-    free, thin = pencil.rigid.shape[1] > 0, bool((pencil.mass[-1] < 0).any())
-    if not pencil.rotor.total_mass:
+    rotor, free = pencil.rotor, pencil.rigid.shape[1] > 0
+    if not rotor.total_mass:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
-    scale = rigid_scale(pencil.rotor)
-    firm = pencil.hold >= 1e-3 * scale * pencil.rotor.total_mass
+    bending = 500 * (rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / rotor.positions[-1] ** 4
+    scale = float(bending / rotor.total_mass)
     pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
-    for shift in (scale,) if free else (0.0,) if firm else (scale, 0.0):
+    for shift in (scale,) if free else (0.0,) if pencil.hold >= 1e-3 * bending else (scale, 0.0):
         U, info = pbtrf(pencil.stiffness + shift * pencil.mass)
         if info == 0:
             return shift, U
-    raise ValueError(NO_MASS if free and not thin else _UNSTABLE)
+    raise ValueError(NO_MASS if free and (pencil.mass[-1] >= 0).all() else _UNSTABLE)
 
 
 def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None) -> Spectrum:
@@ -715,24 +681,23 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     pencil = pencil or one_plane(rotor, A)
     shift, U = factor(pencil)
     R = pencil.rigid
-    free = R.shape[1]
-    X = _vectors(pencil, U, max(m, free))
-    if free:  # the translation first, then what turns about the centre of mass
-        G = R.conj().T @ multiply(pencil.mass, R)
-        if np.linalg.cond(G) > 1e13:
-            raise ValueError(NO_MASS)
-        X[:, :free] = np.linalg.solve(np.linalg.cholesky(G), R.conj().T).conj().T
+    free, elastic = R.shape[1], max(m - R.shape[1], 0)
+    G = R.conj().T @ multiply(pencil.mass, R)
+    if free and np.linalg.cond(G) > 1e13:
+        raise ValueError(NO_MASS)
+    fixed = (
+        np.linalg.solve(np.linalg.cholesky(G), R.conj().T).conj().T
+    )  # first the translation, then the turn
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
-    fixed, moving = X[:, :free], X[:, free:]
+    moving = _vectors(pencil, U, elastic, multiply(pencil.mass, fixed))
     try:
         L = np.linalg.inv(np.linalg.cholesky(pencil.energy(moving)))
     except np.linalg.LinAlgError:
         raise ValueError(_UNSTABLE) from None
-    mu, Y = np.linalg.eigh(L @ (moving.conj().T @ multiply(pencil.mass, moving)) @ L.conj().T)
-    order = np.argsort(-np.abs(mu), kind="stable")[: max(m - free, 0)]
-    X = np.hstack((fixed, moving @ (L.conj().T @ Y[:, order] / np.sqrt(np.abs(mu[order])))))[:, :m]
-    signs = np.append(np.ones(free), np.sign(mu[order]))[:m]
-    squares = np.append(np.zeros(free), 1 / mu[order])[:m]
+    mu, Y = _largest(L @ (moving.conj().T @ multiply(pencil.mass, moving)) @ L.conj().T, elastic)
+    X = np.hstack((fixed, moving @ (L.conj().T @ Y / np.sqrt(np.abs(mu)))))[:, :m]
+    signs = np.append(np.ones(free), np.sign(mu))[:m]
+    squares = np.append(np.zeros(free), 1 / mu)[:m]
     if shift:  # the softest beside stiff ones
         squares = signs * pencil.energy(X).diagonal().real * (np.arange(m) >= free)
     rounding = rounding_error(pencil.stiffness + shift * pencil.mass, X, np.abs(squares + shift))
@@ -755,21 +720,29 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
     )
 
 
-def _vectors(pencil: Pencil, U: AnyArray, m: int) -> AnyArray:
-    """U⁻¹ times eigenvectors of U⁻ᴴ M U⁻¹ of the largest eigenvalues: m, and one that may be less exact."""
+def _largest(T: AnyArray, m: int) -> tuple[FloatArray, AnyArray]:
+    """The m eigenvalues of largest size, and their vectors."""
+    mu, Q = np.linalg.eigh(T)
+    order = np.argsort(-np.abs(mu), kind="stable")[:m]
+    return mu[order], Q[:, order]
+
+
+def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> AnyArray:
+    """U⁻¹ times eigenvectors of U⁻ᴴ M U⁻¹ of the largest eigenvalues: m, and one that may be less exact.
+
+    None of them is a rigid motion: `rigid` is M times these.
+    """
     from scipy.linalg import lapack
 
     tbtrs, adjoint = (lapack.ztbtrs, "C") if np.iscomplexobj(U) else (lapack.dtbtrs, "T")
+    size, block = pencil.size, 4  # equal frequencies are not missed
+    most = min(m + 1, size - rigid.shape[1])
 
     def operator(V: AnyArray) -> AnyArray:
-        return np.asarray(tbtrs(U, multiply(pencil.mass, tbtrs(U, V)[0]), trans=adjoint)[0])
+        W = tbtrs(U, V)[0]
+        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
+        return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
 
-    def largest(T: AnyArray) -> tuple[FloatArray, AnyArray]:
-        mu, Q = np.linalg.eigh(T)
-        order = np.argsort(-np.abs(mu), kind="stable")[: m + 1]
-        return mu[order], Q[:, order]
-
-    size, block = pencil.size, m + 1
     if size > DENSE:
         V = np.random.default_rng(0).standard_normal((block, size)).astype(U.dtype).T
         V = np.linalg.qr(operator(operator(V)))[0]
@@ -781,10 +754,15 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int) -> AnyArray:
             for _ in range(2):
                 Z = Z - basis @ (basis.conj().T @ Z)
             V, beta = np.linalg.qr(Z)
-            mu, Q = largest(basis.conj().T @ image)
+            if basis.shape[1] < 2 * m + block:
+                continue
+            mu, Q = _largest(basis.conj().T @ image, most)
             # What the operator adds outside the basis; on fine meshes rounding stops it before the tolerance.
             outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / np.abs(mu[:m])
-            last, residual = residual, outside.max()
+            last, residual = residual, outside.max(initial=0.0)
             if residual < 3e-10 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, basis @ Q)[0])
-    return np.asarray(tbtrs(U, largest(operator(np.eye(size, dtype=U.dtype)))[1])[0])
+    T = dense(pencil.mass) - rigid @ rigid.conj().T
+    for _ in range(2):
+        T = tbtrs(U, T, trans=adjoint)[0].conj().T
+    return np.asarray(tbtrs(U, _largest(T, most)[1])[0])

@@ -231,3 +231,22 @@ def test_result_as_table_json_and_text():
     assert "1291.45" in modes.summary()
     with pytest.raises(ValueError, match="read-only"):
         modes.shapes[0, 0] = 0.0
+
+
+def test_a_thin_disc_does_not_take_the_place_of_a_rigid_motion():
+    """Its λ < 0 lies nearer to −σ than 0 does."""
+    import scipy.linalg
+
+    disc, model = fem.Disc(3, 30.0, 1.0, 0.6), fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
+    seen = 0
+    for diameter in np.linspace(0.03, 0.3, 40):
+        rotor = fem.Rotor([0.2] * 6, diameter, discs=[disc], model=model)
+        A = assemble(rotor)
+        pencil = one_plane(rotor, A, 1)
+        spectrum = lowest_modes(rotor, A, 6, pencil)
+        K, M = dense(pencil.stiffness), dense(pencil.mass)
+        squares = 1 / scipy.linalg.eigh(M, K + spectrum.shift * M, eigvals_only=True) - spectrum.shift
+        squares = squares[np.argsort(np.abs(squares))][2:6]
+        np.testing.assert_allclose(np.sort(spectrum.squares[2:]), np.sort(squares), rtol=1e-6)
+        seen += -2 * spectrum.shift < spectrum.squares.min() < -spectrum.shift
+    assert seen
