@@ -167,7 +167,7 @@ class Response(Result):
 
     def readings(self, sensors: Sequence[SensorLike]) -> ComplexArray:
         """`at` for each sensor, shape (S, C)."""
-        return np.stack([self.at(sensor) for sensor in sensors], axis=1)
+        return np.array([self.at(sensor) for sensor in sensors]).reshape(-1, self.speeds.size).T
 
     def bearing_forces(self) -> BearingForces:
         """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
@@ -182,7 +182,7 @@ class Response(Result):
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
         sensors = self.nodes.tolist() if sensors is None else sensors
-        Z = self.readings(sensors).T if sensors else np.zeros((0, self.speeds.size))
+        Z = self.readings(sensors).T
         return plain(
             {
                 "speeds_rad_s": self.speeds,
@@ -435,7 +435,7 @@ def unbalance_response(
     if not masses:
         raise ValueError("no unbalance is given: name at least one node")
     A = assemble(rotor)
-    at = np.array([A.deflection(node) for node in masses], dtype=np.intp)
+    at = A.deflections[[node - 1 for node in masses]]
     U, phasors = unit_loads(A, at) @ np.array(list(masses.values())), np.array([1.0, 1j])
     loads = np.column_stack((U.real, U.imag))  # one complex load is two real ones
     receptance = Receptance(rotor, A, A.deflections, loads, speeds)
@@ -459,9 +459,8 @@ def unbalance_response(
 def judged(response: Response) -> Response:
     """The response with the ranges of speed in which it does not exist."""
     windows, texts = judge(response.rotor, response.speeds)
-    before = [window.sentence() for window in response.windows]
-    kept = [warning for warning in response.warnings if warning not in (*before, *texts)]
-    return replace(response, windows=windows, warnings=(*kept, *texts))
+    others = response.solve(response.speeds.max(keepdims=True)).warnings
+    return replace(response, windows=windows, warnings=(*others, *texts))
 
 
 def influence(
@@ -494,9 +493,9 @@ def influence(
     if not planes or not sensors:
         raise ValueError("name at least one plane and one sensor")
     A = assemble(rotor)
-    at = np.array([A.deflection(rotor.node(plane)) for plane in planes], dtype=np.intp)
+    at = A.deflections[[rotor.node(plane) - 1 for plane in planes]]
     places = [as_sensor(sensor, rotor) for sensor in sensors]
-    unknowns = np.array([A.deflection(rotor.node(sensor.node)) for sensor in places], dtype=np.intp)
+    unknowns = A.deflections[[rotor.node(sensor.node) - 1 for sensor in places]]
     turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
     receptance = Receptance(rotor, A, unknowns, unit_loads(A, at), speeds)
     W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
@@ -537,7 +536,7 @@ class Receptance:
         springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
         tilting = any(support.tilting_stiffness for support in rotor.supports)
         self.exact = exact or bool(at.planes == 2 and ((beta != beta[0]).any() or (beta[0] and tilting)))
-        held = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
+        held = A.deflections[[node - 1 for node in at.nodes]]
         places, units, top = np.concatenate((unknowns, held)), unit_loads(A, held), float(speeds.max())
 
         def series(whirl: int, columns: FloatArray) -> Series:
@@ -643,14 +642,11 @@ class Series:
     def at(self, squared: AnyArray) -> tuple[AnyArray, BoolArray]:
         """Receptance where ω² is given, shape (rows, columns, S); nonsense where the second is true."""
         squares, shift = self.modes.squares, self.modes.shift
-        m, n = squares.size, self.factors.shape[2]
         # Rigid motions have λ = 0 without rounding.
         margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
-        terms = np.ones((n, squared.size), dtype=squared.dtype)
-        gap = np.subtract(squares[:, None], squared, out=terms[:m])
+        gap = squares[:, None] - squared
         near = np.asarray((np.abs(gap) <= margin[:, None]).any(axis=0))
         gap[:, near] = 1.0
-        np.divide(1.0, gap, out=gap)
-        for j in range(m + 1, n):
-            terms[j] = terms[j - 1] * (squared + shift)
+        n = self.factors.shape[2]
+        terms = np.vstack((1 / gap, np.vander(squared + shift, n - squares.size, increasing=True).T))
         return (self.factors.reshape(-1, n) @ terms).reshape(*self.factors.shape[:2], -1), near
