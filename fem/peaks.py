@@ -313,7 +313,8 @@ def response_peaks(
             first = "the speeds end" if end == k else "another peak stands"
             notes.append(f"{first} before the curve falls to 0.707 {side}")
             ends.append(None)
-        AF = None if None in ends else speed / max(ends[1] - ends[0], 1e-300)
+        below, above = ends
+        AF = None if None in ends else speed / max(above - below, 1e-300)
         undamped = AF is not None and AF > _NO_DAMPING
         if undamped:
             notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
@@ -321,7 +322,7 @@ def response_peaks(
         # Inside the range any margin is missing; the smaller requirement is then shown.
         required = operating and AF and required_margin(AF, above=speed > operating[1])
         factor, note = None if undamped else AF, "; ".join(notes)
-        peaks.append(Peak(speed, amplitude, *ends, factor, margin, required, note, undamped))
+        peaks.append(Peak(speed, amplitude, below, above, factor, margin, required, note, undamped))
     return Peaks(tuple(peaks), operating)
 
 
@@ -363,14 +364,12 @@ def resolve_peaks(
     finer = judged(smooth_curves(_with(response, near), sensors))
     peaks = [response_peaks(finer, place, operating=operating) for place in sensors]
     every = [peak for each in peaks for peak in each.peaks]
-    added, undamped = (
-        np.array([peak.speed for peak in every if peak.undamped == kind]) for kind in (False, True)
-    )
-    if undamped.size:  # beside them the amplitude has no limit and no meaning
-        near = (np.abs(finer.speeds[:, None] - undamped) < 1e-2 * undamped).any(axis=1)
-        added = np.append(added, finer.speeds[~near])
-        finer = replace(response, windows=finer.windows, warnings=(*finer.warnings, UNDAMPED))
-    return _with(finer, added), peaks
+    undamped = np.array([peak.speed for peak in every if peak.undamped])
+    added = np.append(finer.speeds, [peak.speed for peak in every])
+    # Beside undamped peaks the amplitude has no limit and no meaning.
+    near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
+    warnings = (*finer.warnings, *[UNDAMPED] * bool(undamped.size))
+    return _with(replace(response, windows=finer.windows, warnings=warnings), added[~near]), peaks
 
 
 def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response:
@@ -397,10 +396,10 @@ def _with(response: Response, speeds: FloatArray) -> Response:
         more = response.solve(extra)
     except ValueError:
         return response
-    order = np.argsort(np.append(response.speeds, extra))
-    fields = ("speeds", "amplitudes", "backward", "largest", "largest_node")
-    both = {name: np.concatenate((getattr(response, name), getattr(more, name)))[order] for name in fields}
-    return replace(response, **both)  # type: ignore[arg-type]
+    at, both = np.searchsorted(response.speeds, extra), {}
+    for name in ("speeds", "amplitudes", "backward", "largest", "largest_node"):
+        both[name] = np.insert(getattr(response, name), at, getattr(more, name), axis=0)
+    return replace(response, **both)
 
 
 def separation(speed: float, operating: tuple[float, float]) -> float:

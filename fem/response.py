@@ -126,22 +126,22 @@ class Response(Result):
     @property
     def x(self) -> ComplexArray:
         """Complex amplitudes of the deflection in x, m, shape (S, K)."""
-        return np.asarray(self.amplitudes + self.backward)
+        return self.amplitudes + self.backward
 
     @property
     def y(self) -> ComplexArray:
         """Complex amplitudes of the deflection in y, m, shape (S, K)."""
-        return np.asarray(-1j * (self.amplitudes - self.backward))
+        return -1j * (self.amplitudes - self.backward)
 
     @property
     def major(self) -> FloatArray:
         """Longer half axis of each orbit, m, shape (S, K)."""
-        return np.asarray(np.abs(self.amplitudes) + np.abs(self.backward))
+        return np.abs(self.amplitudes) + np.abs(self.backward)
 
     @property
     def minor(self) -> FloatArray:
         """Shorter half axis, m, shape (S, K); negative where the orbit runs against the rotation."""
-        return np.asarray(np.abs(self.amplitudes) - np.abs(self.backward))
+        return np.abs(self.amplitudes) - np.abs(self.backward)
 
     def column(self, node: str | int) -> int:
         """Which column of the amplitudes belongs to a node.
@@ -345,7 +345,7 @@ class InfluenceCoefficients(Result):
         W, speeds = self.W[steady].reshape(-1, C * P), self.speeds[steady]
         at = np.abs(W).argmax(axis=0)
         size, phase = polar("µm per g·mm", "phase lead, deg", W[at, np.arange(C * P)])
-        columns = (
+        largest = (
             Column("sensor", list(map(str, sensors))),
             Column("plane", list(map(str, planes))),
             replace(size, shown="{:.4g}".format),
@@ -353,7 +353,7 @@ class InfluenceCoefficients(Result):
             Column("at rpm", speeds[at] * RPM, "{:.6g}".format),
             Column("least", np.abs(W).min(axis=0), "{:.4g}".format),
         )
-        return (Table("largest influence coefficients", columns), every)
+        return (Table("largest influence coefficients", largest), every)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane."""
@@ -645,7 +645,7 @@ class Series:
         # Rigid motions have λ = 0 without rounding.
         margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
         gap = squares[:, None] - squared
-        near = np.asarray((np.abs(gap) <= margin[:, None]).any(axis=0))
+        near: BoolArray = np.any(np.abs(gap) <= margin[:, None], axis=0)
         gap[:, near] = 1.0
         n = self.factors.shape[2]
         terms = np.vstack((1 / gap, np.vander(squared + shift, n - squares.size, increasing=True).T))
