@@ -226,12 +226,10 @@ def open_question(peaks: Iterable[Peak], first: float, last: float, operating: t
             # What has not fallen to 0.707 over this distance is critically damped.
             sides = {-1: peak.below, 1: peak.above}
             ends += [peak.speed * (1 + way / CRITICALLY_DAMPED) for way in sides if sides[way] is None]
-    if not any(reasons):
-        return ""
     advice = f"give speeds from {min(ends) * RPM:.0f} to {max(ends) * RPM:.0f} rpm"
     if (first, last) == (min(ends), max(ends)):
         advice = "read it where it stands alone"
-    return "; ".join(filter(None, [*reasons, advice]))
+    return "; ".join(filter(None, [*reasons, advice])) if any(reasons) else ""
 
 
 def required_margin(amplification: float, *, above: bool) -> float:
@@ -310,7 +308,7 @@ def response_peaks(
                 xtol = 1e-13 * speed
                 ends.append(speed + brentq(short, 0.0, omega[end] - speed, (speed, level), xtol=xtol))
                 continue
-            first = "the speeds end" if end == k else "another peak stands"
+            first = "the steady speeds end" if end == k else "another peak stands"
             notes.append(f"{first} before the curve falls to 0.707 {side}")
             ends.append(None)
         below, above = ends

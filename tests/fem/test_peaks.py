@@ -82,7 +82,7 @@ def test_half_power_points_outside_the_range_are_said():
     assert peak.amplification is None
     assert peak.required is None
     assert peak.enough is None
-    assert peak.note == "the speeds end before the curve falls to 0.707 above"
+    assert peak.note == "the steady speeds end before the curve falls to 0.707 above"
 
 
 def test_a_higher_neighbour_hides_the_half_power_point():
