@@ -31,7 +31,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.assembly import (
-    FROM_XY,
     Matrices,
     WholeBand,
     assemble,
@@ -593,12 +592,13 @@ class Receptance:
         what damping makes of it.
         """
         A, band, loads = self.A, self._band, self.loads
-        planes = band.P.planes
-        rhs = band.interleaved(loads.T[:, None] * np.array([1.0, -1j])[:planes, None]).T
-        X = np.array([band.planes(band.factor(1j * speed, speed).solve(rhs).T) for speed in omega.tolist()])
-        X = FROM_XY @ X if planes == 2 else X  # (S, b, planes, size)
-        inertia = (X.conj() * multiply(A.mass, X.reshape(-1, A.size).T).T.reshape(X.shape)).real.sum((2, 3))
-        work = np.abs(np.einsum("ib,sbi->sb", loads, X[:, :, 0]))
+        planes, b = band.P.planes, loads.shape[1]
+        rhs = np.zeros((band.size, b), dtype=complex)
+        rhs[::planes] = loads  # F and b alternate
+        X = np.array([band.factor(1j * speed, speed).solve(rhs) for speed in omega.tolist()])
+        X = X.reshape(-1, A.size, planes, b).swapaxes(0, 1)
+        inertia = (X.conj() * multiply(A.mass, X.reshape(A.size, -1)).reshape(X.shape)).real.sum(axis=(0, 2))
+        work = np.abs(np.einsum("ib,isb->sb", loads, X[:, :, 0]))
         wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1)
         if free_motions(self.rotor, {support.node for support in self.rotor.supports}):
             wrong |= omega == 0
@@ -608,7 +608,7 @@ class Receptance:
                 f"{omega[np.argmax(wrong)]:.10g} rad/s, where the amplitude has no limit; give a support "
                 "damping or choose another speed"
             )
-        return np.moveaxis(X[..., self.unknowns], (2, 3), (0, 2))
+        return X[self.unknowns].transpose(2, 1, 0, 3)
 
 
 class Series:
