@@ -14,7 +14,7 @@ linear or quadratic in θ; no equation is solved for it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -67,16 +67,11 @@ def matrix_change(
     supports = np.zeros((speeds.size, len(pairs), 2, 2), dtype=complex)
     for k, pair in enumerate(pairs):
         supports[:, k] = whirl_change(*pair, speeds) / width
-    bands, first = dict[str, FloatArray](), 0
-    tilting = any(more.tilting_stiffness != less.tilting_stiffness for more, less in pairs)
-    if tilting or replace(down, supports=up.supports) != up:
-        one, other = assemble(up), assemble(down)
-        bands = {name: (getattr(one, name) - getattr(other, name)) / width for name in _BANDS}
-        bands = {name: band for name, band in bands.items() if band.any()}
-        if bands:
-            columns = np.concatenate([np.flatnonzero(band.any(axis=0)) for band in bands.values()])
-            first, end = max(0, columns.min() - one.width), columns.max() + 1
-            bands = {name: band[:, first:end] for name, band in bands.items()}
+    one, other = assemble(up), assemble(down)
+    changes = {name: (getattr(one, name) - getattr(other, name)) / width for name in _BANDS}
+    columns = np.flatnonzero([each.any(axis=0) for each in changes.values()]) % one.size
+    first, end = max(0, columns.min(initial=one.size) - one.width), columns.max(initial=0) + 1
+    bands = {name: band[:, first:end] for name, band in changes.items() if band.any()}
     return MatrixChange(bands, first, tuple(more.node for more, _ in pairs), supports)
 
 

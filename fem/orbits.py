@@ -55,8 +55,7 @@ def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
     >>> float(ellipse.major), float(ellipse.minor), float(ellipse.direction)
     (3.0, 2.0, 1.0)
     """
-    X, Y = np.broadcast_arrays(np.asarray(x, dtype=complex), np.asarray(y, dtype=complex))
-    forward, backward = (X + 1j * Y) / 2, (X - 1j * Y) / 2
+    forward, backward = (np.add(x, np.multiply(way, y)) / 2 for way in (1j, -1j))
     f, b = np.abs(forward), np.abs(backward)
     a, c = np.angle(forward), np.angle(backward)
     # A circle has no major axis: measure from x.
@@ -68,7 +67,7 @@ def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
     return Orbits(
         major=f + b,
         minor=np.where(line, 0.0, np.abs(f - b)),
-        inclination=inclination - np.where(turned, np.copysign(np.pi, inclination), 0.0),
+        inclination=inclination - np.pi * turned * np.sign(inclination),
         phase=np.angle(np.exp(1j * (phase + np.pi * turned))),
         direction=np.where(line, 0.0, np.sign(f - b)),
     )
@@ -88,10 +87,7 @@ def probe(x: ArrayLike, y: ArrayLike, angle: ArrayLike) -> ComplexArray:
     -------
     x cos(angle) + y sin(angle), the shapes broadcast.
     """
-    angle = np.asarray(angle, dtype=float)
-    return np.asarray(
-        np.asarray(x, dtype=complex) * np.cos(angle) + np.asarray(y, dtype=complex) * np.sin(angle)
-    )
+    return np.multiply(x, np.cos(angle)) + np.multiply(y, np.sin(angle)) + 0j
 
 
 def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
@@ -108,9 +104,9 @@ def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
     -------
     1, −1 or 0, shape (…).
     """
-    X, Y = np.asarray(x, dtype=complex), np.asarray(y, dtype=complex)
-    area = (np.conj(X) * -Y).imag  # π times this is the area
-    line = STRAIGHT * (np.abs(X) ** 2 + np.abs(Y) ** 2).max(axis=-1)
-    largest = np.abs(area).max(axis=-1)
-    counts = np.where(np.abs(area) > 1e-2 * np.maximum(largest, line)[..., None], np.sign(area), 0.0)
-    return np.asarray(np.where(largest <= line, 0.0, counts.max(axis=-1) + counts.min(axis=-1)).clip(-1, 1))
+    forward, backward = (np.abs(np.add(x, np.multiply(way, y))) for way in (1j, -1j))
+    area = forward**2 - backward**2  # π times this is the area of four orbits
+    line = STRAIGHT * ((forward + backward) ** 2).max(axis=-1)
+    least = np.maximum(1e-2 * np.abs(area).max(axis=-1), line)
+    counts = np.where(np.abs(area) > least[..., None], np.sign(area), 0.0)
+    return np.asarray((counts.max(axis=-1) + counts.min(axis=-1)).clip(-1, 1))

@@ -17,7 +17,7 @@ where.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,6 @@ import numpy as np
 from fem.response import Response, judged
 from fem.rotor import SensorLike
 from fem.undamped import Result, critical_speeds_below
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
@@ -41,9 +40,8 @@ LARGEST = (16.0, 26.0)  # percent: margins that are enough whatever the amplific
 CRITICALLY_DAMPED = 2.5  # AF below which no margin is required
 _SHARP = 50.0  # AF of a peak that shows none, beside others
 _NO_DAMPING = 1e5  # AF beyond which damping is none
-_FINEST = 1e-7  # relative step; finer ones would show rounding
 _BEND, _SHORT = np.radians(10), 0.05  # of a curve in the plane, and of its distance from the origin
-_ROUNDS, _MOST = 14, 30_000  # of halving steps, and speeds
+_ROUNDS, _MANY = 14, 30_000  # of halving steps, and speeds
 _AROUND = np.array([-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2])  # of a critical speed, relative
 
 
@@ -131,7 +129,7 @@ class Peak:
         """Whether the margin is as required; None where this is not known."""
         if self.margin is None or self.required is None:
             return None
-        return self.required == 0 or self.margin >= self.required
+        return self.margin >= self.required
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,19 +149,11 @@ class Peaks(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
+        columns = peak_columns(self.peaks)
         peaks = [
-            {
-                "speed_rad_s": peak.speed,
-                "speed_rpm": peak.speed * RPM,
-                "amplitude": None if peak.undamped else peak.amplitude,
-                "half_power_rad_s": (peak.below, peak.above),
-                "amplification_factor": peak.amplification,
-                "separation_margin_percent": peak.margin,
-                "required_margin_percent": peak.required,
-                "enough": peak.enough,
-                "note": peak.note,
-            }
-            for peak in self.peaks
+            {column.key: column.values[k] for column in columns}
+            | {"half_power_rad_s": (peak.below, peak.above), "note": peak.note}
+            for k, peak in enumerate(self.peaks)
         ]
         return plain({"operating_rad_s": self.operating, "peaks": peaks})
 
@@ -189,17 +179,17 @@ class Peaks(Result):
 
 
 def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
-    """The table of peaks, amplitudes times `scale` with the name of their unit."""
-    one = "{:.1f}".format
+    """The table of peaks, amplitudes times `scale` with the name of their unit; keys as in `to_dict`."""
     sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
+    size, one = f"amplitude, {unit} peak" if unit else "amplitude", "{:.1f}".format
     return (
-        Column("rpm", [p.speed * RPM for p in peaks], "{:.2f}".format),
-        Column("rad/s", [p.speed for p in peaks], "{:.4f}".format),
-        Column(f"amplitude, {unit} peak" if unit else "amplitude", sizes, "{:.4g}".format),
-        Column("AF", [p.amplification for p in peaks], "{:.2f}".format),
-        Column("margin, %", [p.margin for p in peaks], one),
-        Column("required, %", [p.required for p in peaks], one),
-        Column("", [p.enough for p in peaks], lambda enough: "enough" if enough else "NOT ENOUGH"),
+        Column("rpm", [p.speed * RPM for p in peaks], "{:.2f}".format, "speed_rpm"),
+        Column("rad/s", [p.speed for p in peaks], "{:.4f}".format, "speed_rad_s"),
+        Column(size, sizes, "{:.4g}".format, "amplitude"),
+        Column("AF", [p.amplification for p in peaks], "{:.2f}".format, "amplification_factor"),
+        Column("margin, %", [p.margin for p in peaks], one, "separation_margin_percent"),
+        Column("required, %", [p.required for p in peaks], one, "required_margin_percent"),
+        Column("", [p.enough for p in peaks], lambda good: "enough" if good else "NOT ENOUGH", "enough"),
     )
 
 
@@ -209,21 +199,18 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
     Peaks of different readings belong to one critical speed where each lies in the half-power band of the
     other. Shown is one that is not far enough, if any, else the largest with an amplification factor.
     """
-    groups: list[dict[str, Peak]] = []
-    last = None
     every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
+    groups, last = list[dict[str, Peak]](), None
     for name, peak in sorted(every, key=lambda one: one[1].speed):
         sharper = max(one.amplification or _SHARP for one in (peak, last or peak))
-        if last is None or name in groups[-1] or peak.speed - last.speed > last.speed / (2 * sharper):
+        if last is None or name in groups[-1] or peak.speed > last.speed * (1 + 0.5 / sharper):
             groups.append({})
         groups[-1][name] = last = peak
-    return [
-        min(
-            group.items(),
-            key=lambda one: (one[1].enough is not False, not one[1].amplification, -one[1].amplitude),
-        )
-        for group in groups
-    ]
+
+    def rank(one: tuple[str, Peak]) -> tuple[bool, bool, float]:
+        return one[1].enough is not False, not one[1].amplification, -one[1].amplitude
+
+    return [min(group.items(), key=rank) for group in groups]
 
 
 def open_question(peaks: Iterable[Peak], first: float, last: float, operating: tuple[float, float]) -> str:
@@ -231,51 +218,18 @@ def open_question(peaks: Iterable[Peak], first: float, last: float, operating: t
 
     Empty where one can. Speeds were searched from `first` to `last`; all in rad/s.
     """
-    low, high = (
-        end * (1 + share / 100) for end, share in zip(operating, (-LARGEST[0], LARGEST[1]), strict=True)
-    )
     reasons = [unsearched(first, last, operating)]
+    ends = [first, last, operating[0] * (1 - LARGEST[0] / 100), operating[1] * (1 + LARGEST[1] / 100)]
     for peak in peaks:
-        if peak.enough is None and (peak.margin is None or peak.margin < LARGEST[1]):
+        if peak.enough is None and separation(peak.speed, operating) < LARGEST[1]:
             reasons.append(f"no amplification factor at {rpm_text(peak.speed)}")
             # What has not fallen to 0.707 over this distance is critically damped.
-            low = low if peak.below else min(low, peak.speed * (1 - 1 / CRITICALLY_DAMPED))
-            high = high if peak.above else max(high, peak.speed * (1 + 1 / CRITICALLY_DAMPED))
-    if not any(reasons):
-        return ""
-    advice = f"give speeds from {min(low, first) * RPM:.0f} to {max(high, last) * RPM:.0f} rpm"
-    if first <= low and high <= last:
+            sides = {-1: peak.below, 1: peak.above}
+            ends += [peak.speed * (1 + way / CRITICALLY_DAMPED) for way in sides if sides[way] is None]
+    advice = f"give speeds from {min(ends) * RPM:.0f} to {max(ends) * RPM:.0f} rpm"
+    if (first, last) == (min(ends), max(ends)):
         advice = "read it where it stands alone"
-    return "; ".join(filter(None, [*reasons, advice]))
-
-
-def find_peaks(
-    omega: FloatArray,
-    A: FloatArray,
-    evaluate: Callable[[float], float],
-    *,
-    operating: tuple[float, float] | None = None,
-) -> Peaks:
-    """Find the peaks of a response to unbalance, their amplification factors and separation margins.
-
-    Parameters
-    ----------
-    omega, A
-        Speeds, rad/s, ascending, and the amplitude there, shape (S,): they show the peaks.
-    evaluate
-        The amplitude at any speed between: it says where the peaks and their half-power points are.
-    operating
-        Lowest and highest operating speed, rad/s.
-
-    Raises
-    ------
-    ValueError
-        For an impossible range of operating speeds.
-    """
-    if operating is not None and not 0 < operating[0] <= operating[1]:
-        raise ValueError(f"operating must be a lowest and a highest speed above 0, not {operating!r}")
-    summits = np.flatnonzero((A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:]) & (A[1:-1] > 0)) + 1
-    return Peaks(tuple(_peak(omega, A, k, evaluate, operating) for k in summits.tolist()), operating)
+    return "; ".join(filter(None, [*reasons, advice])) if any(reasons) else ""
 
 
 def required_margin(amplification: float, *, above: bool) -> float:
@@ -303,81 +257,71 @@ def required_margin(amplification: float, *, above: bool) -> float:
     return min(LARGEST[int(above)], 10.0 * above + 17 * (1 - 1 / (AF - 1.5)))
 
 
-def _peak(
-    omega: FloatArray,
-    A: FloatArray,
-    k: int,
-    curve: Callable[[float], float],
-    operating: tuple[float, float] | None,
-) -> Peak:
-    """The peak near speed k."""
-    from scipy.optimize import brentq, minimize_scalar
-
-    middle, options = float(omega[k]), {"xatol": 1e-12 * omega[k]}
-    bounds = omega[k - 1] - middle, omega[k + 1] - middle  # of what is added: a sharp peak needs all digits
-    top = minimize_scalar(
-        lambda more: -curve(middle + more), bounds=bounds, method="bounded", options=options
-    )
-    amplitude, speed = max((-float(top.fun), middle + float(top.x)), (float(A[k]), middle))
-    level, notes, ends = math.sqrt(0.5) * amplitude, list[str](), list[float | None]()
-    for side, way in (("below", -1), ("above", 1)):
-        beyond = (omega - speed) * way > 0
-        at, size = omega[beyond][::way], A[beyond][::way]
-        n = int(np.argmax(np.append(size <= level, True)))
-        ends.append(None)
-        if (size[:n] > amplitude * (1 + 1e-9)).any():
-            notes.append(f"the curve rises to another peak before it falls to 0.707 {side}")
-        elif n == size.size:
-            end = f"lies outside the speeds, which end at {at[-1]:.6g} rad/s"
-            notes.append(f"the half-power point {side} {end}")
-        else:
-            ends[-1] = brentq(lambda speed: curve(speed) - level, speed, at[n], xtol=1e-13 * speed)
-    AF = margin = required = None
-    below, above = ends
-    if below is not None and above is not None:
-        AF = speed / max(above - below, 1e-300)
-    undamped = AF is not None and AF > _NO_DAMPING
-    if undamped:
-        notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
-    if operating is not None:
-        margin = separation(speed, operating)
-        # Inside the range any margin is missing; the smaller requirement is then shown.
-        required = None if AF is None else required_margin(AF, above=speed > operating[1])
-    factor = None if undamped else AF
-    return Peak(speed, amplitude, below, above, factor, margin, required, "; ".join(notes), undamped)
-
-
 def response_peaks(
     response: Response,
     sensor: SensorLike,
     *,
     operating: tuple[float, float] | None = None,
 ) -> Peaks:
-    """Find the peaks of one reading, evaluated by the model between the speeds of the response.
+    """Find the peaks of one reading, their amplification factors and separation margins.
 
     Parameters
     ----------
     response
-        At speeds between which no peak is hidden; those without a steady response do not count.
+        At ascending speeds, which show the peaks; those without a steady response do not count. The model
+        is evaluated between them.
     sensor
         Where it is read.
     operating
-        As in `find_peaks`.
+        Lowest and highest operating speed, rad/s.
 
     Raises
     ------
     ValueError
-        As `find_peaks`.
+        For an impossible range of operating speeds.
     """
+    from scipy.optimize import brentq, minimize_scalar
 
-    def reading(speed: float) -> float:
+    if operating is not None and not 0 < operating[0] <= operating[1]:
+        raise ValueError(f"operating must be a lowest and a highest speed above 0, not {operating!r}")
+
+    def short(more: float, speed: float, level: float) -> float:
+        """By how much the reading stays below a level; a sharp peak needs all digits of what is added."""
         try:
-            return float(np.abs(response.solve(np.array([speed])).at(sensor)[0]))
+            return level - float(np.abs(response.solve(np.array([speed + more])).at(sensor)[0]))
         except ValueError:
-            return 1e300  # undamped, and critical
+            return -1e300  # undamped, and critical
 
-    size = np.where(response.steady & (response.speeds > 0), np.abs(response.at(sensor)), np.nan)
-    return find_peaks(response.speeds, size, reading, operating=operating)
+    omega, peaks = response.speeds, []
+    A = np.where(response.steady & (omega > 0), np.abs(response.at(sensor)), np.nan)
+    for k in np.flatnonzero((A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:]) & (A[1:-1] > 0)) + 1:
+        middle = float(omega[k])
+        bounds, options = omega[[k - 1, k + 1]] - middle, {"xatol": 1e-12 * middle}
+        top = minimize_scalar(short, bounds=bounds, args=(middle, 0.0), options=options)
+        amplitude, speed = max((-float(top.fun), middle + float(top.x)), (float(A[k]), middle))
+        level, notes, ends = math.sqrt(0.5) * amplitude, [], []
+        for side, way in (("below", -1), ("above", 1)):
+            beyond = np.flatnonzero((omega - speed) * way > 0)[::way]
+            leaves = (A[beyond] <= level) | (A[beyond] > amplitude * (1 + 1e-9))
+            end = next(iter(beyond[leaves]), k)
+            if A[end] <= level:
+                xtol = 1e-13 * speed
+                ends.append(speed + brentq(short, 0.0, omega[end] - speed, (speed, level), xtol=xtol))
+                continue
+            first = "the steady speeds end" if end == k else "another peak stands"
+            notes.append(f"{first} before the curve falls to 0.707 {side}")
+            ends.append(None)
+        below, above = ends
+        AF = None if None in ends else speed / max(above - below, 1e-300)
+        undamped = AF is not None and AF > _NO_DAMPING
+        if undamped:
+            notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
+        margin = operating and separation(speed, operating)
+        # Inside the range any margin is missing; the smaller requirement is then shown.
+        required = operating and AF and required_margin(AF, above=speed > operating[1])
+        factor, note = None if undamped else AF, "; ".join(notes)
+        peaks.append(Peak(speed, amplitude, below, above, factor, margin, required, note, undamped))
+    return Peaks(tuple(peaks), operating)
 
 
 def resolve_peaks(
@@ -395,7 +339,7 @@ def resolve_peaks(
     sensors
         Where it is read.
     operating
-        As in `find_peaks`.
+        As in `response_peaks`.
 
     Returns
     -------
@@ -411,20 +355,19 @@ def resolve_peaks(
     if np.count_nonzero(asked) < 3:  # rest is no part of a peak
         return response, []
     try:
-        criticals = critical_speeds_below(response.rotor, asked[-1] / (1 + _AROUND[0]), 32)
+        criticals = critical_speeds_below(response.rotor, 1.01 * asked[-1], 32)
     except ValueError:  # fewer modes than one asks for, or none inside the tables
         criticals = np.empty(0)
-    near = np.multiply.outer(criticals, 1 + _AROUND)
-    finer = _with(response, near[(near > asked[0]) & (near < asked[-1])])
-    finer = judged(smooth_curves(finer, sensors))
+    near = np.multiply.outer(criticals, 1 + _AROUND).clip(asked[0], asked[-1])
+    finer = judged(smooth_curves(_with(response, near), sensors))
     peaks = [response_peaks(finer, place, operating=operating) for place in sensors]
     every = [peak for each in peaks for peak in each.peaks]
     undamped = np.array([peak.speed for peak in every if peak.undamped])
-    added = np.concatenate((finer.speeds, [peak.speed for peak in every if not peak.undamped]))
+    added = np.append(finer.speeds, [peak.speed for peak in every])
     # Beside undamped peaks the amplitude has no limit and no meaning.
-    far = (np.abs(added[:, None] - undamped) > 1e-2 * undamped).all(axis=1)
-    warnings = (*finer.warnings, UNDAMPED) if undamped.size else finer.warnings
-    return _with(replace(response, windows=finer.windows, warnings=warnings), added[far]), peaks
+    near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
+    warnings = (*finer.warnings, *[UNDAMPED] * bool(undamped.size))
+    return _with(replace(response, windows=finer.windows, warnings=warnings), added[~near]), peaks
 
 
 def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response:
@@ -437,35 +380,30 @@ def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response
         steps, size = np.diff(Z, axis=0), np.abs(Z)
         bends = np.pad(np.abs(np.angle(steps[1:] * steps[:-1].conj())) > _BEND, ((1, 1), (0, 0)))
         long = np.abs(steps) > _SHORT * np.maximum(size[1:], size[:-1]) + 1e-9 * size.max(initial=0.0)
-        wanted = (long & (bends[1:] | bends[:-1])).any(axis=1) & (np.diff(omega) > _FINEST * omega[1:])
-        finer = _with(response, ((omega[1:] + omega[:-1]) / 2)[wanted])
-        if not response.speeds.size < finer.speeds.size < _MOST:
+        wanted = (long & (bends[1:] | bends[:-1])).any(axis=1)
+        coarse, response = response, _with(response, ((omega[1:] + omega[:-1]) / 2)[wanted])
+        if response is coarse or response.speeds.size > _MANY:
             break
-        response = finer
     return response
 
 
 def _with(response: Response, speeds: FloatArray) -> Response:
-    """The response at more speeds, unless the rotor cannot run at one of them (undamped, critical)."""
+    """The response at more speeds; the same without any, and if the rotor cannot run at one (critical)."""
     extra = np.setdiff1d(speeds, response.speeds)
     try:
-        more = response.solve(extra) if extra.size else response
+        more = response.solve(extra)
     except ValueError:
-        more = response
-    if more is response:
         return response
-    order = np.argsort(np.concatenate((response.speeds, extra)), kind="stable")
-    fields = ("speeds", "amplitudes", "backward", "largest", "largest_node")
-    both = {name: np.concatenate((getattr(response, name), getattr(more, name)))[order] for name in fields}
-    return replace(response, **both)  # type: ignore[arg-type]
+    at, both = np.searchsorted(response.speeds, extra), {}
+    for name in ("speeds", "amplitudes", "backward", "largest", "largest_node"):
+        both[name] = np.insert(getattr(response, name), at, getattr(more, name), axis=0)
+    return replace(response, **both)
 
 
 def separation(speed: float, operating: tuple[float, float]) -> float:
     """Distance of a speed from the operating range, percent of its nearest end; 0 inside."""
     low, high = operating
-    if speed > high:
-        return 100 * (speed - high) / high
-    return max(0.0, 100 * (low - speed) / low) if low > 0 else 0.0
+    return 100 * max(0.0, (speed - high) / high, (low - speed) / max(low, 1e-300))
 
 
 @dataclass(frozen=True, repr=False)
@@ -477,46 +415,39 @@ class Separation(Result):
     doubt: str = ""
 
     @property
-    def nearest(self) -> list[float]:
-        """The speeds, the nearest to the range first."""
-        return sorted(self.speeds, key=lambda speed: separation(speed, self.operating))
+    def away(self) -> list[tuple[float, float]]:
+        """How far each is from the range, in percent of its nearest end, and the speed; the nearest first."""
+        return sorted((separation(speed, self.operating), speed) for speed in self.speeds)
 
     def to_dict(self) -> dict[str, Any]:
         """Which speeds lie in the range, and how far off the others are, in percent of its nearest end."""
         rows = [
             {"speed_rad_s": speed, "inside": away == 0, "separation_percent": away}
-            for speed in self.speeds
-            for away in (separation(speed, self.operating),)
+            for away, speed in sorted(self.away, key=lambda row: row[1])
         ]
-        return {"range_rad_s": list(self.operating), "critical_speeds": rows}
+        return plain({"range_rad_s": self.operating, "critical_speeds": rows})
 
     def tables(self) -> tuple[Table, ...]:
         """How far each is from the range, the nearest first."""
         columns = (
-            Column("rpm", [speed * RPM for speed in self.nearest], "{:.6g}".format),
-            Column("away, %", [separation(speed, self.operating) for speed in self.nearest], "{:.1f}".format),
+            Column("rpm", [speed * RPM for _, speed in self.away], "{:.6g}".format),
+            Column("away, %", [away for away, _ in self.away], "{:.1f}".format),
         )
         return (Table("how far each is from the operating range", columns),)
 
     def sentence(self) -> str:
         """Whether one lies in the range, and which is nearest."""
         low, high = self.operating
-        within, nearest = f"the operating range {low * RPM:.6g} to {rpm_text(high)}", self.nearest
-        inside = [rpm_text(speed) for speed in nearest if separation(speed, self.operating) == 0]
+        within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
+        inside = [rpm_text(speed) for away, speed in self.away if away == 0]
         if inside:
             return f"INSIDE {within}: {listing(inside, 'and')}."
         if self.doubt:
             return f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
-        if not nearest:
+        if not self.away:
             return f"No critical speed was found beside {within}."
-        away = f"{rpm_text(nearest[0])}, is {separation(nearest[0], self.operating):.1f} % away"
-        return f"None lies in {within}; the nearest, {away}."
-
-    @property
-    def answer(self) -> Answer:
-        """For an engineer."""
-        shown = tuple(map(terminal, self.tables()))
-        return Answer(self.sentence(), tables=shown, more="how far each is from the operating range")
+        away, nearest = self.away[0]
+        return f"None lies in {within}; the nearest, {rpm_text(nearest)}, is {away:.1f} % away."
 
 
 def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:

@@ -31,7 +31,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.assembly import (
-    FROM_XY,
     Matrices,
     WholeBand,
     assemble,
@@ -41,14 +40,13 @@ from fem.assembly import (
     multiply,
     supported,
 )
-from fem.orbits import DIRECTION_NAMES, orbits, probe, whirl_direction
+from fem.orbits import orbits, probe
 from fem.rotor import Rotor, SensorLike, Support, as_sensor, label
 from fem.stability import Window, judge, within
 from fem.undamped import (
     DENSE,
     Pencil,
     Result,
-    factor,
     fine_mesh_warning,
     finite_modes,
     lowest_modes,
@@ -60,7 +58,7 @@ from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
 from rotorid.base.tables import Column, Table, frame, terminal
-from rotorid.base.text import counted, figures
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +69,8 @@ NEAR = (
     1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
 )
 GROWTH = 1e4  # forces of the supports by those without whirl of the supports: beyond, four digits are lost
-TOLERANCE = 1e-12  # of the series, relative to the static contribution of the modes left out
+_CHUNK = 64  # speeds at a time, to stay in the cache of the processor
+_POWERS = 10  # of the series: 16⁻¹⁰ is 1e-12 of the static contribution of the modes left out
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,27 +120,27 @@ class Response(Result):
     @property
     def steady(self) -> BoolArray:
         """At which speeds a steady response exists, shape (S,)."""
-        return _steady(self.windows, self.speeds)
+        return ~within(self.windows, self.speeds)
 
     @property
     def x(self) -> ComplexArray:
         """Complex amplitudes of the deflection in x, m, shape (S, K)."""
-        return np.asarray(self.amplitudes + self.backward)
+        return self.amplitudes + self.backward
 
     @property
     def y(self) -> ComplexArray:
         """Complex amplitudes of the deflection in y, m, shape (S, K)."""
-        return np.asarray(-1j * (self.amplitudes - self.backward))
+        return -1j * (self.amplitudes - self.backward)
 
     @property
     def major(self) -> FloatArray:
         """Longer half axis of each orbit, m, shape (S, K)."""
-        return np.asarray(np.abs(self.amplitudes) + np.abs(self.backward))
+        return np.abs(self.amplitudes) + np.abs(self.backward)
 
     @property
     def minor(self) -> FloatArray:
         """Shorter half axis, m, shape (S, K); negative where the orbit runs against the rotation."""
-        return np.asarray(np.abs(self.amplitudes) - np.abs(self.backward))
+        return np.abs(self.amplitudes) - np.abs(self.backward)
 
     def column(self, node: str | int) -> int:
         """Which column of the amplitudes belongs to a node.
@@ -167,26 +166,22 @@ class Response(Result):
 
     def readings(self, sensors: Sequence[SensorLike]) -> ComplexArray:
         """`at` for each sensor, shape (S, C)."""
-        return np.stack([self.at(sensor) for sensor in sensors], axis=1)
-
-    def deflected(self, speed: float) -> Response:
-        """The response of all nodes at one speed, rad/s: the shape of the shaft there, such as at a peak."""
-        return unbalance_response(self.rotor, self.unbalance, speed)
+        return np.array([self.at(sensor) for sensor in sensors]).reshape(-1, self.speeds.size).T
 
     def bearing_forces(self) -> BearingForces:
         """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
-        forces = np.empty((2, self.speeds.size, len(self.rotor.supports)), dtype=complex)
-        for k, support in enumerate(self.rotor.supports):
-            i = self.column(support.node)
-            motion = np.stack((self.x[:, i], self.y[:, i]), axis=1)
-            forces[:, :, k] = np.einsum("sij,sj->is", support.dynamic_stiffness(self.speeds), motion)
-        read_only(forces)
-        return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1], self.steady)
+        supports = self.rotor.supports
+        at = [self.column(support.node) for support in supports]
+        D = np.array([support.dynamic_stiffness(self.speeds) for support in supports])
+        motion = np.stack((self.x[:, at], self.y[:, at]))
+        x, y = np.einsum("bsij,jsb->isb", D.reshape(-1, self.speeds.size, 2, 2), motion)
+        read_only(x, y)
+        return BearingForces(self.speeds, supports, x, y, self.steady)
 
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
         sensors = self.nodes.tolist() if sensors is None else sensors
-        Z = self.readings(sensors).T if sensors else np.zeros((0, self.speeds.size))
+        Z = self.readings(sensors).T
         return plain(
             {
                 "speeds_rad_s": self.speeds,
@@ -230,9 +225,9 @@ class Response(Result):
     @property
     def highest(self) -> str:
         """The largest amplitude in a sentence."""
-        k = largest_at(self.largest, self.steady)
-        if k is None:
+        if not self.steady.any():
             return "No steady response at any of these speeds."
+        k = np.argmax(self.largest * self.steady)
         where = f"node {self.largest_node[k]}, {rpm_text(self.speeds[k])}"
         return f"Largest amplitude {1e6 * self.largest[k]:.4g} µm peak at {where}."
 
@@ -294,11 +289,6 @@ class BearingForces(Result):
         """How many there are."""
         return f"Forces on {counted(len(self.supports), 'support')} at {speed_range(self.speeds)}."
 
-    def summary(self) -> str:
-        """The largest force on each support, as text."""
-        names = [support.name or f"node {support.node}" for support in self.supports]
-        return largest_text("support", names, "force, N peak", self.largest, self.speeds, self.steady)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InfluenceCoefficients(Result):
@@ -340,34 +330,29 @@ class InfluenceCoefficients(Result):
     def tables(self) -> tuple[Table, ...]:
         """Where they are largest, if there is a steady response; and the influence table of INTERFACE.md."""
         S, C, P = self.W.shape
-        sensors, planes = (
-            [label(sensor) for sensor in self.sensors for _ in self.planes],
-            list(self.planes) * C,
+        sensors = [label(sensor) for sensor in self.sensors for _ in self.planes]
+        planes, steady = list(self.planes) * C, ~within(self.windows, self.speeds)
+        columns = (
+            Column("speed_rad_s", np.repeat(self.speeds, C * P)),
+            Column("sensor", sensors * S),
+            Column("plane", planes * S),
+            *polar("influence_m_per_kg_m", "phase_deg", self.W),
         )
-        every = Table(
-            "influence coefficients",
-            (
-                Column("speed_rad_s", np.repeat(self.speeds, C * P)),
-                Column("sensor", sensors * S),
-                Column("plane", planes * S),
-                *polar("influence_m_per_kg_m", "phase_deg", self.W),
-            ),
-        )
-        steady = _steady(self.windows, self.speeds)
+        every = Table("influence coefficients", columns)
         if not steady.any():
             return (every,)
         W, speeds = self.W[steady].reshape(-1, C * P), self.speeds[steady]
-        sizes = np.abs(W)
-        at = sizes.argmax(axis=0)
-        columns = (
+        at = np.abs(W).argmax(axis=0)
+        size, phase = polar("µm per g·mm", "phase lead, deg", W[at, np.arange(C * P)])
+        largest = (
             Column("sensor", list(map(str, sensors))),
             Column("plane", list(map(str, planes))),
-            Column("µm per g·mm", sizes.max(axis=0), "{:.4g}".format),
-            Column("phase lead, deg", phase_deg(W[at, np.arange(C * P)]), "{:.2f}".format),
+            replace(size, shown="{:.4g}".format),
+            replace(phase, shown="{:.2f}".format),
             Column("at rpm", speeds[at] * RPM, "{:.6g}".format),
-            Column("least", sizes.min(axis=0), "{:.4g}".format),
+            Column("least", np.abs(W).min(axis=0), "{:.4g}".format),
         )
-        return (Table("largest influence coefficients", columns), every)
+        return (Table("largest influence coefficients", largest), every)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane."""
@@ -387,30 +372,6 @@ class InfluenceCoefficients(Result):
     def answer(self) -> Answer:
         """Where the coefficients are largest, and over many speeds how small they get."""
         return Answer(self.sentence(), "".join(map(terminal, self.tables()[:-1])), self.warnings)
-
-
-def _steady(windows: tuple[Window, ...], speeds: FloatArray) -> BoolArray:
-    return ~within(windows, speeds)
-
-
-def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
-    """Where a size is largest of all that exist, both of shape (S,); None if none does."""
-    return int(np.argmax(np.where(steady, size, -1.0))) if steady.any() else None
-
-
-def largest_text(
-    what: str, names: Sequence[str], size: str, values: FloatArray, speeds: FloatArray, steady: BoolArray
-) -> str:
-    """The largest of values, shape (S, n), of each name and its speed, as a table; `size` with its unit."""
-    at = [largest_at(column, steady) for column in values.T]
-    sizes = [None if k is None else column[k] for k, column in zip(at, values.T, strict=True)]
-    rpm = [None if k is None else speeds[k] * RPM for k in at]
-    columns = (
-        Column(what, names),
-        Column(f"largest {size}", sizes, figures),
-        Column("at rpm", rpm, "{:.1f}".format),
-    )
-    return terminal(Table("largest", columns))
 
 
 def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
@@ -463,7 +424,7 @@ def unbalance_response(
     amplification is 70 to 900. A warning says where the mesh is too fine for six digits.
     """
     speeds = checked_speeds(speeds)
-    kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
+    kept = np.array([rotor.node(n) for n in (range(1, rotor.n_nodes + 1) if nodes is None else nodes)])
     masses: dict[int, complex] = {}
     for key, value in dict(unbalance).items():
         node, amount = rotor.node(key), complex(value)
@@ -473,11 +434,9 @@ def unbalance_response(
     if not masses:
         raise ValueError("no unbalance is given: name at least one node")
     A = assemble(rotor)
-    at = np.array([A.deflection(node) for node in masses], dtype=np.intp)
-    U = unit_loads(A, at) @ np.array(list(masses.values()))
-    loads, phasors = np.column_stack((U.real, U.imag)), np.array([1.0, 1j])
-    if not U.imag.any():  # one complex load is two real ones
-        loads, phasors = loads[:, :1], phasors[:1]
+    at = A.deflections[[node - 1 for node in masses]]
+    U, phasors = unit_loads(A, at) @ np.array(list(masses.values())), np.array([1.0, 1j])
+    loads = np.column_stack((U.real, U.imag))  # one complex load is two real ones
     receptance = Receptance(rotor, A, A.deflections, loads, speeds)
 
     def solve(speeds: FloatArray) -> Response:
@@ -499,9 +458,8 @@ def unbalance_response(
 def judged(response: Response) -> Response:
     """The response with the ranges of speed in which it does not exist."""
     windows, texts = judge(response.rotor, response.speeds)
-    before = [window.sentence() for window in response.windows]
-    kept = [warning for warning in response.warnings if warning not in (*before, *texts)]
-    return replace(response, windows=windows, warnings=(*kept, *texts))
+    others = response.solve(response.speeds.max(keepdims=True)).warnings
+    return replace(response, windows=windows, warnings=(*others, *texts))
 
 
 def influence(
@@ -534,9 +492,9 @@ def influence(
     if not planes or not sensors:
         raise ValueError("name at least one plane and one sensor")
     A = assemble(rotor)
-    at = np.array([A.deflection(rotor.node(plane)) for plane in planes], dtype=np.intp)
+    at = A.deflections[[rotor.node(plane) - 1 for plane in planes]]
     places = [as_sensor(sensor, rotor) for sensor in sensors]
-    unknowns = np.array([A.deflection(rotor.node(sensor.node)) for sensor in places], dtype=np.intp)
+    unknowns = A.deflections[[rotor.node(sensor.node) - 1 for sensor in places]]
     turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
     receptance = Receptance(rotor, A, unknowns, unit_loads(A, at), speeds)
     W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
@@ -572,35 +530,34 @@ class Receptance:
         exact: bool = False,
     ) -> None:
         self.rotor, self.A, self.unknowns, self.loads = rotor, A, unknowns, loads
-        at, beta, gyroscopic = supported(rotor, speeds), rotor.material_damping, rotor.model.gyroscopic
+        at, beta = supported(rotor, speeds), rotor.material_damping
         self.planes, self.springs, self.beta = at.planes, at.reference, float(beta[0])
         springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
-        whole = one_plane(rotor, A, 1, springs)
         tilting = any(support.tilting_stiffness for support in rotor.supports)
         self.exact = exact or bool(at.planes == 2 and ((beta != beta[0]).any() or (beta[0] and tilting)))
-        if gyroscopic:
-            try:
-                factor(whole)
-            except ValueError:  # free, and M − G is negative in a rigid motion
-                self.exact, whole = True, one_plane(rotor, A, 0, springs)
-        held = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
+        held = A.deflections[[node - 1 for node in at.nodes]]
         places, units, top = np.concatenate((unknowns, held)), unit_loads(A, held), float(speeds.max())
-        self.series = [Series(whole, places, np.hstack((units, loads)), top)]
+
+        def series(whirl: int, columns: FloatArray) -> Series:
+            return Series(one_plane(rotor, A, whirl, springs), places, columns, top)
+
+        forward = np.hstack((units, loads))
+        try:
+            self.series = [series(1, forward)]
+        except ValueError:  # free, and M − G is negative in a rigid motion
+            self.exact, self.series = True, [series(0, forward)]
+        if at.planes == 2:
+            self.series.append(series(-1, units))
         self.warnings = (*ignored_inertia(rotor), *fine_mesh_warning(rotor, self.series[0].modes.rounding))
-        if at.planes == 2 and gyroscopic and not self.exact:
-            self.series.append(Series(one_plane(rotor, A, -1, springs), places, units, top))
 
     def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray]]:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b)."""
-        step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
         stiffness = supported(self.rotor, speeds).stiffness
-        for start in range(0, speeds.size, step):
-            part = slice(start, start + step)
+        for start in range(0, speeds.size, _CHUNK):
+            part = slice(start, start + _CHUNK)
             omega = speeds[part]
-            if self.exact:
-                yield part, self._exact(omega)
-                continue
             H, lost = self._fast(omega, stiffness[part])
+            lost |= self.exact
             if lost.any():
                 H[:, lost] = self._exact(omega[lost])
             yield part, H
@@ -609,24 +566,20 @@ class Receptance:
         """Receptances from the series, (planes, S, a, b), and at which speeds they lose digits."""
         a, s, planes = self.unknowns.size, self.springs.size, self.planes
         S, n, b = omega.size, planes * s, self.loads.shape[1]
-        change = D[:, :, :planes, :planes].copy()
-        whole, near = self.series[0].at(omega * omega)
-        F = np.zeros((planes, a, b, S), dtype=complex)
-        F[0], pulled, G = whole[:a, s:], whole[a:, s:], [whole[:, :s]] * planes
-        for p in range(planes):
-            stiffer = 1.0 + (2j * self.beta * omega if p and self.beta else np.zeros(S))
+        change, near, H = D[:, :, :planes, :planes].copy(), np.zeros(S, dtype=bool), []
+        for p, series in enumerate(self.series):
+            stiffer: AnyArray | float = 1.0 + 2j * self.beta * omega if p * self.beta else 1.0
             change[:, :, p, p] -= np.multiply.outer(stiffer, self.springs)
-            if p and (self.beta or len(self.series) == planes):
-                whole, lost = self.series[-1].at(omega * omega / stiffer)
-                G[p], near = whole[:, :s] / stiffer, near | lost
-        E = np.einsum("kipq,qijk->kpiqj", change, [H[a:] for H in G]).reshape(S, n, n) + np.eye(n)
-        pull = np.einsum("kip,ibk->kpib", -change[..., 0], pulled).reshape(S, n, b)
-        forces = np.linalg.solve(E, pull)
+            whole, lost = series.at(omega * omega / stiffer)
+            H.append(np.moveaxis(whole / stiffer, -1, 0))
+            near |= lost
+        E = np.einsum("kipq,qkij->kpiqj", change, [each[:, a:, :s] for each in H]).reshape(S, n, n)
+        pull = -np.einsum("kip,kib->kpib", change[..., 0], H[0][:, a:, s:]).reshape(S, n, b)
+        forces = np.linalg.solve(E + np.eye(n), pull)
         size, before = (np.abs(each).max(axis=(1, 2), initial=0.0) for each in (forces, pull))
-        forces = np.moveaxis(forces.reshape(S, planes, s, b), 0, -1)
-        for p, k in np.ndindex(planes, s):
-            F[p] += G[p][:a, k, None] * forces[p, k]
-        return np.moveaxis(F, -1, 1), near | ~(size <= GROWTH * before)
+        F = np.array([each[:, :a, :s] for each in H]) @ forces.reshape(S, planes, s, b).swapaxes(0, 1)
+        F[0] += H[0][:, :a, s:]
+        return F, near | ~(size <= GROWTH * before)
 
     @cached_property
     def _band(self) -> WholeBand:
@@ -639,23 +592,23 @@ class Receptance:
         what damping makes of it.
         """
         A, band, loads = self.A, self._band, self.loads
-        planes = band.P.planes
-        rhs = band.interleaved(loads.T[:, None] * np.array([1.0, -1j])[:planes, None]).T
-        X = np.array([band.planes(band.factor(1j * speed, speed).solve(rhs).T) for speed in omega.tolist()])
-        X = FROM_XY @ X if planes == 2 else X  # (S, b, planes, size)
-        moving = multiply(A.mass, X.reshape(-1, A.size).T).T.reshape(X.shape)
-        inertia = np.einsum("sbpi,sbpi->sb", X.conj(), moving).real
-        work = np.abs(np.einsum("ib,sbi->sb", loads, X[:, :, 0]))
+        planes, b = band.P.planes, loads.shape[1]
+        rhs = np.zeros((band.size, b), dtype=complex)
+        rhs[::planes] = loads  # F and b alternate
+        X = np.array([band.factor(1j * speed, speed).solve(rhs) for speed in omega.tolist()])
+        X = X.reshape(-1, A.size, planes, b).swapaxes(0, 1)
+        inertia = (X.conj() * multiply(A.mass, X.reshape(A.size, -1)).reshape(X.shape)).real.sum(axis=(0, 2))
+        work = np.abs(np.einsum("ib,isb->sb", loads, X[:, :, 0]))
         wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1)
         if free_motions(self.rotor, {support.node for support in self.rotor.supports}):
             wrong |= omega == 0
         if wrong.any():
-            at = f"{omega[np.argmax(wrong)]:.10g} rad/s"
             raise ValueError(
-                f"at {at} the undamped rotor stands exactly at its critical speed {at}, where the amplitude "
-                "has no limit; give a support damping or choose another speed"
+                "the undamped rotor stands exactly at its critical speed "
+                f"{omega[np.argmax(wrong)]:.10g} rad/s, where the amplitude has no limit; give a support "
+                "damping or choose another speed"
             )
-        return np.moveaxis(X[..., self.unknowns], (2, 3), (0, 2))
+        return X[self.unknowns].transpose(2, 1, 0, 3)
 
 
 class Series:
@@ -678,10 +631,7 @@ class Series:
         V, signs, R = modes.vectors, modes.signs, columns
         MV = multiply(whole.mass, V) * signs
         factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
-        powers = int(m < whole.size)
-        if m < available:
-            powers += int(np.log(TOLERANCE) / np.log(ratio))
-        for _ in range(powers):
+        for _ in range(1 if m == available else _POWERS):
             R = dpbtrs(modes.factor, R)[0]
             for _ in range(2):
                 R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
@@ -692,14 +642,11 @@ class Series:
     def at(self, squared: AnyArray) -> tuple[AnyArray, BoolArray]:
         """Receptance where ω² is given, shape (rows, columns, S); nonsense where the second is true."""
         squares, shift = self.modes.squares, self.modes.shift
-        m, n = squares.size, self.factors.shape[2]
         # Rigid motions have λ = 0 without rounding.
         margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
-        terms = np.ones((n, squared.size), dtype=squared.dtype)
-        gap = np.subtract(squares[:, None], squared, out=terms[:m])
-        near = np.asarray((np.abs(gap) <= margin[:, None]).any(axis=0))
+        gap = squares[:, None] - squared
+        near: BoolArray = np.any(np.abs(gap) <= margin[:, None], axis=0)
         gap[:, near] = 1.0
-        np.divide(1.0, gap, out=gap)
-        for j in range(m + 1, n):
-            terms[j] = terms[j - 1] * (squared + shift)
+        n = self.factors.shape[2]
+        terms = np.vstack((1 / gap, np.vander(squared + shift, n - squares.size, increasing=True).T))
         return (self.factors.reshape(-1, n) @ terms).reshape(*self.factors.shape[:2], -1), near

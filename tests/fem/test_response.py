@@ -175,13 +175,6 @@ def test_at_rest_there_is_no_force(rotor):
     np.testing.assert_allclose(found.amplitudes[1], moving.amplitudes[0, 2], rtol=1e-9)
 
 
-def test_the_deflected_shape_at_a_speed():
-    kept = fem.unbalance_response(rotor23(2e4), {5: 1e-3}, [50.0, 300.0], nodes=[3])
-    shape = kept.deflected(300.0)
-    assert shape.x.shape == (1, 24)
-    np.testing.assert_allclose(shape.x[:, 2], kept.x[1], rtol=1e-12)
-
-
 @each_of(
     ("arguments", "message"),
     [
