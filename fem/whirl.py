@@ -173,7 +173,12 @@ def _answers(
     """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
     lam = values[..., None, None] * (1 + 1e-14)  # beside an eigenvalue, where the matrix is singular
     dynamic = lam * (lam * M + D[:, None]) + K[:, None]
-    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads, dynamic.shape[:-1])[..., None])[..., 0])
+    loads = np.broadcast_to(loads, dynamic.shape[:-1])[..., None]
+    try:
+        return np.asarray(np.linalg.solve(dynamic, loads)[..., 0])
+    except np.linalg.LinAlgError:  # singular to the last bit all the same: moved by rounding
+        moved = dynamic + 1e-14 * np.abs(dynamic).max() * np.eye(len(M))
+        return np.asarray(np.linalg.solve(moved, loads)[..., 0])
 
 
 def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray) -> ComplexArray:
