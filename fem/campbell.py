@@ -10,7 +10,6 @@ step; where it slips to another mode the step is halved, too.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -336,10 +335,7 @@ class _Paths:
 
         def excess(speed: float) -> float:
             nonlocal value, vector
-            with suppress(np.linalg.LinAlgError):  # λ is an eigenvalue to the last bit
-                value, vector = polish(
-                    self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), value, vector, 2
-                )
+            value, vector = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), value, vector, 2)
             return float(abs(value[0].imag) - speed)
 
         speed = root(excess, self.speeds[k : k + 2], f)
