@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.assembly import Planes, WholeBand, both_planes, multiply, rounding_error
+from fem.assembly import Planes, WholeBand, both_planes, free_motions, multiply, rounding_error
 from fem.rotor import Rotor
-from fem.undamped import whole_rotor
+from fem.undamped import Result
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, Table, frame, html, terminal
+from rotorid.base.tables import Column, Table, frame, terminal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,7 @@ GRAVITY = 9.80665  # m/s²
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StaticDeflection:
+class StaticDeflection(Result):
     """A rotor under its own weight.
 
     Attributes
@@ -103,12 +103,6 @@ class StaticDeflection:
         """Weight, largest deflection and reactions, as text."""
         return f"{self.sentence()}\n{terminal(self.tables()[1])}"
 
-    def __repr__(self) -> str:
-        return f"StaticDeflection({self.sentence()})"
-
-    def _repr_html_(self) -> str:
-        return "\n".join(map(html, self.tables()))
-
 
 def static_deflection(
     rotor: Rotor, speed: float = 0.0, *, direction: float = -90.0, gravity: float = GRAVITY
@@ -136,18 +130,14 @@ def static_deflection(
     speed, gravity = number(speed, "speed"), number(gravity, "gravity")
     angle = np.radians(number(direction, "direction", signed=True))
     P = both_planes(rotor, complex_coordinate=False)
-    A = P.A
-    ones = np.zeros((A.size, 1))
-    ones[A.deflections] = 1.0
+    lifted = np.zeros((P.A.size, 1))
+    lifted[P.A.deflections] = gravity
     along = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
-    weight = gravity * multiply(A.mass, ones)[:, 0]
-    X = _solved(P, np.outer(along, weight)[None], speed)[0]
-    springs = [support.dynamic_stiffness(0.0, speed).real for support in rotor.supports]
-    moved = [X[:, A.deflection(support.node)] for support in rotor.supports]
-    reactions = -np.einsum("sij,sj->is", springs, moved)
-    x, y = X[:, A.deflections]
+    X, springs = _solved(P, along[:, None] * multiply(P.A.mass, lifted).T[:, None], speed)
+    reactions = -np.einsum("sij,js->is", springs, X[0][:, P.rows])
+    x, y = X[0][:, P.A.deflections]
     read_only(x, y, reactions)
-    return StaticDeflection(x, y, reactions[0], reactions[1], gravity * rotor.total_mass, rotor, speed)
+    return StaticDeflection(x, y, *reactions, gravity * rotor.total_mass, rotor, speed)
 
 
 def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> FloatArray:
@@ -181,26 +171,26 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
     unknowns = np.array([P.A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
     forces = np.zeros((unknowns.size, 2, P.A.size))
     forces[np.arange(unknowns.size), 0, unknowns] = 1.0
-    alpha = _solved(P, forces, number(speed, "speed"))[:, 0, unknowns].T
+    alpha = _solved(P, forces, number(speed, "speed"))[0][:, 0, unknowns].T
     symmetric = all(support.plain for support in rotor.supports)
     return np.asarray((alpha + alpha.T) / 2 if symmetric else alpha)
 
 
-def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
-    """Deflections under forces at rest, both of shape (m, 2, size)."""
-    if whole_rotor(P.rotor, P.A, speed).rigid.shape[1]:
-        raise ValueError(
-            "a rotor that is not held has no static compliance, and no rest under its weight: give stiffness "
-            "to supports at two nodes"
-        )
-    band = WholeBand(P)
-    X = band.planes(band.factor(0.0, speed).solve(band.interleaved(forces).T).T).real
-    work = np.abs((forces * X).sum(axis=(1, 2)))
-    lost = np.add(*(rounding_error(P.A.shaft, X[:, plane].T, work) for plane in (0, 1)))
-    if not (lost[forces.any(axis=(1, 2))] < 1e-3).all():
+def _solved(P: Planes, forces: FloatArray, speed: float) -> tuple[FloatArray, FloatArray]:
+    """Deflections under forces at rest, both of shape (m, 2, size), and supports' stiffness, (s, 2, 2)."""
+    supports = P.rotor.supports
+    springs = np.reshape([each.dynamic_stiffness(0.0, speed).real for each in supports], (-1, 2, 2))
+    for plane in (0, 1):
+        stiff = {each.node for each, k in zip(supports, springs, strict=True) if k[plane, plane]}
+        if free_motions(P.rotor, stiff):
+            raise ValueError("a rotor that is not held has no rest: give stiffness to supports at two nodes")
+    whole = WholeBand(P)
+    X = whole.planes(whole.factor(0.0, speed).solve(whole.interleaved(forces).T).T).real
+    flat, work = X.reshape(-1, P.A.size), np.abs((forces * X).sum(axis=(1, 2)))
+    if not (rounding_error(P.A.shaft, flat.T, np.repeat(work, 2)) < 1e-3).all():
         raise ValueError(
             f"the compliance of {P.rotor.n_elements} elements on these supports is lost in float64; "
             "join neighbouring elements (50 to 200 are ample for a rotor) or check the support stiffness"
         )
     # What rounding alone moves across does not move.
-    return np.where(np.abs(X) < 1e-9 * np.abs(X).max(axis=1, keepdims=True), 0.0, X)
+    return np.where(np.abs(X) < 1e-9 * np.abs(X).max(axis=1, keepdims=True), 0.0, X), springs
