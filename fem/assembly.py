@@ -31,15 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.elements import (
-    Layout,
-    bending_terms,
-    dense,
-    gyroscopic_terms,
-    mass_terms,
-    multiply,
-    strains,
-)
+from fem.elements import dense, multiply, shaft_bands, strains
 from fem.forces import InternalDamping, kind_of
 from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
@@ -86,8 +78,8 @@ class Matrices:
         G, polar inertia of shaft and discs on the slopes; zero unless the model has `gyroscopic`.
     material
         B, Σ β K of the elements, and internal damping at nodes.
-    stride, width
-        Unknowns per node, and entries of a band above its diagonal.
+    stride
+        Unknowns per node.
     """
 
     shaft: FloatArray
@@ -95,7 +87,11 @@ class Matrices:
     gyroscopic: FloatArray
     material: FloatArray
     stride: int
-    width: int
+
+    @property
+    def width(self) -> int:
+        """Entries of a band above its diagonal."""
+        return len(self.shaft) - 1
 
     @property
     def size(self) -> int:
@@ -120,19 +116,16 @@ def assemble(rotor: Rotor) -> Matrices:
     ValueError
         For a rotor with forces that are not linear.
     """
-    layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
-    stiffness = bending_terms(rotor)
-    damping = [(beta * factor, form) for factor, form in stiffness] if beta.any() else []
-    terms = (stiffness, mass_terms(rotor), gyroscopic_terms(rotor), damping)
-    K, M, G, B = (layout.band(each) for each in terms)
-    A = Matrices(K, M, G, B, layout.stride, layout.width)
+    model = rotor.model
+    A = Matrices(*shaft_bands(rotor), stride=4 if model.shear else 2)
+    M, G, B = A.mass, A.gyroscopic, A.material
     for disc in rotor.discs:
         w = A.deflection(disc.node)
         M[-1, w] += disc.mass
         M[-1, w + 1] += disc.diametral_inertia * model.rotary_inertia
         G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
     for support in rotor.supports:
-        K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
+        A.shaft[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
     for force in rotor.forces:
         if not isinstance(force, InternalDamping):
             kind = kind_of(force).replace("_", " ")
