@@ -433,31 +433,28 @@ class WholeBand:
     def __init__(self, P: Planes) -> None:
         A, p = P.A, P.planes
         self.P, self.size, self.reach = P, p * A.size, p * A.width
-        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex).reshape(4, -1)
-        self._from: AnyArray = FROM_XY if p == 2 else np.eye(1)
+        self._bands = np.zeros((4, 2 * A.width + 1, A.size), complex)
+        self._bands[:, : A.width + 1] = A.mass, A.gyroscopic, A.material, A.shaft
+        for off in range(1, A.width + 1):
+            self._bands[:, A.width + off, :-off] = self._bands[:, A.width - off, off:]
         self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
+        self._from: AnyArray = FROM_XY if p == 2 else np.eye(1)
 
     def factor(self, value: complex, speed: float) -> Factored:
         """LU factors of λ² M + λ D + K at one λ and speed."""
         from scipy.linalg.lapack import zgbtrf
 
-        P, p, reach, width = self.P, self.P.planes, self.reach, self.P.A.width
+        P, p, reach = self.P, self.P.planes, self.reach
         band = np.zeros((3 * reach + 1, self.size), complex, order="F")
         for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
             powers = np.array([value * value, -value * turning, value - turning, 1.0])
-            upper = (powers @ self._bands).reshape(width + 1, -1)
-            for off in range(width + 1):
-                entries = upper[width - off, off:]
-                band[2 * reach - p * off, p * off + plane :: p] = entries
-                band[2 * reach + p * off, plane : self.size - p * off : p] = entries
+            band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
-        for i, (m, stiffness, damping) in zip(P.pedestals, np.moveaxis(P.feet, 1, 0), strict=True):
-            stand = stiffness + value * damping + value**2 * m
-            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(stand), D[i])
-        for row, matrix in zip(P.rows, self._from @ D @ self._to, strict=True):
-            for a, b in np.ndindex(p, p):
-                band[2 * reach + a - b, p * row + b] += matrix[a, b]
+        for i, foot in zip(P.pedestals, np.tensordot([value**2, 1.0, value], P.feet, 1), strict=True):
+            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(foot), D[i])
+        for (i, a, b), entry in np.ndenumerate(self._from @ D @ self._to):
+            band[2 * reach + a - b, p * P.rows[i] + b] += entry
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
         if info > 0:  # singular to the last bit: an eigenvalue
             lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
