@@ -31,33 +31,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.elements import dense, multiply, shaft_bands, strains
+from fem.elements import dense as dense
+from fem.elements import multiply as multiply
+from fem.elements import shaft_bands, strains
 from fem.forces import InternalDamping, kind_of
 from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
-
-__all__ = [
-    "FROM_XY",
-    "TO_XY",
-    "Factored",
-    "Matrices",
-    "Planes",
-    "Reduced",
-    "Supported",
-    "WholeBand",
-    "assemble",
-    "both_planes",
-    "dense",
-    "free_motions",
-    "held",
-    "ignored_inertia",
-    "multiply",
-    "project",
-    "rounding_error",
-    "static_stiffness",
-    "supported",
-    "whirl_change",
-]
 
 TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
 FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
@@ -141,7 +120,7 @@ def assemble(rotor: Rotor) -> Matrices:
 def free_motions(rotor: Rotor, held: set[int]) -> int:
     """Number of rigid-body motions, of 2, left by springs at the nodes `held` and by tilting springs."""
     tilting = any(support.tilting_stiffness > 0 for support in rotor.supports)
-    return max(2 - len(held) - tilting, 0) if held else 2 - tilting
+    return max(2 - len(held) - tilting, 0)
 
 
 def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
@@ -170,22 +149,17 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     """One warning for each disc whose moments of inertia the model leaves out."""
-    moments = (
-        ("diametral", "no rotary inertia", rotor.model.rotary_inertia),
-        ("polar", "no gyroscopic effect", rotor.model.gyroscopic),
-    )
+    effects = {
+        "diametral": "" if rotor.model.rotary_inertia else "no rotary inertia",
+        "polar": "" if rotor.model.gyroscopic else "no gyroscopic effect",
+    }
     warnings = []
     for disc in rotor.discs:
-        missing = {
-            kind: effect
-            for kind, effect, counted in moments
-            if not counted and getattr(disc, f"{kind}_inertia") > 0
-        }
+        missing = [kind for kind in effects if effects[kind] and getattr(disc, f"{kind}_inertia")]
         if missing:
-            what = "moments of inertia are" if len(missing) > 1 else f"{min(missing)} moment of inertia is"
-            name = f" {disc.name!r}" if disc.name else ""
-            effects = " and ".join(missing.values())
-            warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {effects}")
+            what = "moments of inertia are" if missing[1:] else f"{missing[0]} moment of inertia is"
+            why = " and ".join(effects[kind] for kind in missing)
+            warnings.append(f"disc at node {disc.node}: its {what} ignored, the model has {why}")
     return tuple(warnings)
 
 
@@ -241,12 +215,12 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     ValueError
         If a speed lies outside a bearing table.
     """
-    attached = [support.node for support in rotor.supports] + [damper.node for damper in _internal(rotor)]
-    nodes = tuple(dict.fromkeys(attached))
+    dampers = _internal(rotor)
+    nodes = tuple(dict.fromkeys(each.node for each in (*rotor.supports, *dampers)))
     stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
     for support in rotor.supports:
         stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
-    for damper in _internal(rotor):
+    for damper in dampers:
         stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
     # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
     reference = np.maximum(np.median(stiffness[..., 0, 0].real, axis=0), 0.0)
@@ -259,12 +233,11 @@ def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArr
     Bearing B and pedestal S in series are D = B − B (B + S)⁻¹ B: dD = S G dB G S + B G dS G B, G = (B + S)⁻¹.
     """
     (B, S), (other, beneath) = (support.dynamic_parts(speeds) for support in (more, less))
-    change = B - other
-    if S is not None and beneath is not None:
-        moved, B, S = S - beneath, (B + other) / 2, (S + beneath) / 2
-        G = np.linalg.inv(B + S)
-        change = S @ G @ change @ G @ S + B @ G @ moved @ G @ B
-    return _turned(change)
+    if S is None or beneath is None:
+        return _turned(B - other)
+    more_B, more_S, B, S = B - other, S - beneath, (B + other) / 2, (S + beneath) / 2
+    G = np.linalg.inv(B + S)
+    return _turned(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +255,7 @@ class Planes:
     pedestals
         Which supports stand on a pedestal, shape (f,).
     feet
-        Mass, stiffness and damping of the pedestals, shape (3, f, planes).
+        Mass, damping and stiffness of the pedestals, shape (3, planes, f).
     """
 
     rotor: Rotor
@@ -310,17 +283,16 @@ class Planes:
 def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
     """Look at a rotor in both planes; by default with the complex coordinate where that is enough."""
     one = rotor.symmetric if complex_coordinate is None else complex_coordinate
-    A, p = assemble(rotor), 1 if one else 2
-    rows = [A.deflection(support.node) for support in rotor.supports]
-    pedestals = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
-    feet = [(2 * (foot.mass,), foot.xy("stiffness"), foot.xy("damping")) for foot in pedestals.values()]
+    A, p, supports = assemble(rotor), 1 if one else 2, rotor.supports
+    pedestals = {i: support.pedestal for i, support in enumerate(supports) if support.pedestal}
+    feet = [(2 * (foot.mass,), foot.xy("damping"), foot.xy("stiffness")) for foot in pedestals.values()]
     return Planes(
         rotor,
         A,
         p,
-        np.array(rows, np.intp),
+        np.array([A.deflection(support.node) for support in supports], np.intp),
         np.array(list(pedestals), np.intp),
-        np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p],
+        np.reshape(feet, (-1, 3, 2)).transpose(1, 2, 0)[:, :p],
     )
 
 
@@ -339,7 +311,7 @@ class Reduced:
     M, D0, D1, K0, K1
         Shape (R, R).
     ties
-        What a unit entry (i, j) of each support's matrices adds, shape (s · planes², R²).
+        What a unit entry (i, j) of each support's matrices adds, shape (s, planes, planes, R, R).
     """
 
     P: Planes
@@ -358,13 +330,9 @@ class Reduced:
 
     def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """D and K at each speed, shape (S, R, R)."""
-        omega, (k, c) = speeds[:, None, None], self.P.supports(speeds)
-
-        def matrix(constant: FloatArray, turning: AnyArray, supports: AnyArray) -> AnyArray:
-            entries = supports.reshape(speeds.size, len(self.ties))
-            return constant + omega * turning + (entries @ self.ties).reshape(-1, *constant.shape)
-
-        return matrix(self.D0, self.D1, c), matrix(self.K0, self.K1, k)
+        omega = speeds[:, None, None]
+        k, c = (np.tensordot(matrices, self.ties, 3) for matrices in self.P.supports(speeds))
+        return self.D0 + omega * self.D1 + c, self.K0 + omega * self.K1 + k
 
     def expand(self, vectors: AnyArray) -> AnyArray:
         """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
@@ -384,9 +352,9 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     """
     d, p, f = basis.shape[1], P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
-    beta = np.tile(P.rotor.material_damping, len(strain))[:, None]
+    damped = (P.rotor.material_damping[:, None] * strain).reshape(-1, d)
     strain = strain.reshape(-1, d)
-    K, B = strain.T @ strain, strain.T @ (beta * strain)
+    K, B = strain.T @ strain, strain.T @ damped
     for support in P.rotor.supports:
         tilt = basis[P.A.deflection(support.node) + 1]
         K += support.tilting_stiffness * np.outer(tilt, tilt)
@@ -396,31 +364,19 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
     # Force in x from y, and with the opposite sign in y from x; or the same of z.
     along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
-    mass, stiffness, damping = P.feet
-
-    def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
-        """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        matrix = np.zeros((p * (d + f), p * (d + f)), sides.dtype)
-        both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]
-        matrix[: p * d, : p * d] = both.reshape(p * d, p * d)
-        np.fill_diagonal(matrix[p * d :, p * d :], pedestals.T.ravel())
-        return matrix
-
+    forms, feet = np.array([M, B, K, G, B]), np.arange(p * d, p * (d + f))
+    forms = (forms + forms.swapaxes(1, 2)) / 2
+    matrices = np.zeros((5, p * (d + f), p * (d + f)), across.dtype)
+    planes = np.einsum("kab,kij->kaibj", [along] * 3 + [across] * 2, forms)
+    matrices[:, : p * d, : p * d] = planes.reshape(5, p * d, p * d)
+    matrices[:3, feet, feet] = P.feet.reshape(3, -1)
     # What a support feels: motion of its node against the ground or the foot, in each plane.
     felt = np.zeros((len(P.rows), p, p * (d + f)))
-    for plane in range(p):
+    for plane, unknowns in enumerate(feet.reshape(p, f)):
         felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
-        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
-    none = np.zeros_like(mass)
-    terms = (
-        (along, M, mass),
-        (along, B, damping),
-        (across, G, none),
-        (along, K, stiffness),
-        (across, B, none),
-    )
-    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
-    M, D0, D1, K0, K1 = (whole(*term) for term in terms)
+        felt[P.pedestals, plane, unknowns] = -1.0
+    ties = np.einsum("sia,sjb->sijab", felt, felt)
+    (M, D0, K0), (D1, K1) = matrices[:3].real, matrices[3:]
     return Reduced(P, basis, M, D0, D1, K0, K1, ties)
 
 
@@ -451,7 +407,7 @@ class WholeBand:
             band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
-        for i, foot in zip(P.pedestals, np.tensordot([value**2, 1.0, value], P.feet, 1), strict=True):
+        for i, foot in zip(P.pedestals, np.tensordot([value**2, value, 1.0], P.feet, 1).T, strict=True):
             D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(foot), D[i])
         for (i, a, b), entry in np.ndenumerate(self._from @ D @ self._to):
             band[2 * reach + a - b, p * P.rows[i] + b] += entry

@@ -27,8 +27,6 @@ import numpy as np
 from fem.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray
 
-__all__ = ["dense", "multiply", "shaft_bands", "strains"]
-
 _LENGTHS = np.array([0, 1, 1, 1, 0, 1])  # powers of L in the scaling
 _HERMITE = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
 """Coefficients of 1, ξ, ξ², ξ³ on 0 … 1 of the polynomials of w₁, slope₁, w₂, slope₂."""

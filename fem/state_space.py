@@ -1,6 +1,6 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
-In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet of massless pedestals.
+In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass.
 Singular vectors of their damping, C₂₂ = U Σ Vᵀ, part them in a, damped, and b, not damped: q₂ = V (a, b), and
 the equations are multiplied by Uᵀ. Then each kind has equations of its own, solved one after the other: K for
 b, C for a', M for the acceleration of what has mass. The states are q₁, q₁' and a.
@@ -19,8 +19,6 @@ from fem.assembly import both_planes, project
 from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
-
-__all__ = ["Motion", "StateSpace", "equations_of_motion", "state_space"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,6 @@ from rotorid.base.tables import Column, Table, frame, terminal
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["GRAVITY", "StaticDeflection", "compliance", "static_deflection"]
-
 GRAVITY = 9.80665  # m/s²
 
 
