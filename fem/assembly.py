@@ -127,9 +127,8 @@ def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
     """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
     free = np.ones(band.shape[1])
     free[unknowns] = 0.0
-    K = np.asfortranarray(band * free)
-    for above in range(1, len(K)):
-        K[-1 - above, above:] *= free[:-above]
+    above = range(len(band) - 1, -1, -1)
+    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
     K[-1, unknowns] = 1.0
     return K
 
@@ -148,18 +147,16 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
 
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
-    """One warning for each disc whose moments of inertia the model leaves out."""
-    effects = {
-        "diametral": "" if rotor.model.rotary_inertia else "no rotary inertia",
-        "polar": "" if rotor.model.gyroscopic else "no gyroscopic effect",
-    }
+    """One warning for each kind of moments of inertia of the discs that the model leaves out."""
     warnings = []
-    for disc in rotor.discs:
-        missing = [kind for kind in effects if effects[kind] and getattr(disc, f"{kind}_inertia")]
-        if missing:
-            what = "moments of inertia are" if missing[1:] else f"{missing[0]} moment of inertia is"
-            why = " and ".join(effects[kind] for kind in missing)
-            warnings.append(f"disc at node {disc.node}: its {what} ignored, the model has {why}")
+    for kind, effect, counted in (
+        ("diametral", "rotary inertia", rotor.model.rotary_inertia),
+        ("polar", "gyroscopic effect", rotor.model.gyroscopic),
+    ):
+        nodes = [str(disc.node) for disc in rotor.discs if getattr(disc, f"{kind}_inertia")]
+        if nodes and not counted:
+            discs = f"disc{'s' * (len(nodes) > 1)} at node {', '.join(nodes)}"
+            warnings.append(f"{discs}: {kind} moment of inertia is ignored, the model has no {effect}")
     return tuple(warnings)
 
 
@@ -216,7 +213,8 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
         If a speed lies outside a bearing table.
     """
     dampers = _internal(rotor)
-    nodes = tuple(dict.fromkeys(each.node for each in (*rotor.supports, *dampers)))
+    attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
+    nodes = tuple(dict.fromkeys(attached))
     stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
     for support in rotor.supports:
         stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
@@ -273,10 +271,9 @@ class Planes:
         ValueError
             Outside the table of a support.
         """
-        parts = [support.at(speeds) for support in self.rotor.supports]
-        k, c = np.array(parts).reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
-        if self.planes == 1:
-            k, c = (X[..., :1, :1] - 1j * X[..., :1, 1:] for X in (k, c))
+        parts = np.array([support.at(speeds) for support in self.rotor.supports])
+        parts = parts.reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
+        k, c = parts if self.planes == 2 else parts[..., :1, :1] - 1j * parts[..., :1, 1:]
         return k, c
 
 
@@ -383,7 +380,9 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
 class WholeBand:
     """The full model at complex frequencies, its bands prepared once; pedestals are condensed.
 
-    F and b alternate, or F = z stands alone; the supports alone couple them.
+    F and b alternate, or F = z stands alone; the supports alone couple them. Entries of K are rounded: an
+    element of 1/500 of its neighbours, of 20, costs 1e-5 of a deflection at rest and 1e-3 of the peak of a
+    resonance that amplifies 1000 times; see `rounding_error`.
     """
 
     def __init__(self, P: Planes) -> None:
@@ -394,7 +393,7 @@ class WholeBand:
         for off in range(1, A.width + 1):
             self._bands[:, A.width + off, :-off] = self._bands[:, A.width - off, off:]
         self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
-        self._from: AnyArray = FROM_XY if p == 2 else np.eye(1)
+        self._from = np.linalg.inv(self._to)
 
     def factor(self, value: complex, speed: float) -> Factored:
         """LU factors of λ² M + λ D + K at one λ and speed."""
@@ -442,8 +441,6 @@ class Factored:
         """
         from scipy.linalg.lapack import zgbtrs
 
-        order = np.arange(len(b))
-        if transposed and self.planes == 2:
-            order ^= 1
+        order = np.arange(len(b)) ^ int(transposed and self.planes == 2)
         x, _ = zgbtrs(self.lu, self.reach, self.reach, b[order], self.pivots, trans=int(transposed))
         return np.asarray(x[order])

@@ -212,8 +212,8 @@ def state_space(
         (rate, M, one, "the mass matrix is singular without a zero row, as with shear but no rotary inertia"),
     ):
         square = matrix[np.ix_(rows, rows)]
-        scale = 1 / np.sqrt(np.abs(square).max(axis=1, initial=1e-300))
-        if np.linalg.matrix_rank(scale[:, None] * square * scale, 1e-12) < rows.size:
+        scale = np.abs(square).max(axis=1, initial=1e-300, keepdims=True)
+        if np.linalg.matrix_rank(square / scale, 1e-12) < rows.size:
             raise ValueError(f"{what}: there is no state space")
         unknown[rows] = np.linalg.solve(square, (load - C @ v - K @ q)[rows])
     A, B = np.split(np.vstack((v[one], rate[one], v[damped])), [order], axis=1)

@@ -6,6 +6,7 @@ the whole band at the frequency 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -126,16 +127,16 @@ def static_deflection(
         carry the answer.
     """
     speed, gravity = number(speed, "speed"), number(gravity, "gravity")
-    angle = np.radians(number(direction, "direction", signed=True))
+    angle = math.radians(number(direction, "direction", signed=True))
     P = both_planes(rotor, complex_coordinate=False)
     lifted = np.zeros((P.A.size, 1))
     lifted[P.A.deflections] = gravity
-    along = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
+    along = np.round((math.cos(angle), math.sin(angle)), 15)  # straight down is straight down
     X, springs = _solved(P, along[:, None] * multiply(P.A.mass, lifted).T[:, None], speed)
-    reactions = -np.einsum("sij,js->is", springs, X[0][:, P.rows])
     x, y = X[0][:, P.A.deflections]
-    read_only(x, y, reactions)
-    return StaticDeflection(x, y, *reactions, gravity * rotor.total_mass, rotor, speed)
+    at_x, at_y = -np.einsum("sij,js->is", springs, X[0][:, P.rows])
+    read_only(x, y, at_x, at_y)
+    return StaticDeflection(x, y, at_x, at_y, gravity * rotor.total_mass, rotor, speed)
 
 
 def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> FloatArray:
