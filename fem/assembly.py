@@ -96,15 +96,15 @@ def assemble(rotor: Rotor) -> Matrices:
         For a rotor with forces that are not linear.
     """
     model = rotor.model
-    A = Matrices(*shaft_bands(rotor), stride=4 if model.shear else 2)
-    M, G, B = A.mass, A.gyroscopic, A.material
+    K, M, G, B = shaft_bands(rotor)
+    A = Matrices(K, M, G, B, 4 if model.shear else 2)
     for disc in rotor.discs:
         w = A.deflection(disc.node)
         M[-1, w] += disc.mass
         M[-1, w + 1] += disc.diametral_inertia * model.rotary_inertia
         G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
     for support in rotor.supports:
-        A.shaft[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
+        K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
     for force in rotor.forces:
         if not isinstance(force, InternalDamping):
             kind = kind_of(force).replace("_", " ")
@@ -141,8 +141,7 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
     """
     if energy is None:
         energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
-    size = np.abs(X)
-    scatter = (size * multiply(np.abs(band), size)).sum(axis=0)
+    scatter = (np.abs(X) * multiply(np.abs(band), np.abs(X))).sum(axis=0)
     return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
 
 
@@ -153,10 +152,9 @@ def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
         ("diametral", "rotary inertia", rotor.model.rotary_inertia),
         ("polar", "gyroscopic effect", rotor.model.gyroscopic),
     ):
-        nodes = [str(disc.node) for disc in rotor.discs if getattr(disc, f"{kind}_inertia")]
+        nodes = ", ".join(str(disc.node) for disc in rotor.discs if getattr(disc, f"{kind}_inertia"))
         if nodes and not counted:
-            discs = f"disc{'s' * (len(nodes) > 1)} at node {', '.join(nodes)}"
-            warnings.append(f"{discs}: {kind} moment of inertia is ignored, the model has no {effect}")
+            warnings.append(f"disc at node {nodes}: {kind} inertia is ignored, the model has no {effect}")
     return tuple(warnings)
 
 
@@ -167,7 +165,7 @@ def static_stiffness(support: Support, speed: float) -> FloatArray:
     conservative rotor.
     """
     k = support.at(speed)[0]
-    return np.asarray((k + k.T) / 2)
+    return (k + k.T) / 2
 
 
 def _internal(rotor: Rotor) -> list[InternalDamping]:

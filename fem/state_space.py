@@ -1,9 +1,9 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
 In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass.
-Singular vectors of their damping, C₂₂ = U Σ Vᵀ, part them in a, damped, and b, not damped: q₂ = V (a, b), and
-the equations are multiplied by Uᵀ. Then each kind has equations of its own, solved one after the other: K for
-b, C for a', M for the acceleration of what has mass. The states are q₁, q₁' and a.
+Singular vectors V of the columns of their damping part them in a, which is damped, and b, which is not:
+q₂ = V (a, b); the equations are multiplied by Uᵀ, C₂₂ V = U R, so that those of b are free of a'. Each kind
+is solved in turn: K for b, C for a', M for the acceleration of what has mass. The states are q₁, q₁' and a.
 """
 
 from __future__ import annotations
@@ -194,12 +194,11 @@ def state_space(
     forces, shown = _places(inputs, every, "input"), _places(outputs, [*names, *velocities], "output")
 
     U, V, light = np.eye(n), np.eye(n), np.ix_(two, two)
-    U[light], sigma, right = np.linalg.svd(C[light])
+    _, sigma, right = np.linalg.svd(C[:, two])
     V[light] = right.T
+    U[light] = np.linalg.qr(C[light] @ right.T)[0]
     C, K = U.T @ C @ V, U.T @ K @ V
     damped, free = np.split(two, [np.count_nonzero(sigma > 1e-12 * sigma.max(initial=0.0))])
-    if (np.abs(C[:, free]) > 1e-9 * np.abs(C).max()).any():
-        raise ValueError("the velocity of a massless coordinate acts on others without being damped itself")
     states = (*(names[i] for i in one), *velocities, *(f"damped{i + 1}" for i in range(damped.size)))
     order = len(states)
     # Over the states and the inputs.
@@ -208,7 +207,7 @@ def state_space(
     load[:, order:] = U.T[:, forces]
     for unknown, matrix, rows, what in (
         (q, K, free, "massless coordinates are held neither by stiffness nor by damping"),
-        (v, C, damped, "the damping of massless coordinates is singular"),
+        (v, C, damped, "velocities of massless coordinates act on others, but are not damped themselves"),
         (rate, M, one, "the mass matrix is singular without a zero row, as with shear but no rotary inertia"),
     ):
         square = matrix[np.ix_(rows, rows)]

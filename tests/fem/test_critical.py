@@ -293,10 +293,10 @@ def test_ignored_inertia_names_what_is_missing():
         )
         return fem.critical_speeds(rotor, 1).warnings
 
-    polar = "disc at node 2: polar moment of inertia is ignored, the model has no gyroscopic effect"
+    polar = "disc at node 2: polar inertia is ignored, the model has no gyroscopic effect"
     assert warnings()[1] == polar
     assert warnings(rotary_inertia=True) == (polar,)
-    assert "diametral moment of inertia is ignored" in warnings(gyroscopic=True)[0]
+    assert "diametral inertia is ignored" in warnings(gyroscopic=True)[0]
     assert warnings(gyroscopic=True, rotary_inertia=True) == ()
 
 

@@ -183,7 +183,7 @@ def test_a_rotor_with_massless_pedestals_and_shaft():
         # no mass where x1 = −x2
         (np.ones((2, 2)), 0.5 * np.eye(2), np.eye(2), "singular without a zero row"),
         # damping by the velocity of a coordinate that has neither mass nor damping
-        (np.diag([2.0, 0]), [[0, 0.6], [0.5, 0]], np.diag([8.0, 3.0]), "without being damped itself"),
+        (np.diag([2.0, 0]), [[0, 0.6], [0.5, 0]], np.diag([8.0, 3.0]), "not damped themselves"),
         (np.eye(2), np.eye(2), [[1.0, np.nan], [0, 1]], "2 coordinates needs finite matrices, 2 × 2"),
         (np.eye(2), np.eye(2), np.eye(3)[:2], "inhomogeneous"),
     ],
