@@ -325,19 +325,19 @@ class Reduced:
 
     def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """D and K at each speed, shape (S, R, R)."""
-        omega = speeds[:, None, None]
-        k, c = (np.tensordot(matrices, self.ties, 3) for matrices in self.P.supports(speeds))
-        return self.D0 + omega * self.D1 + c, self.K0 + omega * self.K1 + k
+        omega, (k, c) = speeds[:, None, None], self.P.supports(speeds)
+        D = self.D0 + omega * self.D1 + np.tensordot(c, self.ties, 3)
+        return D, self.K0 + omega * self.K1 + np.tensordot(k, self.ties, 3)
 
     def expand(self, vectors: AnyArray) -> AnyArray:
         """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
         planes, d = self.P.planes, self.basis.shape[1]
         coefficients = vectors[..., : planes * d].reshape(*vectors.shape[:-1], planes, d)
-        return np.asarray(coefficients @ self.basis.T)
+        return coefficients @ self.basis.T
 
     def nodes(self, vectors: AnyArray) -> AnyArray:
         """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
-        return np.asarray(self.expand(vectors)[..., :: self.P.A.stride])
+        return self.expand(vectors)[..., :: self.P.A.stride]
 
 
 def project(P: Planes, basis: FloatArray) -> Reduced:
@@ -420,7 +420,7 @@ class WholeBand:
     def planes(self, X: AnyArray) -> AnyArray:
         """Back to (…, planes, size)."""
         alternating = X.reshape(*X.shape[:-1], -1, self.P.planes)
-        return np.asarray(self._to @ np.swapaxes(alternating, -1, -2))
+        return self._to @ np.swapaxes(alternating, -1, -2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -174,7 +174,7 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
     forces[np.arange(unknowns.size), 0, unknowns] = 1.0
     alpha = _solved(P, forces, number(speed, "speed"))[:, 0, unknowns].T
     symmetric = all(support.plain for support in rotor.supports)
-    return np.asarray((alpha + alpha.T) / 2 if symmetric else alpha)
+    return (alpha + alpha.T) / 2 if symmetric else alpha
 
 
 def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
