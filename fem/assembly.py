@@ -386,10 +386,7 @@ class WholeBand:
     def __init__(self, P: Planes) -> None:
         A, p = P.A, P.planes
         self.P, self.size, self.reach = P, p * A.size, p * A.width
-        self._bands = np.zeros((4, 2 * A.width + 1, A.size), complex)
-        self._bands[:, : A.width + 1] = A.mass, A.gyroscopic, A.material, A.shaft
-        for off in range(1, A.width + 1):
-            self._bands[:, A.width + off, :-off] = self._bands[:, A.width - off, off:]
+        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex)
         self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
         self._from = np.linalg.inv(self._to)
 
@@ -397,11 +394,15 @@ class WholeBand:
         """LU factors of λ² M + λ D + K at one λ and speed."""
         from scipy.linalg.lapack import zgbtrf
 
-        P, p, reach = self.P, self.P.planes, self.reach
+        P, p, reach, width = self.P, self.P.planes, self.reach, self.P.A.width
         band = np.zeros((3 * reach + 1, self.size), complex, order="F")
         for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
             powers = np.array([value * value, -value * turning, value - turning, 1.0])
-            band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
+            upper = np.tensordot(powers, self._bands, 1)
+            band[reach : 2 * reach + 1 : p, plane::p] = upper
+            for off in range(1, width + 1):
+                below = slice(plane, self.size - p * off, p)
+                band[2 * reach + p * off, below] = upper[width - off, off:]
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
         for i, foot in zip(P.pedestals, np.tensordot([value**2, value, 1.0], P.feet, 1).T, strict=True):

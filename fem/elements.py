@@ -49,11 +49,12 @@ def shaft_bands(rotor: Rotor) -> FloatArray:
     """Upper bands of stiffness, mass, gyroscopic form and material damping, shape (4, width + 1, size)."""
     model, L, outer = rotor.model, rotor.length, np.multiply.outer
     unknowns = np.arange(6) if model.shear else np.array([0, 1, 4, 5])
-    stiffness = outer(_BENDING, rotor.youngs_modulus * rotor.second_moment / L**3)
+    taken, scale = np.ix_(unknowns, unknowns), L ** _LENGTHS[unknowns, None]
+    stiffness = outer(_BENDING[taken], rotor.youngs_modulus * rotor.second_moment / L**3)
     if model.shear:
         stiffness += outer(_SHEAR, rotor.shear_coefficient * rotor.shear_modulus * rotor.area / L)
-    mass = outer(_MASS, rotor.density * rotor.area * L)
-    tilting = outer(_TILT, rotor.density * rotor.second_moment / L)
+    mass = outer(_MASS[taken], rotor.density * rotor.area * L)
+    tilting = outer(_TILT[taken], rotor.density * rotor.second_moment / L)
     forms = np.array(
         (
             stiffness,
@@ -62,8 +63,7 @@ def shaft_bands(rotor: Rotor) -> FloatArray:
             rotor.material_damping * stiffness,
         )
     )
-    scale = L ** _LENGTHS[:, None]
-    forms = (forms * scale * scale[:, None])[:, unknowns[:, None], unknowns]
+    forms *= scale * scale[:, None]
     stride, width = unknowns.size - 2, unknowns.size - 1
     # Each as LAPACK takes it without a copy.
     bands = np.zeros((4, stride * L.size + 2, width + 1)).transpose(0, 2, 1)
