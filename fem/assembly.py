@@ -31,41 +31,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.elements import (
-    Layout,
-    bending_terms,
-    dense,
-    gyroscopic_terms,
-    mass_terms,
-    multiply,
-    strains,
-)
+from fem.elements import dense as dense
+from fem.elements import multiply as multiply
+from fem.elements import shaft_bands, strains
 from fem.forces import InternalDamping, kind_of
 from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
-
-__all__ = [
-    "FROM_XY",
-    "TO_XY",
-    "Factored",
-    "Matrices",
-    "Planes",
-    "Reduced",
-    "Supported",
-    "WholeBand",
-    "assemble",
-    "both_planes",
-    "dense",
-    "free_motions",
-    "held",
-    "ignored_inertia",
-    "multiply",
-    "project",
-    "rounding_error",
-    "static_stiffness",
-    "supported",
-    "whirl_change",
-]
 
 TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
 FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
@@ -86,8 +57,8 @@ class Matrices:
         G, polar inertia of shaft and discs on the slopes; zero unless the model has `gyroscopic`.
     material
         B, Σ β K of the elements, and internal damping at nodes.
-    stride, width
-        Unknowns per node, and entries of a band above its diagonal.
+    stride
+        Unknowns per node.
     """
 
     shaft: FloatArray
@@ -95,7 +66,11 @@ class Matrices:
     gyroscopic: FloatArray
     material: FloatArray
     stride: int
-    width: int
+
+    @property
+    def width(self) -> int:
+        """Entries of a band above its diagonal."""
+        return len(self.shaft) - 1
 
     @property
     def size(self) -> int:
@@ -120,12 +95,9 @@ def assemble(rotor: Rotor) -> Matrices:
     ValueError
         For a rotor with forces that are not linear.
     """
-    layout, model, beta = Layout(rotor), rotor.model, rotor.material_damping
-    stiffness = bending_terms(rotor)
-    damping = [(beta * factor, form) for factor, form in stiffness] if beta.any() else []
-    terms = (stiffness, mass_terms(rotor), gyroscopic_terms(rotor), damping)
-    K, M, G, B = (layout.band(each) for each in terms)
-    A = Matrices(K, M, G, B, layout.stride, layout.width)
+    model = rotor.model
+    K, M, G, B = shaft_bands(rotor)
+    A = Matrices(K, M, G, B, 4 if model.shear else 2)
     for disc in rotor.discs:
         w = A.deflection(disc.node)
         M[-1, w] += disc.mass
@@ -148,16 +120,15 @@ def assemble(rotor: Rotor) -> Matrices:
 def free_motions(rotor: Rotor, held: set[int]) -> int:
     """Number of rigid-body motions, of 2, left by springs at the nodes `held` and by tilting springs."""
     tilting = any(support.tilting_stiffness > 0 for support in rotor.supports)
-    return max(2 - len(held) - tilting, 0) if held else 2 - tilting
+    return max(2 - len(held) - tilting, 0)
 
 
 def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
     """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
     free = np.ones(band.shape[1])
     free[unknowns] = 0.0
-    K = np.asfortranarray(band * free)
-    for above in range(1, len(K)):
-        K[-1 - above, above:] *= free[:-above]
+    above = range(len(band) - 1, -1, -1)
+    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
     K[-1, unknowns] = 1.0
     return K
 
@@ -170,29 +141,20 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
     """
     if energy is None:
         energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
-    size = np.abs(X)
-    scatter = (size * multiply(np.abs(band), size)).sum(axis=0)
+    scatter = (np.abs(X) * multiply(np.abs(band), np.abs(X))).sum(axis=0)
     return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
 
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
-    """One warning for each disc whose moments of inertia the model leaves out."""
-    moments = (
-        ("diametral", "no rotary inertia", rotor.model.rotary_inertia),
-        ("polar", "no gyroscopic effect", rotor.model.gyroscopic),
-    )
+    """One warning for each kind of moments of inertia of the discs that the model leaves out."""
     warnings = []
-    for disc in rotor.discs:
-        missing = {
-            kind: effect
-            for kind, effect, counted in moments
-            if not counted and getattr(disc, f"{kind}_inertia") > 0
-        }
-        if missing:
-            what = "moments of inertia are" if len(missing) > 1 else f"{min(missing)} moment of inertia is"
-            name = f" {disc.name!r}" if disc.name else ""
-            effects = " and ".join(missing.values())
-            warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {effects}")
+    for kind, effect, counted in (
+        ("diametral", "rotary inertia", rotor.model.rotary_inertia),
+        ("polar", "gyroscopic effect", rotor.model.gyroscopic),
+    ):
+        nodes = ", ".join(str(disc.node) for disc in rotor.discs if getattr(disc, f"{kind}_inertia"))
+        if nodes and not counted:
+            warnings.append(f"disc at node {nodes}: {kind} inertia is ignored, the model has no {effect}")
     return tuple(warnings)
 
 
@@ -203,7 +165,7 @@ def static_stiffness(support: Support, speed: float) -> FloatArray:
     conservative rotor.
     """
     k = support.at(speed)[0]
-    return np.asarray((k + k.T) / 2)
+    return (k + k.T) / 2
 
 
 def _internal(rotor: Rotor) -> list[InternalDamping]:
@@ -248,12 +210,13 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     ValueError
         If a speed lies outside a bearing table.
     """
-    attached = [support.node for support in rotor.supports] + [damper.node for damper in _internal(rotor)]
+    dampers = _internal(rotor)
+    attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
     nodes = tuple(dict.fromkeys(attached))
     stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
     for support in rotor.supports:
         stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
-    for damper in _internal(rotor):
+    for damper in dampers:
         stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
     # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
     reference = np.maximum(np.median(stiffness[..., 0, 0].real, axis=0), 0.0)
@@ -266,12 +229,11 @@ def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArr
     Bearing B and pedestal S in series are D = B − B (B + S)⁻¹ B: dD = S G dB G S + B G dS G B, G = (B + S)⁻¹.
     """
     (B, S), (other, beneath) = (support.dynamic_parts(speeds) for support in (more, less))
-    change = B - other
-    if S is not None and beneath is not None:
-        moved, B, S = S - beneath, (B + other) / 2, (S + beneath) / 2
-        G = np.linalg.inv(B + S)
-        change = S @ G @ change @ G @ S + B @ G @ moved @ G @ B
-    return _turned(change)
+    if S is None or beneath is None:
+        return _turned(B - other)
+    more_B, more_S, B, S = B - other, S - beneath, (B + other) / 2, (S + beneath) / 2
+    G = np.linalg.inv(B + S)
+    return _turned(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,7 +251,7 @@ class Planes:
     pedestals
         Which supports stand on a pedestal, shape (f,).
     feet
-        Mass, stiffness and damping of the pedestals, shape (3, f, planes).
+        Mass, damping and stiffness of the pedestals, shape (3, planes, f).
     """
 
     rotor: Rotor
@@ -307,27 +269,25 @@ class Planes:
         ValueError
             Outside the table of a support.
         """
-        parts = [support.at(speeds) for support in self.rotor.supports]
-        k, c = np.array(parts).reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
-        if self.planes == 1:
-            k, c = (X[..., :1, :1] - 1j * X[..., :1, 1:] for X in (k, c))
+        parts = np.array([support.at(speeds) for support in self.rotor.supports])
+        parts = parts.reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
+        k, c = parts if self.planes == 2 else parts[..., :1, :1] - 1j * parts[..., :1, 1:]
         return k, c
 
 
 def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
     """Look at a rotor in both planes; by default with the complex coordinate where that is enough."""
     one = rotor.symmetric if complex_coordinate is None else complex_coordinate
-    A, p = assemble(rotor), 1 if one else 2
-    rows = [A.deflection(support.node) for support in rotor.supports]
-    pedestals = {i: s.pedestal for i, s in enumerate(rotor.supports) if s.pedestal is not None}
-    feet = [(2 * (foot.mass,), foot.xy("stiffness"), foot.xy("damping")) for foot in pedestals.values()]
+    A, p, supports = assemble(rotor), 1 if one else 2, rotor.supports
+    pedestals = {i: support.pedestal for i, support in enumerate(supports) if support.pedestal}
+    feet = [(2 * (foot.mass,), foot.xy("damping"), foot.xy("stiffness")) for foot in pedestals.values()]
     return Planes(
         rotor,
         A,
         p,
-        np.array(rows, np.intp),
+        np.array([A.deflection(support.node) for support in supports], np.intp),
         np.array(list(pedestals), np.intp),
-        np.moveaxis(np.reshape(feet, (-1, 3, 2)), 1, 0)[..., :p],
+        np.reshape(feet, (-1, 3, 2)).transpose(1, 2, 0)[:, :p],
     )
 
 
@@ -346,7 +306,7 @@ class Reduced:
     M, D0, D1, K0, K1
         Shape (R, R).
     ties
-        What a unit entry (i, j) of each support's matrices adds, shape (s · planes², R²).
+        What a unit entry (i, j) of each support's matrices adds, shape (s, planes, planes, R, R).
     """
 
     P: Planes
@@ -366,22 +326,18 @@ class Reduced:
     def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """D and K at each speed, shape (S, R, R)."""
         omega, (k, c) = speeds[:, None, None], self.P.supports(speeds)
-
-        def matrix(constant: FloatArray, turning: AnyArray, supports: AnyArray) -> AnyArray:
-            entries = supports.reshape(speeds.size, len(self.ties))
-            return constant + omega * turning + (entries @ self.ties).reshape(-1, *constant.shape)
-
-        return matrix(self.D0, self.D1, c), matrix(self.K0, self.K1, k)
+        D = self.D0 + omega * self.D1 + np.tensordot(c, self.ties, 3)
+        return D, self.K0 + omega * self.K1 + np.tensordot(k, self.ties, 3)
 
     def expand(self, vectors: AnyArray) -> AnyArray:
         """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
         planes, d = self.P.planes, self.basis.shape[1]
         coefficients = vectors[..., : planes * d].reshape(*vectors.shape[:-1], planes, d)
-        return np.asarray(coefficients @ self.basis.T)
+        return coefficients @ self.basis.T
 
     def nodes(self, vectors: AnyArray) -> AnyArray:
         """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
-        return np.asarray(self.expand(vectors)[..., :: self.P.A.stride])
+        return self.expand(vectors)[..., :: self.P.A.stride]
 
 
 def project(P: Planes, basis: FloatArray) -> Reduced:
@@ -391,9 +347,9 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     """
     d, p, f = basis.shape[1], P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
-    beta = np.tile(P.rotor.material_damping, len(strain))[:, None]
+    damped = (P.rotor.material_damping[:, None] * strain).reshape(-1, d)
     strain = strain.reshape(-1, d)
-    K, B = strain.T @ strain, strain.T @ (beta * strain)
+    K, B = strain.T @ strain, strain.T @ damped
     for support in P.rotor.supports:
         tilt = basis[P.A.deflection(support.node) + 1]
         K += support.tilting_stiffness * np.outer(tilt, tilt)
@@ -403,46 +359,36 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
     # Force in x from y, and with the opposite sign in y from x; or the same of z.
     along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
-    mass, stiffness, damping = P.feet
-
-    def whole(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
-        """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        matrix = np.zeros((p * (d + f), p * (d + f)), sides.dtype)
-        both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]
-        matrix[: p * d, : p * d] = both.reshape(p * d, p * d)
-        np.fill_diagonal(matrix[p * d :, p * d :], pedestals.T.ravel())
-        return matrix
-
+    forms, feet = np.array([M, B, K, G, B]), np.arange(p * d, p * (d + f))
+    forms = (forms + forms.swapaxes(1, 2)) / 2
+    matrices = np.zeros((5, p * (d + f), p * (d + f)), across.dtype)
+    planes = np.einsum("kab,kij->kaibj", [along] * 3 + [across] * 2, forms)
+    matrices[:, : p * d, : p * d] = planes.reshape(5, p * d, p * d)
+    matrices[:3, feet, feet] = P.feet.reshape(3, -1)
     # What a support feels: motion of its node against the ground or the foot, in each plane.
     felt = np.zeros((len(P.rows), p, p * (d + f)))
-    for plane in range(p):
+    for plane, unknowns in enumerate(feet.reshape(p, f)):
         felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
-        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
-    none = np.zeros_like(mass)
-    terms = (
-        (along, M, mass),
-        (along, B, damping),
-        (across, G, none),
-        (along, K, stiffness),
-        (across, B, none),
-    )
-    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
-    M, D0, D1, K0, K1 = (whole(*term) for term in terms)
+        felt[P.pedestals, plane, unknowns] = -1.0
+    ties = np.einsum("sia,sjb->sijab", felt, felt)
+    (M, D0, K0), (D1, K1) = matrices[:3].real, matrices[3:]
     return Reduced(P, basis, M, D0, D1, K0, K1, ties)
 
 
 class WholeBand:
     """The full model at complex frequencies, its bands prepared once; pedestals are condensed.
 
-    F and b alternate, or F = z stands alone; the supports alone couple them.
+    F and b alternate, or F = z stands alone; the supports alone couple them. Entries of K are rounded: an
+    element of 1/500 of its neighbours, of 20, costs 1e-5 of a deflection at rest and 1e-3 of the peak of a
+    resonance that amplifies 1000 times; see `rounding_error`.
     """
 
     def __init__(self, P: Planes) -> None:
         A, p = P.A, P.planes
         self.P, self.size, self.reach = P, p * A.size, p * A.width
-        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex).reshape(4, -1)
-        self._from: AnyArray = FROM_XY if p == 2 else np.eye(1)
+        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex)
         self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
+        self._from = np.linalg.inv(self._to)
 
     def factor(self, value: complex, speed: float) -> Factored:
         """LU factors of λ² M + λ D + K at one λ and speed."""
@@ -452,19 +398,17 @@ class WholeBand:
         band = np.zeros((3 * reach + 1, self.size), complex, order="F")
         for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
             powers = np.array([value * value, -value * turning, value - turning, 1.0])
-            upper = (powers @ self._bands).reshape(width + 1, -1)
-            for off in range(width + 1):
-                entries = upper[width - off, off:]
-                band[2 * reach - p * off, p * off + plane :: p] = entries
-                band[2 * reach + p * off, plane : self.size - p * off : p] = entries
+            upper = np.tensordot(powers, self._bands, 1)
+            band[reach : 2 * reach + 1 : p, plane::p] = upper
+            for off in range(1, width + 1):
+                below = slice(plane, self.size - p * off, p)
+                band[2 * reach + p * off, below] = upper[width - off, off:]
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
-        for i, (m, stiffness, damping) in zip(P.pedestals, np.moveaxis(P.feet, 1, 0), strict=True):
-            stand = stiffness + value * damping + value**2 * m
-            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(stand), D[i])
-        for row, matrix in zip(P.rows, self._from @ D @ self._to, strict=True):
-            for a, b in np.ndindex(p, p):
-                band[2 * reach + a - b, p * row + b] += matrix[a, b]
+        for i, foot in zip(P.pedestals, np.tensordot([value**2, value, 1.0], P.feet, 1).T, strict=True):
+            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(foot), D[i])
+        for (i, a, b), entry in np.ndenumerate(self._from @ D @ self._to):
+            band[2 * reach + a - b, p * P.rows[i] + b] += entry
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
         if info > 0:  # singular to the last bit: an eigenvalue
             lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
@@ -477,7 +421,7 @@ class WholeBand:
     def planes(self, X: AnyArray) -> AnyArray:
         """Back to (…, planes, size)."""
         alternating = X.reshape(*X.shape[:-1], -1, self.P.planes)
-        return np.asarray(self._to @ np.swapaxes(alternating, -1, -2))
+        return self._to @ np.swapaxes(alternating, -1, -2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -496,8 +440,6 @@ class Factored:
         """
         from scipy.linalg.lapack import zgbtrs
 
-        order = np.arange(len(b))
-        if transposed and self.planes == 2:
-            order ^= 1
+        order = np.arange(len(b)) ^ int(transposed and self.planes == 2)
         x, _ = zgbtrs(self.lu, self.reach, self.reach, b[order], self.pivots, trans=int(transposed))
         return np.asarray(x[order])

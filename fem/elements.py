@@ -22,89 +22,54 @@ all of them multiples of 1/420.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from fem.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray
 
-__all__ = [
-    "Layout",
-    "bending_terms",
-    "dense",
-    "gyroscopic_terms",
-    "mass_terms",
-    "multiply",
-    "strains",
-]
-
 _LENGTHS = np.array([0, 1, 1, 1, 0, 1])  # powers of L in the scaling
-# End values (w₁, slope₁, w₂, slope₂) of the polynomial from the element's unknowns, and the polynomial
-# 1, ξ, ξ², ξ³ on 0 … 1 from its end values.
-_ENDS = np.array([[1, 0, 0, 0, 0, 0], [0, 1, 1, 0, 0, 0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 1, 0, 1]])
 _HERMITE = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
+"""Coefficients of 1, ξ, ξ², ξ³ on 0 … 1 of the polynomials of w₁, slope₁, w₂, slope₂."""
 
 
 def _forms() -> list[FloatArray]:
-    """∫(w'' − γ')², ∫γ², ∫w², ∫(w' − γ)² as 6 × 6 matrices: Gauss's rule of four points is exact."""
-    points, weights = np.polynomial.legendre.leggauss(4)
-    x, one, zero = (points + 1) / 2, np.ones(4), np.zeros(4)
-    powers = [(one, x, x**2, x**3), (zero, one, 2 * x, 3 * x**2), (zero, zero, 2 * one, 6 * x)]
-    w, slope, curvature = (_ENDS.T @ _HERMITE @ np.array(each) for each in powers)
-    shear = np.array([zero, zero, 1 - x, x, zero, zero])
-    change = np.array([zero, zero, -one, one, zero, zero])
-    fields = (curvature - change, shear, w, slope - shear)
-    return [np.round(420 * (field * weights / 2) @ field.T) / 420 for field in fields]
+    """∫(w'' − γ')², ∫γ², ∫w², ∫(w' − γ)² as 6 × 6 matrices."""
+    derivative, powers = np.diag([1, 2, 3], 1), np.arange(4)
+    w, gamma = _HERMITE[[0, 1, 1, 3, 2, 3]].T, np.zeros((4, 6))
+    gamma[:2, 2:4] = [[1, 0], [-1, 1]]
+    tilt = derivative @ w - gamma
+    integrals = 1 / (powers[:, None] + powers + 1)
+    return [np.round(420 * f.T @ integrals @ f) / 420 for f in (derivative @ tilt, gamma, w, tilt)]
 
 
 _BENDING, _SHEAR, _MASS, _TILT = _forms()
 
 
-class Layout:
-    """Where the unknowns of a rotor stand: `stride` per node, the last node has two."""
-
-    def __init__(self, rotor: Rotor) -> None:
-        self._unknowns = np.arange(6) if rotor.model.shear else np.array([0, 1, 4, 5])
-        self.stride = self._unknowns.size - 2
-        self.width = self._unknowns.size - 1  # entries above the diagonal
-        self.size = self.stride * rotor.n_elements + 2
-        scale = rotor.length ** _LENGTHS[self._unknowns, None]
-        self._scales = scale[:, None] * scale
-
-    def band(self, terms: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-        """Upper band of Σ over terms (factor per element, form), shape (width + 1, size)."""
-        pick = np.ix_(self._unknowns, self._unknowns)
-        elements = sum(form[pick][:, :, None] * factor for factor, form in terms) * self._scales
-        band = np.zeros((self.width + 1, self.size), order="F")  # as LAPACK takes it without a copy
-        for j in range(self.width + 1):
-            columns = slice(j, j + self.stride * elements.shape[2], self.stride)
-            band[self.width - j :, columns] += elements[: j + 1, j]
-        return band
-
-
-def bending_terms(rotor: Rotor) -> list[tuple[FloatArray, FloatArray]]:
-    """Terms of the stiffness."""
-    L = rotor.length
-    terms = [(rotor.youngs_modulus * rotor.second_moment / L**3, _BENDING)]
-    if rotor.model.shear:
-        terms.append((rotor.shear_coefficient * rotor.shear_modulus * rotor.area / L, _SHEAR))
-    return terms
-
-
-def mass_terms(rotor: Rotor) -> list[tuple[FloatArray, FloatArray]]:
-    """Terms of the mass."""
-    terms = [(rotor.density * rotor.area * rotor.length, _MASS)]
-    if rotor.model.rotary_inertia:
-        terms.append((rotor.density * rotor.second_moment / rotor.length, _TILT))
-    return terms
-
-
-def gyroscopic_terms(rotor: Rotor) -> list[tuple[FloatArray, FloatArray]]:
-    """Terms of the gyroscopic matrix; none unless the model has it."""
-    if not rotor.model.gyroscopic:
-        return []
-    return [(2 * rotor.density * rotor.second_moment / rotor.length, _TILT)]
+def shaft_bands(rotor: Rotor) -> FloatArray:
+    """Upper bands of stiffness, mass, gyroscopic form and material damping, shape (4, width + 1, size)."""
+    model, L, outer = rotor.model, rotor.length, np.multiply.outer
+    unknowns = np.arange(6) if model.shear else np.array([0, 1, 4, 5])
+    taken, scale = np.ix_(unknowns, unknowns), L ** _LENGTHS[unknowns, None]
+    stiffness = outer(_BENDING[taken], rotor.youngs_modulus * rotor.second_moment / L**3)
+    if model.shear:
+        stiffness += outer(_SHEAR, rotor.shear_coefficient * rotor.shear_modulus * rotor.area / L)
+    mass = outer(_MASS[taken], rotor.density * rotor.area * L)
+    tilting = outer(_TILT[taken], rotor.density * rotor.second_moment / L)
+    forms = np.array(
+        (
+            stiffness,
+            mass + model.rotary_inertia * tilting,
+            2 * model.gyroscopic * tilting,
+            rotor.material_damping * stiffness,
+        )
+    )
+    forms *= scale * scale[:, None]
+    stride, width = unknowns.size - 2, unknowns.size - 1
+    # Each as LAPACK takes it without a copy.
+    bands = np.zeros((4, stride * L.size + 2, width + 1)).transpose(0, 2, 1)
+    for j in range(width + 1):
+        bands[:, width - j :, j : j + stride * L.size : stride] += forms[:, : j + 1, j]
+    return bands
 
 
 def strains(rotor: Rotor, X: FloatArray) -> FloatArray:
@@ -116,23 +81,18 @@ def strains(rotor: Rotor, X: FloatArray) -> FloatArray:
     elements)² of what a product with K costs.
     """
     stride = 4 if rotor.model.shear else 2
-    L = rotor.length[:, None]
-    w, tilt = X[0::stride], X[1::stride]
-    chord = np.diff(w, axis=0) / L
-    a, b = tilt[:-1] - chord, tilt[1:] - chord
+    w, tilt, *shear = (X[i::stride] for i in range(stride))
+    chord = np.diff(w, axis=0) / rotor.length[:, None]
     bending = np.sqrt(rotor.youngs_modulus * rotor.second_moment / rotor.length)[:, None]
-    if not rotor.model.shear:
-        return np.stack((bending * (b - a), np.sqrt(3.0) * bending * (a + b)))
-    left, right = X[2::stride], X[3::stride]
-    shear = np.sqrt(rotor.shear_coefficient * rotor.shear_modulus * rotor.area * rotor.length)[:, None]
-    return np.stack(
-        (
-            bending * (b - a),
-            np.sqrt(3.0) * bending * (a + b + left + right),
-            shear * (left + right) / 2,
-            shear * (right - left) / np.sqrt(12.0),
-        )
-    )
+    parts = [
+        bending * np.diff(tilt, axis=0),
+        np.sqrt(3.0) * bending * ((tilt[:-1] - chord) + (tilt[1:] - chord) + sum(shear)),
+    ]
+    if shear:
+        left, right = shear
+        stiff = np.sqrt(rotor.shear_coefficient * rotor.shear_modulus * rotor.area * rotor.length)[:, None]
+        parts += [stiff * (left + right) / 2, stiff * (right - left) / np.sqrt(12.0)]
+    return np.stack(parts)
 
 
 def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
@@ -148,11 +108,4 @@ def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
 
 def dense(band: AnyArray) -> AnyArray:
     """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
-    size = band.shape[1]
-    A = np.zeros((size, size), band.dtype)
-    flat = A.reshape(-1)
-    for above in range(min(len(band), size)):
-        entries = band[-1 - above, above:]
-        flat[above * size :: size + 1] = entries.conj()
-        flat[above : (size - above) * size : size + 1] = entries
-    return A
+    return multiply(band, np.eye(band.shape[1]))

@@ -1,20 +1,14 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
-In M q'' + C q' + K q = f let q₁ be the coordinates that move mass and q₂ the others, with zero rows and
-columns of M: nodes of a massless shaft, feet of massless pedestals. Singular vectors of their damping,
-Uᵀ C₂₂ V = Σ, part them in q₂ = V_a a + V_b b: a is damped, b is not. With v = q₁' and the signs of
-`fem.assembly` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …)
-
-    (U_bᵀ K₂₂ V_b) b = U_bᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ V_a a)
-    Σ_a a'           = U_aᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂)
-    M₁₁ v'           = f₁ − C₁₁ v − C₁₂ V_a a' − K₁₁ q₁ − K₁₂ q₂
-
-where C₁₂ V_b = 0: what does no negative work has no force by a velocity that is not damped itself. The states
-are q₁, v and a.
+In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass.
+Singular vectors V of the columns of their damping part them in a, which is damped, and b, which is not:
+q₂ = V (a, b); the equations are multiplied by Uᵀ, C₂₂ V = U R, so that those of b are free of a'. Each kind
+is solved in turn: K for b, C for a', M for the acceleration of what has mass. The states are q₁, q₁' and a.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,8 +19,6 @@ from fem.assembly import both_planes, project
 from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
-
-__all__ = ["Motion", "StateSpace", "equations_of_motion", "state_space"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +51,7 @@ class Motion:
         ValueError
             For an unknown that does not exist.
         """
-        if name not in self.coordinates:
-            raise ValueError(f"no unknown {name!r}: they are {self.coordinates[0]} … {self.coordinates[-1]}")
-        return self.coordinates.index(name)
+        return _places([name], self.coordinates, "unknown")[0]
 
 
 def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both") -> Motion:
@@ -99,18 +89,15 @@ def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both"
         raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
     speed = number(speed, "speed")
     P = both_planes(rotor, complex_coordinate=False)
-    equations = project(P, np.eye(P.A.size))
-    M, (C, K) = equations.M, (X[0] for X in equations.at(np.array([speed])))
-    kinds = ("", "tilt_", "left_", "right_")
-    shaft = [(kinds[i % P.A.stride], i // P.A.stride + 1) for i in range(P.A.size)]
-    feet = [("foot_", int(i) + 1) for i in P.pedestals]
-    names = np.array([f"{kind}{axis}{i}" for part in (shaft, feet) for axis in "xy" for kind, i in part])
-    if plane == "x":
-        in_x = np.array([name.split("_")[-1].startswith("x") for name in names])
-        if any(X[np.ix_(in_x, ~in_x)].any() for X in (C, K)):
-            raise ValueError("the planes x and y of this rotor are coupled: take both")
-        (M, C, K), names = (X[np.ix_(in_x, in_x)] for X in (M, C, K)), names[in_x]
-    return Motion(M, C, K, tuple(names.tolist()), speed)
+    equations, kinds, stride = project(P, np.eye(P.A.size)), ("", "tilt_", "left_", "right_"), P.A.stride
+    names = [f"{kinds[i % stride]}{axis}{i // stride + 1}" for axis in "xy" for i in range(P.A.size)]
+    names += [f"foot_{axis}{i + 1}" for axis in "xy" for i in P.pedestals]
+    taken = np.array([plane == "both" or "x" in name for name in names])
+    D, K = (matrix[0] for matrix in equations.at(np.array([speed])))
+    if any(matrix[taken][:, ~taken].any() for matrix in (D, K)):
+        raise ValueError("the planes x and y of this rotor are coupled: take both")
+    M, D, K = (matrix[np.ix_(taken, taken)] for matrix in (equations.M, D, K))
+    return Motion(M, D, K, tuple(itertools.compress(names, taken)), speed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,14 +163,13 @@ def state_space(
     inputs
         Forces, `f_x7` on the coordinate `x7`; by default on every coordinate.
     outputs
-        `x7` for a deflection, `v_x7` for a velocity; by default every deflection.
+        `x7` for a deflection, `v_x7` for the velocity of a coordinate with mass; by default every deflection.
 
     Raises
     ------
     ValueError
-        For names that do not exist or repeat, numbers that are not finite, a singular mass matrix without a
-        zero row, massless coordinates that nothing holds or whose velocity acts without being damped, or as
-        output the velocity of a coordinate with neither mass nor damping.
+        For names that do not exist, numbers that are not finite, a singular mass matrix without a zero row,
+        and massless coordinates that nothing holds or whose velocity acts without being damped.
 
     Examples
     --------
@@ -197,78 +183,46 @@ def state_space(
     array([-1.-3.46410162j, -1.+3.46410162j])
     """
     names, n = motion.coordinates, len(motion.coordinates)
-    matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
-    if matrices.shape != (3, n, n) or not np.isfinite(matrices).all() or len(set(names)) < n:
-        raise ValueError(
-            "a state space needs coordinates with different names, and M, C and K of finite numbers, "
-            f"{n} × {n} for {n} coordinates"
-        )
-    M, C, K = matrices
-    every = tuple(f"f_{name}" for name in names)
-    inputs = every if inputs is None else tuple(inputs)
-    outputs = names if outputs is None else tuple(outputs)
-    forces = _places(inputs, every, "input")
-    shown = _places(outputs, [*names, *(f"v_{name}" for name in names)], "output")
+    M, C, K = matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
+    if matrices.shape != (3, n, n) or not np.isfinite(matrices).all():
+        raise ValueError(f"a state space of {n} coordinates needs finite matrices, {n} × {n}")
     massive = M.any(axis=0) | M.any(axis=1)
     one, two = np.flatnonzero(massive), np.flatnonzero(~massive)
-    light = np.ix_(two, two)
-    size, rate = np.sqrt(np.abs(K).max(axis=1)), np.sqrt(np.abs(K).max() / (np.abs(M).max() or 1.0))
-    unit = 1 / np.where(size > 0, size, 1.0)[two]
-    W, sigma, Vt = np.linalg.svd(unit[:, None] * C[light] * unit)
-    rank = int(np.count_nonzero(rate * sigma > 1e-13))  # the rounding of stiffness damps nothing
-    (Va, Vb), (Ua, Ub) = (np.split(unit[:, None] * X, [rank], axis=1) for X in (Vt.T, W))
-    if (rate * np.abs(C[np.ix_(one, two)] @ Vb) > 1e-9 * size[one, None]).any():
-        raise ValueError(
-            "the velocity of a massless coordinate acts on others without being damped itself: there is no "
-            "state space with velocities; make the damping symmetric, or give the coordinate mass"
-        )
-    at_once = two[(np.abs(Vt[rank:]) > 1e-9).any(axis=0)]
-    for name, place in zip(outputs, shown, strict=True):
-        if place - n in at_once:
-            raise ValueError(
-                f"output {name!r}: {name[2:]!r} has neither mass nor damping and follows forces at once: its "
-                "velocity holds their derivatives; ask for its deflection, or give it mass or damping"
-            )
+    every, velocities = [f"f_{name}" for name in names], [f"v_{names[i]}" for i in one]
+    inputs = tuple(every if inputs is None else inputs)
+    outputs = tuple(names if outputs is None else outputs)
+    forces, shown = _places(inputs, every, "input"), _places(outputs, [*names, *velocities], "output")
 
-    # Rows over the states q₁, v, a and the inputs.
-    states = [*(names[i] for i in one), *(f"v_{names[i]}" for i in one)]
-    states += [f"damped{i + 1}" for i in range(rank)]
+    U, V, light = np.eye(n), np.eye(n), np.ix_(two, two)
+    _, sigma, right = np.linalg.svd(C[:, two])
+    V[light] = right.T
+    U[light] = np.linalg.qr(C[light] @ right.T)[0]
+    C, K = U.T @ C @ V, U.T @ K @ V
+    damped, free = np.split(two, [np.count_nonzero(sigma > 1e-12 * sigma.max(initial=0.0))])
+    states = (*(names[i] for i in one), *velocities, *(f"damped{i + 1}" for i in range(damped.size)))
     order = len(states)
-    width = order + len(forces)
-    q, velocity, load = np.zeros((3, n, width))
-    q[one], velocity[one], a, load[forces] = np.split(np.eye(width), np.cumsum([one.size, one.size, rank]))
-    q[two] = Va @ a
-    q[two] += Vb @ _solved(
-        Ub.T @ K[light] @ Vb,
-        Ub.T @ (load - C @ velocity - K @ q)[two],
-        "some massless coordinates are held neither by stiffness nor by damping, or move only with "
-        "derivatives of the forces (an index above 1): there is no state space; give them mass, damping "
-        "or stiffness",
-    )
-    damped = Ua.T @ (load - C @ velocity - K @ q)[two] / sigma[:rank, None]
-    velocity[two] = Va @ damped
-    rate_v = _solved(
-        M[np.ix_(one, one)],
-        (load - C @ velocity - K @ q)[one],
-        "the mass matrix is singular without a zero row (as with shear but without rotary inertia): "
-        "there is no state space of it; give every combination of its coordinates mass",
-    )
-    rates, readings = np.vstack((velocity[one], rate_v, damped)), np.vstack((q, velocity))[shown]
-    A, B, Y, D = (part for rows in (rates, readings) for part in np.split(rows, [order], axis=1))
-    return StateSpace(A, B, Y, D, tuple(states), inputs, outputs, motion.speed)
+    # Over the states and the inputs.
+    q, v, rate, load = np.zeros((4, n, order + len(inputs)))
+    q[one], v[one], q[damped] = np.split(np.eye(order, q.shape[1]), [one.size, 2 * one.size])
+    load[:, order:] = U.T[:, forces]
+    for unknown, matrix, rows, what in (
+        (q, K, free, "massless coordinates are held neither by stiffness nor by damping"),
+        (v, C, damped, "velocities of massless coordinates act on others, but are not damped themselves"),
+        (rate, M, one, "the mass matrix is singular without a zero row, as with shear but no rotary inertia"),
+    ):
+        square = matrix[np.ix_(rows, rows)]
+        scale = np.abs(square).max(axis=1, initial=1e-300, keepdims=True)
+        if np.linalg.matrix_rank(square / scale, 1e-12) < rows.size:
+            raise ValueError(f"{what}: there is no state space")
+        unknown[rows] = np.linalg.solve(square, (load - C @ v - K @ q)[rows])
+    A, B = np.split(np.vstack((v[one], rate[one], v[damped])), [order], axis=1)
+    Y, D = np.split(np.vstack((V @ q, v[one]))[shown], [order], axis=1)
+    return StateSpace(A, B, Y, D, states, inputs, outputs, motion.speed)
 
 
 def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]:
-    """Where names of inputs or outputs stand."""
+    """Where names stand."""
     for name in chosen:
-        if name not in names or chosen.count(name) > 1:
-            raise ValueError(f"no {what} {name!r}, or it is named more than once: {names[0]} … {names[-1]}")
+        if name not in names:
+            raise ValueError(f"no {what} {name!r}: they are {names[0]} … {names[-1]}")
     return [names.index(name) for name in chosen]
-
-
-def _solved(matrix: FloatArray, right: FloatArray, reason: str) -> FloatArray:
-    """The solution with a matrix that is regular in the scale of its rows; else the reason is raised."""
-    scale = 1 / np.sqrt(np.abs(matrix).max(axis=1, initial=1e-300))
-    if matrix.size and np.linalg.cond(scale[:, None] * matrix * scale, 1) > 1e12:
-        raise ValueError(reason)
-    return np.asarray(np.linalg.solve(matrix, right))

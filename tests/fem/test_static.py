@@ -52,7 +52,7 @@ def test_stations_name_nodes():
 @pytest.mark.parametrize(
     ("rotor", "nodes", "message"),
     [
-        (uniform(4), [1], "not held has no static compliance"),
+        (uniform(4), [1], "not held has no rest"),
         (uniform(4, supports=[fem.Support(1, 1e8), fem.Support(1, 1e8)]), [1], "supports at two nodes"),
         (uniform(4, supports=[fem.Support(1, 1e8), fem.Support(5, 1e8)]), [6], "node 6 does not exist"),
         (uniform(100, supports=[fem.Support(1, 1e-4), fem.Support(101, 1e-4)]), [5], "lost in float64"),
