@@ -41,6 +41,17 @@ class MatrixChange:
 
     The bands, by name, are those of the unknowns from `first` on; supports, (S, k, 2, 2), act on (F, b) as in
     `Supported`.
+
+    Attributes
+    ----------
+    bands
+        By name, upper bands of the unknowns that change.
+    first
+        Their first unknown, from 0.
+    nodes
+        Of the supports that change, from 1, length k.
+    supports
+        Shape (S, k, 2, 2), on forward and backward amplitudes.
     """
 
     bands: dict[str, FloatArray]
@@ -52,7 +63,21 @@ class MatrixChange:
 def matrix_change(
     changed: Callable[[float], Rotor], value: float, step: float, speeds: FloatArray
 ) -> MatrixChange:
-    """∂D of the rotors `changed(value)`; on one side only, where the other is no rotor."""
+    """∂D of the rotors `changed(value)`; on one side only, where the other is no rotor.
+
+    Parameters
+    ----------
+    changed
+        Gives the rotor with another value of the number.
+    value, step
+        The number, and by how much it is changed, in its unit.
+    speeds
+        rad/s, shape (S,).
+
+    Returns
+    -------
+    The change per unit of the number.
+    """
     ends, width = [], 0.0
     for side in (step, -step):
         try:

@@ -179,7 +179,19 @@ class Peaks(Result):
 
 
 def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
-    """The table of peaks, amplitudes times `scale` with the name of their unit; keys as in `to_dict`."""
+    """The table of peaks, amplitudes times `scale` with the name of their unit; keys as in `to_dict`.
+
+    Parameters
+    ----------
+    peaks
+        One a row.
+    unit, scale
+        Of the amplitudes: its name, and what one of the curve's is in it.
+
+    Returns
+    -------
+    Columns of a `rotorid.base.tables.Table`: speed, amplitude, amplification factor, margins, verdict.
+    """
     sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
     size, one = f"amplitude, {unit} peak" if unit else "amplitude", "{:.1f}".format
     return (
@@ -198,6 +210,15 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
 
     Peaks of different readings belong to one critical speed where each lies in the half-power band of the
     other. Shown is one that is not far enough, if any, else the largest with an amplification factor.
+
+    Parameters
+    ----------
+    names, peaks
+        Of each reading: its name and its peaks.
+
+    Returns
+    -------
+    Name of the reading and peak, by rising speed.
     """
     every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
     groups, last = list[dict[str, Peak]](), None
@@ -217,6 +238,19 @@ def open_question(peaks: Iterable[Peak], first: float, last: float, operating: t
     """Why one cannot say that all critical speeds are far enough from the operating range, and what to do.
 
     Empty where one can. Speeds were searched from `first` to `last`; all in rad/s.
+
+    Parameters
+    ----------
+    peaks
+        One of each critical speed.
+    first, last
+        Between which speeds was searched, rad/s.
+    operating
+        Operating range, rad/s.
+
+    Returns
+    -------
+    Clauses; empty where one can say it.
     """
     reasons = [unsearched(first, last, operating)]
     ends = [first, last, operating[0] * (1 - LARGEST[0] / 100), operating[1] * (1 + LARGEST[1] / 100)]
@@ -408,7 +442,17 @@ def separation(speed: float, operating: tuple[float, float]) -> float:
 
 @dataclass(frozen=True, repr=False)
 class Separation(Result):
-    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
+    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it.
+
+    Attributes
+    ----------
+    speeds
+        Critical speeds, rad/s.
+    operating
+        Lowest and highest operating speed, rad/s.
+    doubt
+        Why more may lie in the range; else empty.
+    """
 
     speeds: Iterable[float]
     operating: tuple[float, float]
@@ -451,7 +495,19 @@ class Separation(Result):
 
 
 def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:
-    """What keeps one from saying that nothing is in an operating range: speeds that were not searched."""
+    """What keeps one from saying that nothing is in an operating range: speeds that were not searched.
+
+    Parameters
+    ----------
+    first, last
+        Between which speeds was searched, rad/s.
+    operating
+        Operating range, rad/s; None: there is none.
+
+    Returns
+    -------
+    A clause; empty where all of the range was searched.
+    """
     if operating is None or (first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6)):
         return ""
     return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"

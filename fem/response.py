@@ -375,7 +375,19 @@ class InfluenceCoefficients(Result):
 
 
 def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
-    """Two columns of a table: size, and phase as lead, 0 ≤ phase < 360 degrees."""
+    """Two columns of a table: size, and phase as lead, 0 ≤ phase < 360 degrees.
+
+    Parameters
+    ----------
+    size, phase
+        Headings of the columns.
+    Z
+        Complex amplitudes, any shape, positive phase = lead.
+
+    Returns
+    -------
+    Size in the unit of Z, and phase in degrees.
+    """
     return Column(size, np.abs(Z).ravel()), Column(phase, phase_deg(Z).ravel())
 
 
@@ -507,7 +519,19 @@ def influence(
 
 
 def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
-    """A load 1 on each of these unknowns, (size, m)."""
+    """A load 1 on each of these unknowns, (size, m).
+
+    Parameters
+    ----------
+    A
+        Matrices of the rotor.
+    unknowns
+        From 0, shape (m,).
+
+    Returns
+    -------
+    Shape (size, m).
+    """
     unit = np.zeros((A.size, unknowns.size))
     unit[unknowns, np.arange(unknowns.size)] = 1.0
     return unit

@@ -347,6 +347,15 @@ def is_reading(path: str) -> bool:
 
     Angles in degrees with the rotation: the true one less the one that the job says. A gain is what is
     read over what is there.
+
+    Parameters
+    ----------
+    path
+        Path of a parameter.
+
+    Returns
+    -------
+    Whether it belongs to readings.
     """
     return re.fullmatch(r"probe\[[^*]+\]\.(angle|gain)|key_phasor\.angle", path) is not None
 
@@ -665,7 +674,17 @@ PER_ELEMENT = {
 
 
 def too_short(length: FloatArray) -> BoolArray:
-    """Which elements are too short beside their longer neighbour, from lengths of shape (n,)."""
+    """Which elements are too short beside their longer neighbour, from lengths of shape (n,).
+
+    Parameters
+    ----------
+    length
+        m, shape (n,).
+
+    Returns
+    -------
+    Shape (n,).
+    """
     beside = np.pad(length, 1)
     return np.asarray(SHORTEST * length < np.maximum(beside[:-2], beside[2:]))
 
@@ -742,6 +761,13 @@ SensorLike = str | int | tuple[str | int, float] | Sensor
 def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
     """A sensor from a node, a station, a pair (node, angle in degrees) or a Sensor.
 
+    Parameters
+    ----------
+    sensor
+        What names it.
+    rotor
+        The rotor it stands at.
+
     Raises
     ------
     ValueError
@@ -756,7 +782,17 @@ def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
 
 
 def label(sensor: SensorLike) -> str | int:
-    """How a table names it: as given, or "5 at 45°"."""
+    """How a table names it: as given, or "5 at 45°".
+
+    Parameters
+    ----------
+    sensor
+        As `as_sensor` takes it.
+
+    Returns
+    -------
+    Node or station, with its angle where that is not 0.
+    """
     if isinstance(sensor, tuple):
         sensor = Sensor(*sensor)
     return str(sensor) if isinstance(sensor, Sensor) else sensor

@@ -275,7 +275,17 @@ def _largest_real(whirl: Whirl) -> FloatArray:
 
 
 def runs_away(whirl: Whirl) -> BoolArray:
-    """At which speeds a motion grows without oscillating, shape (S,)."""
+    """At which speeds a motion grows without oscillating, shape (S,).
+
+    Parameters
+    ----------
+    whirl
+        Modes over speeds.
+
+    Returns
+    -------
+    One truth value a speed.
+    """
     return _largest_real(whirl) > AWAY
 
 
@@ -429,6 +439,17 @@ def stability_threshold(
 def range_of_speeds(lowest: float, highest: float, steps: int) -> FloatArray:
     """The speeds of a search for a threshold, rad/s, shape (steps + 1,).
 
+    Parameters
+    ----------
+    lowest, highest
+        rad/s.
+    steps
+        Into how many the range is divided.
+
+    Returns
+    -------
+    rad/s, ascending, shape (steps + 1,).
+
     Raises
     ------
     ValueError
@@ -444,7 +465,19 @@ def range_of_speeds(lowest: float, highest: float, steps: int) -> FloatArray:
 
 
 def threshold_of(whirl: Whirl, n: int | None = None) -> Stability:
-    """The first threshold in a whirl that has all modes that may grow; its margin is that of n of them."""
+    """The first threshold in a whirl that has all modes that may grow; its margin is that of n of them.
+
+    Parameters
+    ----------
+    whirl
+        All modes that may grow, over ascending speeds.
+    n
+        How many modes of lowest frequency the margin is taken from; None: all.
+
+    Returns
+    -------
+    The threshold, or that there is none.
+    """
     speeds, windows = whirl.speeds, windows_of(whirl)
     first = windows[0] if windows else Window(np.inf, np.inf, False, False)
     lam = whirl.values[: max(1, int((speeds < first.first).sum())), :n]

@@ -324,7 +324,19 @@ def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
 
 
 def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
-    """`critical_speeds`: the `most` lowest, or all there are, where there are not fewer than `least`."""
+    """`critical_speeds`: the `most` lowest, or all there are, where there are not fewer than `least`.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    most, least
+        How many at most, and at least.
+
+    Returns
+    -------
+    Critical speeds with their mode shapes.
+    """
     if most < 1:
         raise ValueError(f"{most} critical speeds cannot be found: ask for 1 or more")
     A, warnings, cut = assemble(rotor), ignored_inertia(rotor), ""
@@ -387,6 +399,10 @@ def critical_speeds_near(rotor: Rotor, speeds: FloatArray) -> FloatArray:
         The other rotor.
     speeds
         rad/s, shape (n,); 0 of a rigid-body motion stays.
+
+    Returns
+    -------
+    rad/s, shape (n,).
 
     Raises
     ------
@@ -533,7 +549,21 @@ class Pencil:
 
 
 def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, float] | None = None) -> Pencil:
-    """Pencil of one plane on springs {node: N/m}, by default of plain supports; `whirl` 1 is forward."""
+    """Pencil of one plane on springs {node: N/m}, by default of plain supports; `whirl` 1 is forward.
+
+    Parameters
+    ----------
+    rotor, A
+        The rotor and its matrices.
+    whirl
+        1 forward, −1 backward, 0 without gyroscopic moments.
+    springs
+        N/m by node; None: those of plain supports.
+
+    Returns
+    -------
+    Stiffness and mass of the plane.
+    """
     held = [(s.node, s.stiffness) for s in rotor.supports if s.plain] if springs is None else springs.items()
     return _pencil(rotor, A, (whirl,), [(node, k * np.eye(2), None) for node, k in held])
 
@@ -542,6 +572,17 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     """Pencil of the synchronous conservative rotor with all its supports as they are at a speed.
 
     The forward wave where the supports are rotationally symmetric, else both.
+
+    Parameters
+    ----------
+    rotor, A
+        The rotor and its matrices.
+    speed
+        rad/s, at which tables of supports are read.
+
+    Returns
+    -------
+    Stiffness and mass.
     """
     held = [(s.node, static_stiffness(s, speed), s.pedestal) for s in rotor.supports]
     return _pencil(rotor, A, (1,) if rotor.symmetric else (1, -1), held)
@@ -641,7 +682,17 @@ class Spectrum:
 
 
 def finite_modes(A: Matrices | Pencil) -> int:
-    """Number of modes with finite frequency: unknowns that move mass."""
+    """Number of modes with finite frequency: unknowns that move mass.
+
+    Parameters
+    ----------
+    A
+        Matrices of a plane, or a pencil.
+
+    Returns
+    -------
+    Their number.
+    """
     return int(np.count_nonzero(A.mass[-1]))
 
 
@@ -672,6 +723,19 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
 
 def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None) -> Spectrum:
     """Lowest m modes of a pencil, by default of one plane at rest; m must not exceed the finite modes.
+
+    Parameters
+    ----------
+    rotor, A
+        The rotor and its matrices.
+    m
+        How many modes.
+    pencil
+        Stiffness and mass; None: of one plane at rest.
+
+    Returns
+    -------
+    Squares of frequencies, rad²/s², and shapes.
 
     Raises
     ------

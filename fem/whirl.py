@@ -102,7 +102,23 @@ class Whirl:
 
 
 def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
-    """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`."""
+    """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`.
+
+    Parameters
+    ----------
+    Q
+        The equations in a basis of the shaft.
+    speeds
+        rad/s, shape (S,).
+    m
+        How many modes, at most 2 R.
+    scale
+        A frequency of the order of the lowest, rad/s.
+
+    Returns
+    -------
+    Eigenvalues, rad/s, and vectors in the basis, with NaN where there are fewer.
+    """
     D, K = Q.at(speeds)
     lam = _eigenvalues(Q.M, D, K, scale)
     size = np.abs(lam)
@@ -198,6 +214,19 @@ def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: C
 def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
     """The m oscillating modes of lowest frequency at each speed, rad/s, to about eight digits.
 
+    Parameters
+    ----------
+    P
+        The rotor as both planes see it.
+    speeds
+        rad/s, shape (S,).
+    m
+        How many modes.
+
+    Returns
+    -------
+    Eigenvalues, rad/s, vectors in a reduced basis, and the estimated error.
+
     Raises
     ------
     ValueError
@@ -215,7 +244,21 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
 
 
 def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
-    """Modes of the rotor on supports as at the middle speed, without pedestals, and its lowest frequency."""
+    """Modes of the rotor on supports as at the middle speed, without pedestals, and its lowest frequency.
+
+    Parameters
+    ----------
+    P
+        The rotor as both planes see it.
+    speeds
+        rad/s, shape (S,).
+    m
+        How many modes.
+
+    Returns
+    -------
+    The modes of one plane, and the lowest frequency that is not 0, rad/s.
+    """
     K, _ = P.supports(speeds[speeds.size // 2, None])
     springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
     supports = [
@@ -431,6 +474,17 @@ def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str
 def checked_number(rotor: Rotor, n: int | None) -> int:
     """How many modes to look for, by default 6 or all there are.
 
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    n
+        How many modes are asked for; None: the default.
+
+    Returns
+    -------
+    How many to compute.
+
     Raises
     ------
     ValueError
@@ -447,6 +501,16 @@ def checked_number(rotor: Rotor, n: int | None) -> int:
 
 
 def available_modes(rotor: Rotor) -> int:
-    """How many modes can oscillate at most: two for each unknown of a plane that moves mass."""
+    """How many modes can oscillate at most: two for each unknown of a plane that moves mass.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+
+    Returns
+    -------
+    Their number.
+    """
     pedestals = sum(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
     return 2 * (finite_modes(assemble(rotor)) + pedestals)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from fem.parameters import with_parameters
 
 import fem
+from fem.parameters import with_parameters
 from rotorid import read_rotor
 
 HERE = Path(__file__).resolve().parent

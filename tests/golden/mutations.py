@@ -59,9 +59,9 @@ MUTATIONS = (
     Mutation(
         "sign of seal damping",
         "campbell-compressor-coarse response-report",
-        "fem/model/supports.py",
-        "return both[..., 0, :, :], both[..., 1, :, :]",
-        'return both[..., 0, :, :], both[..., 1, :, :] * (-1 if self.kind == "seal" else 1)',
+        "fem/rotor.py",
+        "        return k, c\n\n    def dynamic_stiffness",
+        '        return k, -c if self.kind == "seal" else c\n\n    def dynamic_stiffness',
     ),
     Mutation(
         "stacking of speeds",
@@ -73,9 +73,9 @@ MUTATIONS = (
     Mutation(
         "one entry of the gyroscopic matrix",
         "campbell-compressor-coarse critical-compressor-map",
-        "fem/matrices/elements.py",
-        "rotor.second_moment / rotor.length, _TILT)]",
-        "rotor.second_moment / rotor.length, _TILT * (1 - 2 * np.diag(np.eye(6)[0])))]",
+        "fem/elements.py",
+        "2 * model.gyroscopic * tilting,",
+        "2 * model.gyroscopic * tilting * (1 - 2 * np.diag(np.eye(6)[0]))[..., None],",
     ),
     Mutation(
         "the Student quantile",

@@ -15,8 +15,8 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, Table, frame
 from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.tables import Column, Table, frame
 from rotorid.base.text import counted, sentence
 from rotorid.reduction.dynamics.instability_threshold import stability_threshold
 from rotorid.reduction.dynamics.small_rotor import SmallRotor, readings
