@@ -420,19 +420,23 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
 
     Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
     speed is left out below that of another; then those of the lowest frequency on the whole. Those
-    that are heavily damped at half of the speeds come last.
+    that are heavily damped at half of the speeds, and where they cross the line, come last.
     """
     light, there = decrements_of(values) <= heavy, np.isfinite(values)
-    far = 1e9 * speeds[-1]
-    size = np.where(there, np.abs(values.imag), far)
-    meets = [
-        np.interp(0.0, speeds - mode, speeds, left=mode[0], right=np.inf)
-        for mode in np.where(light, size, far).T
-    ]
+    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    gap = size - speeds[:, None]
+    gap = np.vstack((gap, gap[-1:]))  # one speed alone has no step
+    meets = (gap[:-1] > 0) & (gap[1:] <= 0) & (light | np.vstack((light[1:], light[-1:])))
+    k, modes = meets.argmax(axis=0), np.arange(values.shape[1])
+    part = gap[k, modes] / np.where(meets.any(axis=0), gap[k, modes] - gap[k + 1, modes], 1.0)
+    crossing = speeds[k] + part * (np.append(speeds, speeds[-1])[k + 1] - speeds[k])
+    crossing = np.where(meets.any(axis=0), crossing, np.inf)
+    crossing = np.where((gap[0] <= 0) & light[0], speeds[0], crossing)
+    last = (light.mean(axis=0) < 0.5) & np.isinf(crossing)
     begins = there.argmax(axis=0)
     start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
-    best = np.lexsort((start, size.mean(axis=0), meets, light.mean(axis=0) < 0.5))[:n]
+    best = np.lexsort((start, size.mean(axis=0), crossing, last))[:n]
     best = best[there[:, best].any(axis=0)]
     return best[np.lexsort((start[best], begins[best]))]
 

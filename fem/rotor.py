@@ -314,9 +314,8 @@ def _canonical(value: Any, isotropic: FloatArray, what: str, signed: bool = Fals
         raise ValueError(f"{what} must be a number or of the shape {isotropic.shape}, not {value!r}")
     right = np.isfinite(array) & (signed | (array >= 0) | (isotropic == 0))
     if not right.all():
-        raise ValueError(
-            f"{what} must be finite{'' if signed else ' and not negative'}, not {array[~right][0]}"
-        )
+        size = "finite" if signed else "finite and not negative"
+        raise ValueError(f"{what} must be {size}, not {array[~right][0]}")
     first = float(array.flat[0])
     if np.array_equal(array, first * isotropic):
         return first

@@ -460,7 +460,7 @@ def in_both_planes(
 
 def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
     """What is not among the modes, of which `count` of n oscillate."""
-    texts = [f"only {count} of {n} modes oscillate, the others are overdamped"] if count < n else []
+    texts = [f"only {count} of {n} modes oscillate"] if count < n else []
     if still > 1:
         texts.append(f"rigid-body motions that nothing holds (eigenvalue 0, {still // 2} times) are left out")
     if real.max(initial=0.0) > 0:
