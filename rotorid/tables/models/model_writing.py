@@ -107,7 +107,7 @@ def _states(
     outputs: Sequence[str] | None,
 ) -> list[str]:
     """Rates s' = A s + B u − Σ B_i d_i v_i with the dampers' forces −d_i v_i on their coordinates."""
-    from fem import state_space
+    import fem
 
     names = motion.coordinates
     for name in dampers:
@@ -120,7 +120,7 @@ def _states(
     shown = list(outputs) if outputs is not None else shown
     forces = [*inputs, *(f"f_{name}" for name in dampers if f"f_{name}" not in inputs)]
     rates = [f"v_{name}" for name in dampers]
-    model = state_space(motion, inputs=forces, outputs=[*shown, *(x for x in rates if x not in shown)])
+    model = fem.state_space(motion, inputs=forces, outputs=[*shown, *(x for x in rates if x not in shown)])
     A, B, C, D = model
     u = [forces.index(name) for name in inputs]
     velocity = {
