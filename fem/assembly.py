@@ -174,7 +174,8 @@ def _internal(rotor: Rotor) -> list[InternalDamping]:
 
 def _turned(D: AnyArray) -> ComplexArray:
     """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
-    return np.asarray(FROM_XY @ D @ TO_XY)
+    # As one product: many products of 2 × 2 matrices take ten times as long.
+    return np.asarray(D.reshape(-1, 4) @ np.kron(FROM_XY, TO_XY.T).T).reshape(D.shape)
 
 
 @dataclass(frozen=True, eq=False)

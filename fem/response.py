@@ -69,7 +69,6 @@ NEAR = (
     1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
 )
 GROWTH = 1e4  # forces of the supports by those without whirl of the supports: beyond, four digits are lost
-_CHUNK = 64  # speeds at a time, to stay in the cache of the processor
 _POWERS = 10  # of the series: 16⁻¹⁰ is 1e-12 of the static contribution of the modes left out
 
 
@@ -577,8 +576,9 @@ class Receptance:
     def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray]]:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b)."""
         stiffness = supported(self.rotor, speeds).stiffness
-        for start in range(0, speeds.size, _CHUNK):
-            part = slice(start, start + _CHUNK)
+        step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
+        for start in range(0, speeds.size, step):
+            part = slice(start, start + step)
             omega = speeds[part]
             H, lost = self._fast(omega, stiffness[part])
             lost |= self.exact
