@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
+from fem.campbell import _choice
 from rotorid.plots import plot
 
 mpl.use("Agg")
@@ -397,3 +398,16 @@ def test_no_damped_crossing_is_missed_in_drawn_tables():
     rng = np.random.default_rng(16)
     wrong = {number: count for number in range(DRAWN) if (count := missed(*drawn(rng)))}
     assert wrong == {}
+
+
+def test_modes_that_meet_the_line_are_listed_first():
+    speeds = np.linspace(0.0, 100.0, 11)
+    frequencies = np.stack(
+        [40.0 + 0 * speeds, 20.0 + 0 * speeds, 60.0 + 0 * speeds, 5.0 + 1.5 * speeds], axis=1
+    )
+    damping = np.full_like(frequencies, 0.01)
+    damping[:, 1] = np.where((speeds >= 20.0) & (speeds <= 30.0), 0.01, 4.0)  # heavy but where it meets it
+    values = frequencies * (1j - damping)
+    values[:3, 2] = complex(np.nan, np.nan)
+    for n, listed in ((1, {1}), (2, {0, 1}), (3, {0, 1, 2})):
+        assert set(_choice(speeds, values, n, 6.0).tolist()) == listed
