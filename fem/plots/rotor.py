@@ -147,11 +147,11 @@ def smooth_shapes(modes: Modes) -> tuple[FloatArray, FloatArray]:
 def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> Axes:
     """Draw the deflected shape of the rotor at speed k, from 0, of a response.
 
-    The larger half axis of each node's orbit, µm peak, with the sign of its motion in the phase of the node
+    The longer half axis of each node's orbit, µm peak, times the cosine of its phase less that of the node
     that moves most, over the rotor.
     """
     size, phase = 1e6 * response.major[k], np.angle(response.amplitudes[k])
-    shape = np.where(np.cos(phase - phase[np.argmax(size)]) < 0, -size, size)
+    shape = size * np.cos(phase - phase[np.argmax(size)])
     words = f"deflection at {response.speeds[k] * RPM:.0f} rpm, µm peak"
     ax = _over_rotor(response.rotor, ax, float(size.max()), words)
     ax.plot(
@@ -243,7 +243,7 @@ def _draw_supports(rotor: Rotor, ax: Axes, scale: float) -> None:
         marker: Any = _TIP if holds else "s" if seal else "D"
         color = DARK if words.startswith("bearing") else COLORS[(4 + number) % len(COLORS)]
         style = {"marker": marker, "s": 200 if holds else 60, "facecolor": color, "edgecolor": "black",
-                 "linewidth": 2.6 if "pedestal" in words else 1.0, "zorder": 4}  # fmt: skip
+                 "linewidth": 1.8 if "pedestal" in words else 1.0, "zorder": 4}  # fmt: skip
         x, radius = rotor.positions[at], scale * (surface(rotor) if seal else radii(rotor))[at]
         ax.scatter(x, -radius, label=words, **style)
         if seal:
