@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -66,17 +67,17 @@ _NORMAL_95 = 1.959964
 class Result(Answered):
     """A result with tables and one sentence."""
 
+    @abstractmethod
     def tables(self) -> tuple[Table, ...]:
         """The numbers."""
-        raise NotImplementedError
 
     def to_frame(self) -> pd.DataFrame:
         """The last of the tables: of modes, a row per node."""
         return frame(self.tables()[-1])
 
+    @abstractmethod
     def sentence(self) -> str:
         """The answer."""
-        raise NotImplementedError
 
     @property
     def answer(self) -> Answer:
