@@ -209,7 +209,3 @@ __all__ = [
     "whirl_modes",
     "whole_rotor",
 ]
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

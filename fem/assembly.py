@@ -40,6 +40,7 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
 FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
+_TURN = np.kron(FROM_XY, TO_XY.T).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +153,8 @@ def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
         ("diametral", "rotary inertia", rotor.model.rotary_inertia),
         ("polar", "gyroscopic effect", rotor.model.gyroscopic),
     ):
-        nodes = ", ".join(str(disc.node) for disc in rotor.discs if getattr(disc, f"{kind}_inertia"))
-        if nodes and not counted:
+        left_out = (disc for disc in rotor.discs if not counted and getattr(disc, f"{kind}_inertia"))
+        if nodes := ", ".join(str(disc.node) for disc in left_out):
             warnings.append(f"disc at node {nodes}: {kind} inertia is ignored, the model has no {effect}")
     return tuple(warnings)
 
@@ -175,7 +176,7 @@ def _internal(rotor: Rotor) -> list[InternalDamping]:
 def _turned(D: AnyArray) -> ComplexArray:
     """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
     # As one product: many products of 2 × 2 matrices take ten times as long.
-    return np.asarray(D.reshape(-1, 4) @ np.kron(FROM_XY, TO_XY.T).T).reshape(D.shape)
+    return np.asarray(D.reshape(-1, 4) @ _TURN).reshape(D.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,16 +190,18 @@ class Supported:
     stiffness
         D on forward and backward amplitudes (F, b), N/m, shape (S, s, 2, 2); on rotationally symmetric
         supports only entry (0, 0) matters.
-    reference
-        Real spring nearest to D at each node, N/m, shape (s,): what the conservative rotor stands on.
     planes
         1: forward only; 2: forward and backward are coupled.
     """
 
     nodes: tuple[int, ...]
     stiffness: ComplexArray
-    reference: FloatArray
     planes: int
+
+    @property
+    def reference(self) -> FloatArray:
+        """Real spring nearest to D at each node, N/m, shape (s,); 0 for what is mostly negative."""
+        return np.asarray(np.maximum(np.median(self.stiffness[..., 0, 0].real, axis=0), 0.0))
 
 
 def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
@@ -219,9 +222,7 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
         stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
     for damper in dampers:
         stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
-    # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
-    reference = np.maximum(np.median(stiffness[..., 0, 0].real, axis=0), 0.0)
-    return Supported(nodes, stiffness, reference, 1 if rotor.symmetric else 2)
+    return Supported(nodes, stiffness, 1 if rotor.symmetric else 2)
 
 
 def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArray:
@@ -271,7 +272,7 @@ class Planes:
             Outside the table of a support.
         """
         parts = np.array([support.at(speeds) for support in self.rotor.supports])
-        parts = parts.reshape(-1, 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
+        parts = parts.reshape(len(self.rotor.supports), 2, speeds.size, 2, 2).transpose(1, 2, 0, 3, 4)
         k, c = parts if self.planes == 2 else parts[..., :1, :1] - 1j * parts[..., :1, 1:]
         return k, c
 
@@ -361,7 +362,6 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     # Force in x from y, and with the opposite sign in y from x; or the same of z.
     along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
     forms, feet = np.array([M, B, K, G, B]), np.arange(p * d, p * (d + f))
-    forms = (forms + forms.swapaxes(1, 2)) / 2
     matrices = np.zeros((5, p * (d + f), p * (d + f)), across.dtype)
     planes = np.einsum("kab,kij->kaibj", [along] * 3 + [across] * 2, forms)
     matrices[:, : p * d, : p * d] = planes.reshape(5, p * d, p * d)
@@ -387,7 +387,12 @@ class WholeBand:
     def __init__(self, P: Planes) -> None:
         A, p = P.A, P.planes
         self.P, self.size, self.reach = P, p * A.size, p * A.width
-        self._bands = np.array([A.mass, A.gyroscopic, A.material, A.shaft], complex)
+        self._bands = np.zeros((4, 2 * A.width + 1, A.size))
+        upper = np.array([A.mass, A.gyroscopic, A.material, A.shaft])
+        for off in range(A.width + 1):
+            entries = upper[:, A.width - off, off:]
+            self._bands[:, A.width - off, off:] = entries
+            self._bands[:, A.width + off, : A.size - off] = entries
         self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
         self._from = np.linalg.inv(self._to)
 
@@ -395,15 +400,11 @@ class WholeBand:
         """LU factors of λ² M + λ D + K at one λ and speed."""
         from scipy.linalg.lapack import zgbtrf
 
-        P, p, reach, width = self.P, self.P.planes, self.reach, self.P.A.width
+        P, p, reach = self.P, self.P.planes, self.reach
         band = np.zeros((3 * reach + 1, self.size), complex, order="F")
         for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
-            powers = np.array([value * value, -value * turning, value - turning, 1.0])
-            upper = np.tensordot(powers, self._bands, 1)
-            band[reach : 2 * reach + 1 : p, plane::p] = upper
-            for off in range(1, width + 1):
-                below = slice(plane, self.size - p * off, p)
-                band[2 * reach + p * off, below] = upper[width - off, off:]
+            powers = [value * value, -value * turning, value - turning, 1.0]
+            band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
         k, c = P.supports(np.array([speed]))
         D = k[0] + value * c[0]
         for i, foot in zip(P.pedestals, np.tensordot([value**2, value, 1.0], P.feet, 1).T, strict=True):
@@ -413,7 +414,7 @@ class WholeBand:
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
         if info > 0:  # singular to the last bit: an eigenvalue
             lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
-        return Factored(p, reach, lu, pivots)
+        return Factored(reach, lu, pivots)
 
     def interleaved(self, X: AnyArray) -> ComplexArray:
         """From (…, planes, size) to the order of the band, (…, planes · size)."""
@@ -429,18 +430,12 @@ class WholeBand:
 class Factored:
     """Solutions with one factored matrix."""
 
-    planes: int
     reach: int
     lu: ComplexArray
     pivots: AnyArray
 
     def solve(self, b: ComplexArray, *, transposed: bool = False) -> ComplexArray:
-        """P⁻¹ b, or P⁻ᵀ b, for b of shape (size,) or (size, m).
-
-        The transpose in x and y is that in (F, b) with both of them exchanged: Tᵀ T = 2 ((0, 1), (1, 0)).
-        """
+        """P⁻¹ b, or P⁻ᵀ b, for b of shape (size,) or (size, m), in the order of the band."""
         from scipy.linalg.lapack import zgbtrs
 
-        order = np.arange(len(b)) ^ int(transposed and self.planes == 2)
-        x, _ = zgbtrs(self.lu, self.reach, self.reach, b[order], self.pivots, trans=int(transposed))
-        return np.asarray(x[order])
+        return np.asarray(zgbtrs(self.lu, self.reach, self.reach, b, self.pivots, trans=int(transposed))[0])

@@ -2,16 +2,16 @@
 
 Modes of neighbouring speeds are the same where their states (u, λ u / |λ|) are alike: MAC in the energy of
 the basis, in which vectors have length 1, and the best assignment of all (`linear_sum_assignment`).
-Velocities tell apart forward and backward whirl of one shape. A step in which a mode is hardly like itself
-is halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
-Crossings are roots (`brentq`) on the mode itself, which inverse iteration follows from the nearer end of the
-step; where it slips to another mode the step is halved, too.
+Velocities tell apart forward and backward whirl of one shape. A step in which a mode is hardly like itself is
+halved; so is one beside which a frequency comes so near to the speed that it may cross the 1× line twice.
+Crossings are roots on the mode itself, which inverse iteration follows from the nearer end of the step; where
+it slips to another mode the step is halved, too.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,16 +19,16 @@ from numpy.typing import ArrayLike
 from fem.assembly import both_planes
 from fem.orbits import DIRECTION_NAMES
 from fem.parameters import nearest_modes
+from fem.result import Result
 from fem.rotor import Rotor, refined
 from fem.stability import (
     Window,
     grid_of,
     near_level,
-    root,
+    roots,
     unstable_windows,
     within,
 )
-from fem.undamped import Result
 from fem.whirl import (
     NONE,
     Whirl,
@@ -45,21 +45,18 @@ from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, I
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text
-from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import counted, listing
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
 _ALIKE = 0.8  # MAC of a mode with itself a step further
-_OTHER = 0.5  # largest MAC with another mode, relative to it
+_NEARER = 3.0  # times as far as from itself, in 1 − MAC, a mode is from every other one
 _HARDLY = 0.3  # MAC below which two modes are not one
 _NARROW = 1e-4  # of the highest speed: steps that are not halved
 _DENSE = 8  # times the speeds asked for: so many are computed at most
 _SWINGS = 14.0  # log decrement above which a critical speed has no meaning
-_VANISHES = 1e-6  # |f| at a root, of its size at the ends of the step
+_VANISHES = 1e-8  # |f| at a root, of the speed
 _PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
 
 
@@ -187,10 +184,6 @@ class Campbell(Result):
         )
         return (Table("damped critical speeds", criticals), Table("modes", modes))
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed and mode."""
-        return frame(self.tables()[1])
-
     def sentence(self) -> str:
         """Whether it is stable, and how many damped critical speeds there are."""
         unstable = listing([window.where() for window in self.windows], "and")
@@ -252,42 +245,34 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     speeds = checked_speeds(speeds, ascending=True)
     asked_for = checked_number(rotor, None) if n is None else whole(n, "the number of modes")
     n = checked_number(rotor, min(asked_for, available_modes(rotor)))
-    paths = _followed(rotor, grid_of(rotor, speeds), n, heavy)
+    paths, (there, modes, values, vectors) = _followed(rotor, grid_of(rotor, speeds), n, heavy)
     whirl, asked = paths.whirl, np.searchsorted(paths.speeds, speeds)
     if not paths.values.size:
         raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
     windows = unstable_windows(whirl, speeds)
     lam, direction = whirling(whirl.Q, paths.values[asked], paths.vectors[asked])
-    crossings = [one for one in paths.crossings if decrements_of(one.value) <= _SWINGS]
-    crossings.sort(key=lambda one: (float(f"{one.speed:.9e}"), one.mode))  # equal but for rounding: by mode
-    there, ways = whirling(
-        whirl.Q,
-        np.array([one.value for one in crossings], dtype=complex),
-        np.array([one.vector for one in crossings]).reshape(-1, whirl.Q.size),
-    )
-    unstable, texts, decrements = [], [], decrements_of(lam)
+    values, ways = whirling(whirl.Q, values, vectors)
+    listed, decrements = {}, decrements_of(lam)
     for window in windows:
         k = int(np.searchsorted(speeds, window.first))
         grows = np.flatnonzero(decrements[k] < 0)
         if window.frequency and grows.size:
             mode = grows[np.abs(lam[k, grows].imag - window.frequency).argmin()]
-            unstable.append(replace(window, mode=int(mode) + 1))
-            texts.append(unstable[-1].sentence())
-        else:
-            texts.append(window.sentence())
+            listed[window] = replace(window, mode=int(mode) + 1)
+    texts = [listed.get(window, window).sentence() for window in windows]
     result = Campbell(
         speeds=speeds,
         frequencies=lam.imag,
         log_decrements=decrements,
         direction=direction,
-        critical_speeds=np.array([one.speed for one in crossings]),
-        critical_modes=np.array([one.mode + 1 for one in crossings], dtype=np.intp),
-        critical_log_decrements=decrements_of(there),
+        critical_speeds=there,
+        critical_modes=modes + 1,
+        critical_log_decrements=decrements_of(values),
         critical_direction=ways,
         error=whirl.error,
         rotor=rotor,
         warnings=(*texts, *_warnings(paths, asked_for, np.isnan(lam))),
-        unstable=tuple(unstable),
+        unstable=tuple(listed.values()),
         windows=windows,
         cut=_cut(paths),
         heavy=heavy,
@@ -296,18 +281,9 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     return result
 
 
-class _Crossing(NamedTuple):
-    """A mode (column, from 0) at a speed, rad/s, where it crosses the 1× line: eigenvalue, vector (R,)."""
-
-    speed: float
-    mode: int
-    value: ComplexArray
-    vector: ComplexArray
-
-
 @dataclass(frozen=True, eq=False)
 class _Paths:
-    """The modes listed, over speeds (S,) in the basis of `whirl`, and their crossings of the 1× line.
+    """The modes listed, over speeds (S,) in the basis of `whirl`.
 
     λ, shape (S, n), NONE where a mode is missing, and vectors (S, n, R); `doubtful`, shape (S − 1, n): in
     which steps shapes do not tell a mode apart from others; λ of the `others` that were followed, (S, c − n).
@@ -319,30 +295,30 @@ class _Paths:
     vectors: ComplexArray
     doubtful: BoolArray
     others: ComplexArray
-    crossings: list[_Crossing] = field(default_factory=list)
 
-    def cross(self) -> None:
-        """Find the crossings of the 1× line; where a mode was lost its step is doubtful."""
-        f = off_synchronous(self.values, self.speeds)
-        changes = ((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:])
-        for k, mode in np.argwhere(changes).tolist():
-            self._cross(k, mode, f[k : k + 2, mode])
 
-    def _cross(self, k: int, mode: int, f: FloatArray) -> None:
-        """The crossing of a mode in a step, followed from the nearer end."""
-        near = [k + int(np.abs(f).argmin())]
-        value, vector = self.values[near, mode], self.vectors[near, mode]
+_Crossings = tuple[FloatArray, IndexArray, ComplexArray, ComplexArray]
 
-        def excess(speed: float) -> float:
-            nonlocal value, vector
-            value, vector = polish(self.whirl.Q, np.array([speed]), np.zeros(1, np.intp), value, vector, 2)
-            return float(abs(value[0].imag) - speed)
 
-        speed = root(excess, self.speeds[k : k + 2], f)
-        if abs(excess(speed)) > _VANISHES * np.abs(f).max():
-            self.doubtful[k, mode] = True
-        else:
-            self.crossings.append(_Crossing(speed, mode, value[0], vector[0]))
+def _crossings(paths: _Paths) -> _Crossings:
+    """Speeds where modes cross the 1× line, which modes, λ and vectors; where one was lost it is in doubt."""
+    f = off_synchronous(paths.values, paths.speeds)
+    k, mode = np.nonzero(((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:]))
+    steps = np.array((k, k + 1))
+    near = k + np.abs(f[steps, mode]).argmin(axis=0)
+    value, vector = paths.values[near, mode], paths.vectors[near, mode]
+
+    def excess(speeds: FloatArray) -> FloatArray:
+        nonlocal value, vector
+        value, vector = polish(paths.whirl.Q, speeds, np.arange(k.size), value, vector, 2)
+        return np.abs(value.imag) - speeds
+
+    speed, rest = roots(excess, paths.speeds[steps], f[steps, mode])
+    lost = ~(np.abs(rest) <= _VANISHES * speed)
+    paths.doubtful[k[lost], mode[lost]] = True
+    order = np.lexsort((mode, np.round(speed / paths.speeds[-1], 9)))  # equal but for rounding: by mode
+    order = order[~lost[order] & (decrements_of(value[order]) <= _SWINGS)]
+    return speed[order], mode[order], value[order], vector[order]
 
 
 def off_synchronous(lam: ComplexArray, speeds: FloatArray) -> FloatArray:
@@ -357,29 +333,29 @@ def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
     return words
 
 
-def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> _Paths:
-    """Modes over speed, n (or fewer) of them listed."""
+def _followed(rotor: Rotor, speeds: FloatArray, n: int, heavy: float) -> tuple[_Paths, _Crossings]:
+    """Modes over speed, n (or fewer) of them listed, and their crossings."""
     P, most = both_planes(rotor), min(2 * n + 8, available_modes(rotor))
     m = min(n + n % 2 + 2, most)  # even: modes come in pairs, a forward and a backward one
     while True:
-        paths = _closely(solve_whirl(P, speeds, m), n, heavy)
+        paths, crossings = _closely(solve_whirl(P, speeds, m), n, heavy)
         light = (decrements_of(paths.values) <= heavy).mean(axis=0) >= 0.5
         if light.sum() == n or m == most:
-            return paths
+            return paths, crossings
         m = most
 
 
-def _closely(whirl: Whirl, n: int, heavy: float) -> _Paths:
+def _closely(whirl: Whirl, n: int, heavy: float) -> tuple[_Paths, _Crossings]:
     """The modes of a whirl followed, with so many speeds between that nothing is in doubt."""
     speeds, values, X = whirl.speeds, whirl.values, whirl.vectors
     while True:
         paths = _chained(whirl, speeds, values, X, n, heavy)
-        paths.cross()
+        crossings = _crossings(paths)
         near = [near_level(np.nan_to_num(gap), 0.0) for gap in off_synchronous(paths.values, speeds).T]
         k = np.unique(np.concatenate((np.flatnonzero(paths.doubtful.any(axis=1)), *near)))
         k = k[np.diff(speeds)[k] > _NARROW * speeds[-1]]
         if not k.size or speeds.size > _DENSE * whirl.speeds.size:
-            return paths
+            return paths, crossings
         more = whirl.at((speeds[k] + speeds[k + 1]) / 2)
         speeds = np.insert(speeds, k + 1, more.speeds)
         values, X = np.insert(values, k + 1, more.values, 0), np.insert(X, k + 1, more.vectors, 0)
@@ -398,8 +374,12 @@ def _chained(
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
     mac = np.take_along_axis(mac, partner[:, None], axis=2)
     best, rivals = mac.diagonal(axis1=1, axis2=2), mac * (1 - np.eye(m))
-    clear = (best >= _ALIKE) & (np.maximum(rivals.max(axis=1), rivals.max(axis=2)) <= _OTHER * best)
-    clear |= (best == 0) | ~(decrements_of(values[:-1]) <= heavy)
+    apart = 1 - np.maximum(rivals.max(axis=1), rivals.max(axis=2))
+    clear = (
+        (best >= _ALIKE) & (apart >= _NEARER * (1 - best))
+        | (best == 0)
+        | ~(decrements_of(values[:-1]) <= heavy)
+    )
     labels, count = np.tile(np.arange(m), (S, 1)), m
     for k, mine in enumerate(partner):
         # What is hardly alike is another mode that came while this one went.
@@ -425,18 +405,16 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     light, there = decrements_of(values) <= heavy, np.isfinite(values)
     size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
     gap = size - speeds[:, None]
-    gap = np.vstack((gap, gap[-1:]))  # one speed alone has no step
-    meets = (gap[:-1] > 0) & (gap[1:] <= 0) & (light | np.vstack((light[1:], light[-1:])))
-    k, modes = meets.argmax(axis=0), np.arange(values.shape[1])
-    part = gap[k, modes] / np.where(meets.any(axis=0), gap[k, modes] - gap[k + 1, modes], 1.0)
-    crossing = speeds[k] + part * (np.append(speeds, speeds[-1])[k + 1] - speeds[k])
-    crossing = np.where(meets.any(axis=0), crossing, np.inf)
-    crossing = np.where((gap[0] <= 0) & light[0], speeds[0], crossing)
-    last = (light.mean(axis=0) < 0.5) & np.isinf(crossing)
+    below = light & (gap <= 0)
+    below[1:] |= light[:-1] & (gap[1:] <= 0)  # lightly damped before, or after
+    steps = [slice(max(k - 1, 0), k + 1) for k in below.argmax(axis=0)]
+    first = [np.interp(0.0, -one[step], speeds[step]) for one, step in zip(gap.T, steps, strict=True)]
+    meets = np.where(below.any(axis=0), first, np.inf)
+    last = (light.mean(axis=0) < 0.5) & np.isinf(meets)
     begins = there.argmax(axis=0)
     start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
     start = np.abs(start) * (1 + _PAIR * (start > 0))
-    best = np.lexsort((start, size.mean(axis=0), crossing, last))[:n]
+    best = np.lexsort((start, size.mean(axis=0), meets, last))[:n]
     best = best[there[:, best].any(axis=0)]
     return best[np.lexsort((start[best], begins[best]))]
 

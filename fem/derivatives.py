@@ -1,14 +1,14 @@
 """What numbers of a rotor change in its synchronous receptance, by the adjoint of the banded equations.
 
-In both planes D z = f with the dynamic stiffness D of the whole rotor at λ = iω. With the solutions q = D⁻¹ f
-for each load and p = D⁻ᵀ u for each sensor, of which both have the same LU factors,
+D z = f with the dynamic stiffness D of the whole rotor at λ = iω on forward and backward amplitudes,
+x = F + b, y = −i (F − b): a load that turns with the rotor is f on F alone, a sensor at the angle α reads
+u = (e^{−iα}, e^{iα}). With the solutions q = D⁻¹ f for each load and p = D⁻ᵀ u for each sensor, of which both
+have the same LU factors,
 
     H = uᵀ q,    ∂H / ∂θ = −pᵀ (∂D / ∂θ) q.
 
-∂D is written for forward and backward amplitudes, x = F + b, y = −i (F − b): bands of the shaft act on each
-by itself, K − ω² (M − G) on F and K + 2 i ω B − ω² (M + G) on b, and p goes with the transposed
-transformation, p_F = p_x − i p_y, p_b = p_x + i p_y. It is a difference of matrices, exact where they are
-linear or quadratic in θ; no equation is solved for it.
+Bands of the shaft act on each wave by itself, K − ω² (M − G) on F and K + 2 i ω B − ω² (M + G) on b. ∂D is a
+difference of matrices, exact where they are linear or quadratic in θ; no equation is solved for it.
 """
 
 from __future__ import annotations
@@ -19,15 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.assembly import (
-    FROM_XY,
-    TO_XY,
-    WholeBand,
-    assemble,
-    both_planes,
-    multiply,
-    whirl_change,
-)
+from fem.assembly import WholeBand, assemble, both_planes, multiply, whirl_change
 from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
@@ -143,20 +135,20 @@ def receptance_with_derivatives(
         Outside a bearing table.
     """
     whole = WholeBand(both_planes(rotor, complex_coordinate=False))
-    A, each = whole.P.A, np.arange(rows.size)
-    f = whole.interleaved(loads.T[:, None] * np.array([[1.0], [-1j]])).T
-    u = np.zeros((rows.size, 2, A.size))
-    u[each, :, rows] = np.column_stack((np.cos(angles), np.sin(angles)))
-    seen, turn = whole.interleaved(u).T, np.exp(1j * angles)[:, None]
+    A, turn = whole.P.A, np.exp(1j * angles)[:, None]
+    f, u = (np.zeros((A.size, 2, n), complex) for n in (loads.shape[1], rows.size))
+    f[:, 0] = loads
+    u[rows, :, np.arange(rows.size)] = np.hstack((1 / turn, turn))
     H, by_angle = np.empty((2, speeds.size, rows.size, loads.shape[1]), dtype=complex)
     by_number = np.zeros((len(changes), *H.shape), dtype=complex)
     for start in range(0, speeds.size, _CHUNK):
         part = slice(start, start + _CHUNK)
         factors = [whole.factor(1j * speed, speed) for speed in speeds[part].tolist()]
-        # q (S, b, 2, size) and p (S, a, 2, size), forward and backward
-        q = FROM_XY @ whole.planes(np.array([one.solve(f).T for one in factors]))
-        p = TO_XY.T @ whole.planes(np.array([one.solve(seen, transposed=True).T for one in factors]))
-        F, b = np.moveaxis(q[..., rows], 2, 0).swapaxes(2, 3)
+        solved = [one.solve(f.reshape(whole.size, -1)) for one in factors]
+        adjoint = [one.solve(u.reshape(whole.size, -1), transposed=True) for one in factors]
+        # (S, size, 2, b) and (S, a, size, 2), forward and backward
+        q, p = np.reshape(solved, (-1, *f.shape)), np.moveaxis(np.reshape(adjoint, (-1, *u.shape)), -1, 1)
+        F, b = q[:, rows, 0], q[:, rows, 1]
         H[part] = F / turn + b * turn
         by_angle[part] = 1j * (b * turn - F / turn)
         omega = speeds[part, None, None]
@@ -169,11 +161,11 @@ def receptance_with_derivatives(
         for change, derivative in zip(changes, by_number[:, part], strict=True):
             for k, node in enumerate(change.nodes):
                 at = A.deflection(node)
-                derivative -= p[..., at] @ change.supports[part, k] @ q[..., at].swapaxes(1, 2)
+                derivative -= p[:, :, at] @ change.supports[part, k] @ q[:, at]
             for name, band in change.bands.items():
                 acting = slice(change.first, change.first + band.shape[1])
-                moved = np.moveaxis(q[..., acting], -1, 0)
-                forces = multiply(band, moved.reshape(len(moved), -1)).reshape(moved.shape)
+                moved = q[:, acting].swapaxes(0, 1)
+                forces = multiply(band, moved.reshape(len(moved), -1)).reshape(moved.shape).swapaxes(0, 1)
                 for plane, factor in enumerate(on_planes[_BANDS.index(name)]):
-                    derivative -= factor * (p[:, :, plane, acting] @ forces[..., plane].swapaxes(0, 1))
+                    derivative -= factor * (p[:, :, acting, plane] @ forces[:, :, plane])
     return ReceptanceWithDerivatives(H, by_number, by_angle)

@@ -50,19 +50,15 @@ def shaft_bands(rotor: Rotor) -> FloatArray:
     model, L, outer = rotor.model, rotor.length, np.multiply.outer
     unknowns = np.arange(6) if model.shear else np.array([0, 1, 4, 5])
     taken, scale = np.ix_(unknowns, unknowns), L ** _LENGTHS[unknowns, None]
-    stiffness = outer(_BENDING[taken], rotor.youngs_modulus * rotor.second_moment / L**3)
+    area, inertia = rotor.area, rotor.second_moment
+    stiffness = outer(_BENDING[taken], rotor.youngs_modulus * inertia / L**3)
     if model.shear:
-        stiffness += outer(_SHEAR, rotor.shear_coefficient * rotor.shear_modulus * rotor.area / L)
-    mass = outer(_MASS[taken], rotor.density * rotor.area * L)
-    tilting = outer(_TILT[taken], rotor.density * rotor.second_moment / L)
-    forms = np.array(
-        (
-            stiffness,
-            mass + model.rotary_inertia * tilting,
-            2 * model.gyroscopic * tilting,
-            rotor.material_damping * stiffness,
-        )
-    )
+        stiffness += outer(_SHEAR, rotor.shear_coefficient * rotor.shear_modulus * area / L)
+    mass = outer(_MASS[taken], rotor.density * area * L)
+    tilting = outer(_TILT[taken], rotor.density * inertia / L)
+    turning = 2 * model.gyroscopic * tilting
+    damping = rotor.material_damping * stiffness
+    forms = np.array((stiffness, mass + model.rotary_inertia * tilting, turning, damping))
     forms *= scale * scale[:, None]
     stride, width = unknowns.size - 2, unknowns.size - 1
     # Each as LAPACK takes it without a copy.
@@ -108,4 +104,9 @@ def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
 
 def dense(band: AnyArray) -> AnyArray:
     """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
-    return multiply(band, np.eye(band.shape[1]))
+    size = band.shape[1]
+    A = np.zeros(size * size, band.dtype)
+    for off in range(min(len(band), size)):
+        A[off * size :: size + 1] = entries = band[-1 - off, off:]
+        A[off : (size - off) * size : size + 1] = entries.conj()
+    return A.reshape(size, size).T

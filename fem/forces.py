@@ -1,7 +1,8 @@
 """Forces at nodes that are not linear: films, seals, springs, stops; their data, laws and derivatives.
 
 A law is F(z, z', Ω) with z = x + i y. In a frame that is turned by n = exp(iβ), components along n and across
-it being those of z n̄, a force f n has the derivatives by x and y that `_turn_back` writes.
+it being those of z n̄, a force f n has the derivatives by x and y that `law` writes from those of f along n
+and across it.
 
 **Film of a short journal bearing or squeeze-film damper (Ocvirk).** With h = c − x cos θ − y sin θ and
 a = x' + Ω y / 2, b = y' − Ω x / 2, Reynolds' equation without flow around the journal gives the pressure,
@@ -38,6 +39,7 @@ a stop with Coulomb friction, here with damping, and smooth around no slip; othe
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -50,23 +52,6 @@ from rotorid.base.checks import attachment, number
 from rotorid.base.compiled import compiled_part
 from rotorid.base.registry import Method
 from rotorid.base.suggestions import one_of
-
-__all__ = [
-    "FORCES",
-    "CubicSpring",
-    "Film",
-    "InternalDamping",
-    "JournalBearing",
-    "MuszynskaSeal",
-    "NodeForce",
-    "ShortFilm",
-    "SqueezeFilm",
-    "Stop",
-    "kind_of",
-    "law",
-    "short_film",
-    "tables",
-]
 
 Film = Literal["pressure", "line of centres"]
 """Where a journal's film carries: where its pressure is positive, or on the half circle that the line of
@@ -109,8 +94,8 @@ class NodeForce:
 
     @property
     def parameters(self) -> Sequence[float]:
-        """Its numbers in SI in the order in which the law takes them."""
-        return [getattr(self, each.name) for each in fields(self) if each.type == "float"]
+        """Its wall and its numbers, in SI, in the order in which the law takes them."""
+        return self.wall, *(getattr(self, each.name) for each in fields(self) if each.type == "float")
 
     @property
     def mass(self) -> float:
@@ -140,15 +125,15 @@ class ShortFilm(NodeForce):
     clearance: float = 0.0
     viscosity: float = 0.0
 
-    above_zero: ClassVar[tuple[str, ...]] = ("length", "diameter", "clearance", "viscosity")
+    above_zero = ("length", "diameter", "clearance", "viscosity")
 
     @property
     def parameters(self) -> Sequence[float]:
-        """C and c, as `short_film` takes them, whether of the line of centres, a spring, whether it turns."""
+        """Its wall, C, whether of the line of centres, the spring's stiffness, whether it turns."""
         C = self.viscosity * self.length**3 * self.diameter / 2 / self.clearance**3
         by_line = getattr(self, "film", "") == "line of centres"
         spring = getattr(self, "centring_stiffness", 0.0)
-        return C, self.clearance, by_line, spring, isinstance(self, JournalBearing)
+        return self.clearance, C, by_line, spring, isinstance(self, JournalBearing)
 
 
 @dataclass(frozen=True)
@@ -216,7 +201,7 @@ class MuszynskaSeal(NodeForce):
     stiffness_exponent: float = 2.0
     swirl_exponent: float = 0.5
 
-    above_zero: ClassVar[tuple[str, ...]] = ("clearance",)
+    above_zero = ("clearance",)
 
 
 @dataclass(frozen=True)
@@ -257,7 +242,7 @@ class Stop(NodeForce):
     diameter: float = 0.0
     slip_speed: float = 0.01
 
-    above_zero: ClassVar[tuple[str, ...]] = ("stiffness", "slip_speed")
+    above_zero = ("stiffness", "slip_speed")
 
 
 @dataclass(frozen=True)
@@ -277,7 +262,7 @@ class InternalDamping(NodeForce):
     @property
     def parameters(self) -> Sequence[float]:
         """Those of a seal whose fluid turns with the shaft, without a wall."""
-        return 0.0, self.damping, 0.0, 1.0, math.inf, 0.0, 0.0
+        return math.inf, 0.0, self.damping, 0.0, 1.0
 
 
 FORCES: tuple[Method[Any], ...] = (
@@ -310,9 +295,9 @@ def code_of(force: NodeForce) -> int:
 
 
 def tables(forces: Sequence[NodeForce]) -> tuple[IndexArray, FloatArray]:
-    """Code of the law of each force, shape (f,), and its parameters, shape (f, 7), as `law` takes them."""
-    values = [np.resize([*force.parameters, *7 * (0.0,)], 7) for force in forces]
-    return np.array([code_of(force) for force in forces], dtype=np.intp), np.reshape(values, (-1, 7))
+    """Code of the law of each force, shape (f,), and its parameters, shape (f, 8), as `law` takes them."""
+    values = [[*force.parameters, *7 * (0.0,)][:8] for force in forces]
+    return np.array([code_of(force) for force in forces], dtype=np.intp), np.reshape(values, (-1, 8))
 
 
 @compiled_part
@@ -331,109 +316,49 @@ def law(
         Written: (F_x, F_y) in N and their derivatives by x, y, x', y' and Ω, shape (2, 6); NaN on or beyond
         the wall.
     """
-    if code <= _SQUEEZE:
-        short_film(v[0], v[1], x, y, vx, vy, omega * v[4], v[2] > 0.0, out)
-        for i in range(2):
-            out[i, 5] *= v[4]
-            out[i, 0] -= v[3] * (x if i == 0 else y)
-            out[i, 1 + i] -= v[3]
-        return
-    if code == _STOP:
-        _stop(v, x, y, vx, vy, omega, out)
-        return
-    # A, B and their derivatives by |z|² (_e) and Ω (_o)
     z, dz, e2 = complex(x, y), complex(vx, vy), x * x + y * y
-    if code == _SPRING:
-        A, A_e = v[0] + v[1] * e2 + 0j, v[1] + 0j
-        B = B_e = A_o = B_o = 0j
+    inside = 1.0 - e2 / (v[0] * v[0])
+    if not inside > _WALL:
+        out[:, :] = math.nan
+        return
+    if code <= _SQUEEZE:
+        parts = _film(v, z, dz, omega, inside)
+    elif code == _STOP:
+        parts = _stop(v, z, dz, omega)
     else:
-        K0, D0, m, tau0, c, n, b = v[0], v[1], v[2], v[3], v[4], v[5], v[6]
-        E = e2 / (c * c)
-        if not E < 1.0:
-            out[:, :] = math.nan
-            return
-        e = math.sqrt(E)
-        stiffer = (1.0 - E) ** -n
-        K, D, tau = K0 * stiffer, D0 * stiffer, tau0 * (1.0 - e) ** b
-        grow = n / (1.0 - E) / (c * c)  # of K and D by |z|²
-        less = -0.5 * b * tau / ((1.0 - e) * e) / (c * c) if e > 0.0 else 0.0  # of τ by |z|²
-        s = tau * omega
-        A, B = K - m * s * s - 1j * s * D, D - 2j * s * m
-        A_s, B_s = -2.0 * m * s - 1j * D, -2j * m
-        A_e = grow * (K - 1j * s * D) + A_s * less * omega
-        B_e = grow * D + B_s * less * omega
-        A_o, B_o = A_s * tau, B_s * tau
-    F_e = -A_e * z - B_e * dz
-    _write(
-        out,
-        1 + 0j,
-        -A * z - B * dz,
-        2.0 * x * F_e - A,
-        2.0 * y * F_e - 1j * A,
-        -B,
-        -1j * B,
-        -A_o * z - B_o * dz,
-    )
-
-
-@compiled_part
-def _write(
-    out: FloatArray,
-    n: complex,
-    F: complex,
-    along: complex,
-    across: complex,
-    along_v: complex,
-    across_v: complex,
-    by_omega: complex,
-) -> None:
-    """Write a force and its derivatives, from F n̄ and those by the components along n and across it."""
-    c, s = n.real, n.imag
-    by_place = c * along - s * across, s * along + c * across
-    by_flow = c * along_v - s * across_v, s * along_v + c * across_v
-    for i, value in enumerate((F, *by_place, *by_flow, by_omega)):
-        turned = n * value
+        if code == _SPRING:
+            A, B, F_e, F_o = v[1] + v[2] * e2 + 0j, 0j, -v[2] * z, 0j
+        else:
+            c, K0, D0, m, tau0, _, n, b = v
+            stiffer, e = inside**-n, math.sqrt(e2) / c
+            K, D, tau = K0 * stiffer, D0 * stiffer, tau0 * (1.0 - e) ** b
+            s = tau * omega
+            A, B = K - m * s * s - 1j * s * D, D - 2j * s * m
+            F_s = (2.0 * m * s + 1j * D) * z + 2j * m * dz
+            # by |z|², of which 1 − e and 1 − e² are functions, and by Ω
+            less = 0.5 * b * s / ((1.0 - e) * e) if e > 0.0 else 0.0
+            F_e = -(less * F_s + n / inside * ((K - 1j * s * D) * z + D * dz)) / (c * c)
+            F_o = tau * F_s
+        parts = 1 + 0j, -A * z - B * dz, 2.0 * x * F_e - A, 2.0 * y * F_e - 1j * A, -B, -1j * B, F_o
+    turn, F, along, across, along_v, across_v, by_omega = parts
+    cos, sin = turn.real, turn.imag
+    by_x, by_y = cos * along - sin * across, sin * along + cos * across
+    by_vx, by_vy = cos * along_v - sin * across_v, sin * along_v + cos * across_v
+    for i, value in enumerate((F, by_x, by_y, by_vx, by_vy, by_omega)):
+        turned = turn * value
         out[0, i], out[1, i] = turned.real, turned.imag
 
 
 @compiled_part
-def short_film(  # noqa: PLR0913  what is compiled takes no objects
-    C: float,
-    c: float,
-    x: float,
-    y: float,
-    vx: float,
-    vy: float,
-    omega: float,
-    line_of_centres: bool,
-    out: FloatArray,
-) -> None:
-    """Force on the journal and its derivatives, as `law` writes them.
-
-    Parameters
-    ----------
-    C, c
-        η L³ R / c³, N·s/m, and the radial clearance, m.
-    x, y, vx, vy, omega
-        Of the journal, m, m/s and rad/s; Ω is 0 for a damper.
-    line_of_centres
-        Which film; False: where the pressure is positive.
-    out
-        Written, shape (2, 6).
-    """
-    X, Y = x / c, y / c
-    k2 = 1.0 - X * X - Y * Y
-    if not k2 > _WALL:
-        out[:, :] = math.nan
-        return
-    a, b = vx + 0.5 * omega * y, vy - 0.5 * omega * x
-    beta = math.atan2(-x, y) if line_of_centres else math.atan2(b, a)
-    n = complex(math.cos(beta), math.sin(beta))
-    place, flow = complex(X, Y) * n.conjugate(), complex(a, b) * n.conjugate()
+def _film(v: FloatArray, z: complex, dz: complex, omega: float, k2: float) -> tuple[complex, ...]:
+    """Of a film and its centring spring: n, F n̄, its derivatives along n and across by z, by z', and by Ω."""
+    c, C, line_of_centres, spring, turns = v[0], v[1], v[2] > 0.0, v[3], 0.5 * v[4]
+    flow = dz - 1j * turns * omega * z
+    n = cmath.rect(1.0, cmath.phase(-1j * z if line_of_centres else flow))
+    place, flow = z / c * n.conjugate(), flow * n.conjugate()
     p, q, u, w = place.real, place.imag, flow.real, flow.imag
 
-    k = math.sqrt(k2)  # J and its derivatives times −C / 2
-    r = 1.0 / k2
+    k, r = math.sqrt(k2), 1.0 / k2  # J and its derivatives times −C / 2
     J = -C / k * math.atan2(k, -p)
     d = 1.0 / (1.0 - q * q)
     ends = -2.0 * C * q * (3.0 + q * q) * d * d * d
@@ -447,37 +372,35 @@ def short_film(  # noqa: PLR0913  what is compiled takes no objects
     Jpqq = (p * Jqq + 2.0 * Jp + 4.0 * q * Jpq) * r
     Jqqq = (p * ends + 4.0 * Jq + 5.0 * q * Jqq) * r
 
-    at_line = line_of_centres and q > 0.0
-    sign = -1.0 if at_line and u < 0.0 else 1.0
-    by_u, by_w = complex(Jpp, sign * Jpq), complex(Jpq, Jqq)
-    by_p = u * complex(Jppp, sign * Jppq) + w * complex(Jppq, Jpqq)
-    by_q = u * complex(Jppq, sign * Jpqq) + w * complex(Jpqq, Jqqq)
-    if at_line:
-        pulled = (1.0 - sign) * complex(-u * Jpq, w * Jpq + u * q * Jppq)
-        by_p -= (complex(0.0, w * ends) - pulled) / q
-    _write(out, n, u * by_u + w * by_w, by_p / c, by_q / c, by_u, by_w, 0j)
-    for i in range(2):  # a and b change with x, y and Ω
-        out[i, 1] -= 0.5 * omega * out[i, 4]
-        out[i, 2] += 0.5 * omega * out[i, 3]
-        out[i, 5] = 0.5 * (y * out[i, 3] - x * out[i, 4])
+    by_u, by_w = complex(Jpp, Jpq), complex(Jpq, Jqq)
+    by_p = u * complex(Jppp, Jppq) + w * complex(Jppq, Jpqq)
+    by_q = u * complex(Jppq, Jpqq) + w * complex(Jpqq, Jqqq)
+    if line_of_centres and q > 0.0:
+        by_p -= 1j * w * ends / q
+        if u < 0.0:
+            by_u = by_u.conjugate()
+            by_p += 2j * Jpq * complex(w, u) / q
+            by_q -= 2j * u * Jpqq
+    # the flow changes with the place and with Ω
+    along = by_p / c - turns * omega * by_w - spring
+    across = by_q / c + turns * omega * by_u - 1j * spring
+    by_omega = turns * c * (q * by_u - p * by_w)
+    return n, u * by_u + w * by_w - spring * c * place, along, across, by_u, by_w, by_omega
 
 
 @compiled_part
-def _stop(v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray) -> None:
-    """As `law` writes it; zeros without contact."""
-    out[:, :] = 0.0
-    gap, k, c, friction, R, v0 = v[0], v[1], v[2], v[3], v[4] / 2, v[5]
-    r = math.hypot(x, y)
-    if not r > gap:
-        return
-    n = complex(x, y) / r
-    speed = complex(vx, vy) * n.conjugate()
+def _stop(v: FloatArray, z: complex, dz: complex, omega: float) -> tuple[complex, ...]:
+    """As `_film`; zeros without contact."""
+    _, gap, k, c, friction, diameter, v0, _ = v
+    r = abs(z)
+    n = z / r if r > gap else 0j
+    speed = dz * n.conjugate()
     N = k * (r - gap) + c * speed.real
     if not N > 0.0:
-        return
-    f = math.tanh((speed.imag + omega * R) / v0)
+        return 0j, 0j, 0j, 0j, 0j, 0j, 0j
+    f = math.tanh((speed.imag + omega * diameter / 2.0) / v0)
     push = complex(-1.0, -friction * f)  # F n̄ = N push
     by_slip = complex(0.0, -friction * N * (1.0 - f * f) / v0)
     # along an arc n turns, and z' n̄ the other way
     by_arc = (c * speed.imag * push - speed.real * by_slip + 1j * N * push) / r
-    _write(out, n, N * push, k * push, by_arc, c * push, by_slip, R * by_slip)
+    return n, N * push, k * push, by_arc, c * push, by_slip, diameter / 2.0 * by_slip

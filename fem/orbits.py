@@ -104,9 +104,9 @@ def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
     -------
     1, −1 or 0, shape (…).
     """
-    forward, backward = (np.abs(np.add(x, np.multiply(way, y))) for way in (1j, -1j))
-    area = forward**2 - backward**2  # π times this is the area of four orbits
-    line = STRAIGHT * ((forward + backward) ** 2).max(axis=-1)
+    X, Y = np.asarray(x), np.asarray(y)
+    area = X.imag * Y.real - X.real * Y.imag  # over π
+    line = STRAIGHT * (X.real**2 + X.imag**2 + Y.real**2 + Y.imag**2).max(axis=-1)
     least = np.maximum(1e-2 * np.abs(area).max(axis=-1), line)
     counts = np.where(np.abs(area) > least[..., None], np.sign(area), 0.0)
     return np.asarray((counts.max(axis=-1) + counts.min(axis=-1)).clip(-1, 1))

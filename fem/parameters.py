@@ -20,45 +20,26 @@ from rotorid.base.checks import number
 from rotorid.base.registry import names
 from rotorid.base.suggestions import one_of
 
-__all__ = [
-    "as_change",
-    "as_they_stand",
-    "band",
-    "expand",
-    "nearest_modes",
-    "numbers_of",
-    "parameter_value",
-    "spread",
-    "typical_size",
-    "with_changes",
-    "with_parameters",
-]
-
 _TABLED = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
 _STAND = ("pedestal_mass", *(f"pedestal_{name}_{axis}" for name in ("stiffness", "damping") for axis in "xy"))
 _DISC = ("mass", "polar_inertia", "diametral_inertia")
 _MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "material_damping")
-_SUPPORT = (*_TABLED, "tilting_stiffness", *_STAND)
-_KEYS: dict[str, dict[str, tuple[str, ...]]] = {
-    **dict.fromkeys(
-        names(KINDS),
-        {name: (name,) for name in _SUPPORT}
-        | {"stiffness": ("kxx", "kyy"), "damping": ("cxx", "cyy")}
-        | {"pedestal_stiffness": _STAND[1:3], "pedestal_damping": _STAND[3:]},
-    ),
-    "disc": {name: (name,) for name in _DISC} | {"scale": _DISC},
-    "material": {name: (name,) for name in _MATERIAL},
+_GROUPS = {
+    "stiffness": ("kxx", "kyy"),
+    "damping": ("cxx", "cyy"),
+    "pedestal_stiffness": _STAND[1:3],
+    "pedestal_damping": _STAND[3:],
+    "scale": _DISC,
 }
-"""By kind and name: keys of numbers."""
+"""Names that stand for several keys."""
+_SUPPORT = (*_TABLED, "tilting_stiffness", *_STAND, *[*_GROUPS][:-1])
+_NAMES = {**dict.fromkeys(names(KINDS), _SUPPORT), "disc": (*_DISC, "scale"), "material": _MATERIAL}
+"""By kind: keys of numbers, then names of groups."""
 _READINGS = ("probe[NAME].angle", "probe[NAME].gain", "key_phasor.angle")
 _ACTS: dict[str, Callable[..., FloatArray]] = {"": np.full_like, "scale": np.multiply, "offset": np.add}
 """What a suffix does to a number with a value, in the order in which they act."""
 _Numbers = dict[tuple[str, int], dict[str, Any]]
 """By kind and place in `rotor.supports` or `rotor.discs`, and by key: rows of a table, elements, or one."""
-
-
-_Parameter = tuple[dict[tuple[str, int, str], Any], str]
-"""The numbers that a path is of, by kind, place and key, as they stand, and its suffix."""
 
 
 def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
@@ -91,29 +72,32 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
         In one sentence: for a path that the rotor does not have, a plain value where a table or a material
         along the shaft has several, a number given twice, an impossible value.
     """
-    numbers, given = _numbers(rotor), set[tuple[str, int, str]]()
-    changes = [
-        (path, number(value, path, signed=True), *_parameter(rotor, path)) for path, value in values.items()
-    ]
-    for path, value, before, suffix in sorted(changes, key=lambda change: [*_ACTS].index(change[3])):
+    numbers, given = _numbers(rotor), list[tuple[str, int, str]]()
+    changes = [(path, *_parameter(rotor, path)) for path in values]
+    for path, before, suffix in sorted(changes, key=lambda change: [*_ACTS].index(change[-1])):
+        value = number(values[path], path, signed=True)
         if not suffix:
+            given += before
             for each in before.values():
                 _one(path, each)
-            if given & before.keys():
+            if len({*given}) < len(given):
                 raise ValueError(f"{path}: another parameter has this number, too")
-            given |= before.keys()
         for kind, i, key in before:
             item = numbers[kind, i]
             item[key] = _ACTS[suffix](item[key], value)
-    discs = [replace(disc, **numbers["disc", i]) for i, disc in enumerate(rotor.discs)]
-    supports = []
-    for i, support in enumerate(rotor.supports):
+    changed = {at[:2] for change in changes for at in change[-2]}
+    discs, supports = list(rotor.discs), list(rotor.supports)
+    for i, disc in enumerate(discs):
+        if ("disc", i) in changed:
+            discs[i] = replace(disc, **numbers["disc", i])
+    for i, support in enumerate(supports):
+        if (support.kind, i) not in changed:
+            continue
         its = tuple(numbers[support.kind, i].values())
-        table = np.moveaxis(np.reshape(its[:8], (2, 2, 2, -1)), -1, 1)
+        table = np.reshape(its[:8], (2, 2, 2, -1)).transpose(0, 3, 1, 2)
         k, c = table if support.speeds else table[:, 0]
         pedestal = Pedestal(its[9], its[10:12], its[12:]) if support.pedestal else None
-        new = replace(support, stiffness=k, damping=c, pedestal=pedestal, tilting_stiffness=its[8])
-        supports.append(new)
+        supports[i] = replace(support, stiffness=k, damping=c, pedestal=pedestal, tilting_stiffness=its[8])
     return replace(rotor, discs=discs, supports=supports, **numbers["material", 0])
 
 
@@ -234,23 +218,24 @@ def expand(rotor: Rotor, path: str, probes: Sequence[str] = ()) -> tuple[str, ..
         one_of(name, f"{path}: the probe", ("*", *probes))
         return tuple(f"probe[{probe}]{rest}" for probe in probes if name in ("*", probe))
     numbers, _ = _parameter(rotor, path)
-    if "[*]" not in path:
+    kind, star, rest = path.partition("[*]")
+    if not star:
         return (path,)
-    places = [i for kind, i in _numbers(rotor) if path.startswith(f"{kind}[")]
-    chosen = {i for _, i, _ in numbers}
-    return tuple(path.replace("*", str(n)) for n, i in enumerate(places, start=1) if i in chosen)
+    places = [i for each, i in _numbers(rotor) if each == kind]
+    chosen = dict.fromkeys(places.index(i) + 1 for _, i, _ in numbers)
+    return tuple(f"{kind}[{n}]{rest}" for n in chosen)
 
 
-def _parameter(rotor: Rotor, path: str) -> _Parameter:
-    """A path, read and checked."""
+def _parameter(rotor: Rotor, path: str) -> tuple[dict[tuple[str, int, str], Any], str]:
+    """The numbers that a path is of, by kind, place and key, as they stand, and its suffix."""
     if is_reading(path):
         return {}, "scale" if path.endswith("gain") else "offset"
     match = re.fullmatch(r"([^.\[\]]+)(?:\[(.*)\])?\.([^.\[\]]+)(?:\.([^\[\]]+))?", path)
     if match is None:
         raise ValueError(f"{path!r} is no parameter: one looks like bearing[1].kxx or material.density.scale")
     kind, selection, name, suffix = match.groups(default="")
-    of_kind = _KEYS[one_of(kind, f"{path}: the kind", (*_KEYS, *_READINGS))]
-    keys = of_kind[one_of(name, f"{path}: of a {kind},", tuple(of_kind))]
+    of_kind = _NAMES[one_of(kind, f"{path}: the kind", (*_NAMES, *_READINGS))]
+    keys = _GROUPS.get(one_of(name, f"{path}: of a {kind},", of_kind), (name,))
     if suffix:
         one_of(suffix, f"{path}: the suffix", tuple(_ACTS)[1:] if keys[0] in _TABLED else ("scale",))
     if suffix == "scale" and len(keys) > 1:
@@ -283,7 +268,7 @@ def _numbers(rotor: Rotor) -> _Numbers:
     for i, disc in enumerate(rotor.discs):
         numbers["disc", i] = {key: getattr(disc, key) for key in _DISC}
     for i, support in enumerate(rotor.supports):
-        values = [*np.moveaxis(support.table, 1, -1).reshape(8, -1), support.tilting_stiffness]
+        values = [*support.table.transpose(0, 2, 3, 1).reshape(8, -1), support.tilting_stiffness]
         if stand := support.pedestal:
             values += [stand.mass, *stand.xy("stiffness"), *stand.xy("damping")]
         numbers[support.kind, i] = dict(zip(_SUPPORT, values, strict=False))

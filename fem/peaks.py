@@ -19,26 +19,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fem.response import Response, judged
+from fem.result import Result
 from fem.rotor import SensorLike
-from fem.undamped import Result, critical_speeds_below
+from fem.undamped import critical_speeds_below
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import listing
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
 LARGEST = (16.0, 26.0)  # percent: margins that are enough whatever the amplification, below and above
 CRITICALLY_DAMPED = 2.5  # AF below which no margin is required
-_SHARP = 50.0  # AF of a peak that shows none, beside others
+_NARROW = 0.01  # half of the half-power band, relative, of a peak that shows no end of it, beside others
 _NO_DAMPING = 1e5  # AF beyond which damping is none
 _BEND, _SHORT = np.radians(10), 0.05  # of a curve in the plane, and of its distance from the origin
 _ROUNDS, _MANY = 14, 30_000  # of halving steps, and speeds
@@ -161,10 +159,6 @@ class Peaks(Result):
         """One row per peak, amplitudes times `scale` with the name of their unit."""
         return (Table("peaks", peak_columns(self.peaks, unit, scale)),)
 
-    def to_frame(self) -> pd.DataFrame:
-        """The table."""
-        return frame(self.tables()[0])
-
     def sentence(self) -> str:
         """Where they are."""
         where = listing([rpm_text(peak.speed) for peak in self.peaks], "and")
@@ -221,12 +215,13 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
     Name of the reading and peak, by rising speed.
     """
     every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
-    groups, last = list[dict[str, Peak]](), None
+    groups, low, high = list[dict[str, Peak]](), np.inf, 0.0
     for name, peak in sorted(every, key=lambda one: one[1].speed):
-        sharper = max(one.amplification or _SHARP for one in (peak, last or peak))
-        if last is None or name in groups[-1] or peak.speed > last.speed * (1 + 0.5 / sharper):
+        beside = low >= (peak.below or peak.speed * (1 - _NARROW)) and peak.speed <= high
+        if not beside or name in groups[-1]:
             groups.append({})
-        groups[-1][name] = last = peak
+        groups[-1][name], low = peak, peak.speed
+        high = peak.above or low * (1 + _NARROW)
 
     def rank(one: tuple[str, Peak]) -> tuple[bool, bool, float]:
         return one[1].enough is not False, not one[1].amplification, -one[1].amplitude
@@ -328,7 +323,7 @@ def response_peaks(
 
     omega, peaks = response.speeds, []
     A = np.where(response.steady & (omega > 0), np.abs(response.at(sensor)), np.nan)
-    for k in np.flatnonzero((A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:]) & (A[1:-1] > 0)) + 1:
+    for k in np.flatnonzero((A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:])) + 1:
         middle = float(omega[k])
         bounds, options = omega[[k - 1, k + 1]] - middle, {"xatol": 1e-12 * middle}
         top = minimize_scalar(short, bounds=bounds, args=(middle, 0.0), options=options)

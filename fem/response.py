@@ -22,10 +22,11 @@ the entries of K are rounded.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,12 +42,11 @@ from fem.assembly import (
     supported,
 )
 from fem.orbits import orbits, probe
+from fem.result import Result
 from fem.rotor import Rotor, SensorLike, Support, as_sensor, label
 from fem.stability import Window, judge, within
 from fem.undamped import (
-    DENSE,
     Pencil,
-    Result,
     fine_mesh_warning,
     finite_modes,
     lowest_modes,
@@ -57,19 +57,16 @@ from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, I
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
-from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import counted
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
 """`{node or station: m r e^{iφ}}`, kg·m."""
 NEAR = (
     1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
 )
-GROWTH = 1e4  # forces of the supports by those without whirl of the supports: beyond, four digits are lost
-_POWERS = 10  # of the series: 16⁻¹⁰ is 1e-12 of the static contribution of the modes left out
+PIVOT = 1e-4  # of the equations of the supports: below, four digits are lost
+_DIGITS = 1e-12  # of the static contribution of the modes left out, to which their series goes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -169,13 +166,12 @@ class Response(Result):
 
     def bearing_forces(self) -> BearingForces:
         """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
-        supports = self.rotor.supports
+        supports, speeds = self.rotor.supports, self.speeds
         at = [self.column(support.node) for support in supports]
-        D = np.array([support.dynamic_stiffness(self.speeds) for support in supports])
-        motion = np.stack((self.x[:, at], self.y[:, at]))
-        x, y = np.einsum("bsij,jsb->isb", D.reshape(-1, self.speeds.size, 2, 2), motion)
+        D = np.reshape([support.dynamic_stiffness(speeds) for support in supports], (-1, speeds.size, 2, 2))
+        x, y = np.einsum("bsij,jsb->isb", D, (self.x[:, at], self.y[:, at]))
         read_only(x, y)
-        return BearingForces(self.speeds, supports, x, y, self.steady)
+        return BearingForces(speeds, supports, x, y, self.steady)
 
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
@@ -207,10 +203,6 @@ class Response(Result):
                 Column("minor_axis_m", self.minor.ravel()),
             ]
         return (Table("unbalance response, peak values", tuple(columns)),)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The table."""
-        return frame(self.tables()[0])
 
     def sentence(self) -> str:
         """The highest peak of a steady response and where it is."""
@@ -280,10 +272,6 @@ class BearingForces(Result):
         }
         return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
 
-    def to_frame(self) -> pd.DataFrame:
-        """The table."""
-        return frame(self.tables()[0])
-
     def sentence(self) -> str:
         """How many there are."""
         return f"Forces on {counted(len(self.supports), 'support')} at {speed_range(self.speeds)}."
@@ -352,10 +340,6 @@ class InfluenceCoefficients(Result):
             Column("least", np.abs(W).min(axis=0), "{:.4g}".format),
         )
         return (Table("largest influence coefficients", largest), every)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed, sensor and plane."""
-        return frame(self.tables()[-1])
 
     def sentence(self) -> str:
         """How many there are, and the largest."""
@@ -444,21 +428,19 @@ def unbalance_response(
         masses[node] = masses.get(node, 0j) + amount
     if not masses:
         raise ValueError("no unbalance is given: name at least one node")
-    A = assemble(rotor)
-    at = A.deflections[[node - 1 for node in masses]]
-    U, phasors = unit_loads(A, at) @ np.array(list(masses.values())), np.array([1.0, 1j])
-    loads = np.column_stack((U.real, U.imag))  # one complex load is two real ones
-    receptance = Receptance(rotor, A, A.deflections, loads, speeds)
+    U, phasors = np.array(list(masses.values())), np.array([1.0, 1j])
+    weights = np.column_stack((U.real, U.imag))  # one complex load is two real ones
+    receptance = Receptance(rotor, range(1, rotor.n_nodes + 1), list(masses), weights, speeds)
 
     def solve(speeds: FloatArray) -> Response:
         both = np.zeros((2, speeds.size, kept.size), dtype=complex)
         largest, where = np.empty(speeds.size), np.empty(speeds.size, dtype=np.intp)
         running = np.where(speeds > 0, speeds, speeds.max())  # at rest there is no force
         for part, H in receptance.parts(running):
-            Z = (speeds[part] ** 2)[:, None] * (H @ phasors)
-            both[: len(Z), part] = Z[..., kept - 1]
+            Z = speeds[part] ** 2 * np.einsum("pabs,b->pas", H, phasors)
+            both[: len(Z), part] = Z[:, kept - 1].swapaxes(1, 2)
             size = np.abs(Z).sum(axis=0)
-            largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
+            largest[part], where[part] = size.max(axis=0), size.argmax(axis=0) + 1
         read_only(both, largest, where)
         warnings = receptance.warnings
         return Response(speeds, both[0], masses, rotor, warnings, both[1], largest, where, kept, solve)
@@ -502,16 +484,15 @@ def influence(
     planes, sensors = tuple(planes), tuple(sensors)
     if not planes or not sensors:
         raise ValueError("name at least one plane and one sensor")
-    A = assemble(rotor)
-    at = A.deflections[[rotor.node(plane) - 1 for plane in planes]]
-    places = [as_sensor(sensor, rotor) for sensor in sensors]
-    unknowns = A.deflections[[rotor.node(sensor.node) - 1 for sensor in places]]
-    turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
-    receptance = Receptance(rotor, A, unknowns, unit_loads(A, at), speeds)
+    places, at = [as_sensor(sensor, rotor) for sensor in sensors], [rotor.node(plane) for plane in planes]
+    turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None, None]
+    ways = np.array([turn.conj(), turn])
+    nodes = [rotor.node(sensor.node) for sensor in places]
+    receptance = Receptance(rotor, nodes, at, np.eye(len(at)), speeds)
     W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
     for part, H in receptance.parts(speeds):
-        reading = sum(plane * way for plane, way in zip(H, (turn.conj(), turn), strict=False))
-        W[part] = (speeds[part] ** 2)[:, None, None] * reading
+        read = H * (ways[: len(H)] * speeds[part] ** 2)
+        W[part] = np.moveaxis(read.sum(axis=0), -1, 0)
     windows, texts = judge(rotor, speeds)
     read_only(W)
     return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings, *texts), windows)
@@ -537,7 +518,7 @@ def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
 
 
 class Receptance:
-    """Deflections of unknowns (a,), from 0, under real loads (size, b) that turn with the rotor.
+    """Deflections of nodes (a,) under real loads on others that turn with the rotor: weights, (others, b).
 
     Ready for any speed up to the largest of those given, rad/s. With `exact` the banded equations are solved
     at every speed instead of at the few where the fast way loses digits.
@@ -546,25 +527,29 @@ class Receptance:
     def __init__(
         self,
         rotor: Rotor,
-        A: Matrices,
-        unknowns: IndexArray,
-        loads: FloatArray,
+        nodes: Sequence[int],
+        loaded: Sequence[int],
+        weights: FloatArray,
         speeds: FloatArray,
         exact: bool = False,
     ) -> None:
-        self.rotor, self.A, self.unknowns, self.loads = rotor, A, unknowns, loads
-        at, beta = supported(rotor, speeds), rotor.material_damping
-        self.planes, self.springs, self.beta = at.planes, at.reference, float(beta[0])
-        springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
+        self.rotor, self.A = rotor, (A := assemble(rotor))
+        self.unknowns = A.deflections[np.subtract(nodes, 1)]
+        self.loads = unit_loads(A, A.deflections[np.subtract(loaded, 1)]) @ weights
+        at, beta = supported(rotor, speeds[:: 1 + speeds.size // 16]), rotor.material_damping
+        # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
+        middle = np.sort(at.stiffness[..., 0, 0].real, axis=0)[len(at.stiffness) // 2]
+        self.planes, self.springs, self.beta = at.planes, np.maximum(middle, 0.0), float(beta[0])
+        springs = dict(zip(at.nodes, self.springs.tolist(), strict=True))
         tilting = any(support.tilting_stiffness for support in rotor.supports)
         self.exact = exact or bool(at.planes == 2 and ((beta != beta[0]).any() or (beta[0] and tilting)))
         held = A.deflections[[node - 1 for node in at.nodes]]
-        places, units, top = np.concatenate((unknowns, held)), unit_loads(A, held), float(speeds.max())
+        places, units, top = np.append(self.unknowns, held), unit_loads(A, held), float(speeds.max())
 
         def series(whirl: int, columns: FloatArray) -> Series:
             return Series(one_plane(rotor, A, whirl, springs), places, columns, top)
 
-        forward = np.hstack((units, loads))
+        forward = np.hstack((self.loads, units))
         try:
             self.series = [series(1, forward)]
         except ValueError:  # free, and M − G is negative in a rigid motion
@@ -574,36 +559,42 @@ class Receptance:
         self.warnings = (*ignored_inertia(rotor), *fine_mesh_warning(rotor, self.series[0].modes.rounding))
 
     def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray]]:
-        """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, S, a, b)."""
+        """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, a, b, S)."""
         stiffness = supported(self.rotor, speeds).stiffness
         step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
         for start in range(0, speeds.size, step):
             part = slice(start, start + step)
             omega = speeds[part]
             H, lost = self._fast(omega, stiffness[part])
-            lost |= self.exact
             if lost.any():
-                H[:, lost] = self._exact(omega[lost])
+                H[..., lost] = self._exact(omega[lost])
             yield part, H
 
     def _fast(self, omega: FloatArray, D: ComplexArray) -> tuple[ComplexArray, BoolArray]:
-        """Receptances from the series, (planes, S, a, b), and at which speeds they lose digits."""
-        a, s, planes = self.unknowns.size, self.springs.size, self.planes
-        S, n, b = omega.size, planes * s, self.loads.shape[1]
-        change, near, H = D[:, :, :planes, :planes].copy(), np.zeros(S, dtype=bool), []
+        """Receptances from the series, (planes, a, b, S), and at which speeds they lose digits."""
+        a, s, planes, b = self.unknowns.size, self.springs.size, self.planes, self.loads.shape[1]
+        change, H = D[..., :planes, :planes].transpose(2, 3, 1, 0).copy(), []
+        lost = np.full(omega.size, self.exact)
         for p, series in enumerate(self.series):
             stiffer: AnyArray | float = 1.0 + 2j * self.beta * omega if p * self.beta else 1.0
-            change[:, :, p, p] -= np.multiply.outer(stiffer, self.springs)
-            whole, lost = series.at(omega * omega / stiffer)
-            H.append(np.moveaxis(whole / stiffer, -1, 0))
-            near |= lost
-        E = np.einsum("kipq,qkij->kpiqj", change, [each[:, a:, :s] for each in H]).reshape(S, n, n)
-        pull = -np.einsum("kip,kib->kpib", change[..., 0], H[0][:, a:, s:]).reshape(S, n, b)
-        forces = np.linalg.solve(E + np.eye(n), pull)
-        size, before = (np.abs(each).max(axis=(1, 2), initial=0.0) for each in (forces, pull))
-        F = np.array([each[:, :a, :s] for each in H]) @ forces.reshape(S, planes, s, b).swapaxes(0, 1)
-        F[0] += H[0][:, :a, s:]
-        return F, near | ~(size <= GROWTH * before)
+            change[p, p] -= self.springs[:, None] * stiffer
+            whole, near = series.at(omega * omega / stiffer)
+            H.append(whole / stiffer if p else whole)
+            lost |= near
+        # What loads, and unit forces at the supports, make the supports do: in the end, what loads do.
+        system = np.concatenate([change[:, p, :, None] * each[a:] for p, each in enumerate(H)], axis=2)
+        system = system.reshape(planes * s, b + planes * s, omega.size)
+        for k, row in enumerate(system):
+            row[b + k] += 1.0
+            lost |= ~(np.abs(row[b + k]) >= PIVOT)
+            row *= 1 / row[b + k]
+            for other in {*range(len(system))} - {k}:
+                system[other] -= system[other, b + k] * row
+        F = np.zeros((planes, a, b, omega.size), complex)
+        F[0] = H[0][:a, :b]
+        for k, force in enumerate(system[:, :b]):
+            F[k // s] -= H[k // s][:a, k % s - s, None] * force
+        return F, lost
 
     @cached_property
     def _band(self) -> WholeBand:
@@ -632,7 +623,7 @@ class Receptance:
                 f"{omega[np.argmax(wrong)]:.10g} rad/s, where the amplitude has no limit; give a support "
                 "damping or choose another speed"
             )
-        return X[self.unknowns].transpose(2, 1, 0, 3)
+        return X[self.unknowns].transpose(2, 0, 3, 1)
 
 
 class Series:
@@ -644,33 +635,33 @@ class Series:
     def __init__(self, whole: Pencil, unknowns: IndexArray, columns: FloatArray, top: float) -> None:
         from scipy.linalg.lapack import dpbtrs
 
-        available = finite_modes(whole)
-        m = available if whole.size <= DENSE else min(available, 8)
+        m, available = 12, finite_modes(whole)
         while True:
+            m = min(m, available)
             self.modes = modes = lowest_modes(whole.rotor, whole.matrices, m, whole)
             ratio = (top * top + modes.shift) / abs(modes.squares[-1] + modes.shift)
             if m == available or ratio < 1 / 16:
                 break
-            m = min(available, 2 * m)
-        V, signs, R = modes.vectors, modes.signs, columns
+            m *= 2
+        V, signs, R = modes.vectors, np.where(modes.squares < 0, -1, 1), columns
         MV = multiply(whole.mass, V) * signs
         factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
-        for _ in range(1 if m == available else _POWERS):
+        self.powers = np.arange(1 if m == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS))))[:, None]
+        for _ in self.powers:
             R = dpbtrs(modes.factor, R)[0]
-            for _ in range(2):
-                R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
+            R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
             factors.append(R[unknowns][..., None])
             R = multiply(whole.mass, R)
         self.factors = np.concatenate(factors, axis=2)  # (rows, columns, modes and powers)
+        self.squares = modes.squares[:, None]
+        # Rigid motions have λ = 0 without rounding.
+        self.margin = NEAR * (np.abs(self.squares) + modes.shift) * (self.squares != 0)
 
     def at(self, squared: AnyArray) -> tuple[AnyArray, BoolArray]:
         """Receptance where ω² is given, shape (rows, columns, S); nonsense where the second is true."""
-        squares, shift = self.modes.squares, self.modes.shift
-        # Rigid motions have λ = 0 without rounding.
-        margin = np.where(squares != 0, NEAR * (np.abs(squares) + shift), 0.0)
-        gap = squares[:, None] - squared
-        near: BoolArray = np.any(np.abs(gap) <= margin[:, None], axis=0)
+        gap = self.squares - squared
+        near: BoolArray = (np.abs(gap) <= self.margin).any(axis=0)
         gap[:, near] = 1.0
-        n = self.factors.shape[2]
-        terms = np.vstack((1 / gap, np.vander(squared + shift, n - squares.size, increasing=True).T))
-        return (self.factors.reshape(-1, n) @ terms).reshape(*self.factors.shape[:2], -1), near
+        terms = np.vstack((1 / gap, (squared + self.modes.shift) ** self.powers))
+        rows, columns, n = self.factors.shape
+        return (self.factors.reshape(-1, n) @ terms).reshape(rows, columns, -1), near

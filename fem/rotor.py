@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,36 +19,12 @@ from rotorid.base.registry import Method, find
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 
-__all__ = [
-    "KINDS",
-    "ROUNDED",
-    "SHORTEST",
-    "STEEL_DENSITY",
-    "STEEL_MODULUS",
-    "STEEL_POISSON",
-    "Calibration",
-    "Coefficient",
-    "Disc",
-    "Model",
-    "Pair",
-    "Pedestal",
-    "Rotor",
-    "Sensor",
-    "SensorLike",
-    "Support",
-    "as_sensor",
-    "is_reading",
-    "label",
-    "refined",
-    "too_short",
-]
-
 STEEL_MODULUS = 2.1e11
 STEEL_DENSITY = 7800.0
 STEEL_POISSON = 0.3
 SHORTEST = 3000
 """A neighbour may be this many times as long as an element: float64 loses the stiffness of shorter ones."""
-ROUNDED = 5e-6  # relative error of a speed that was written with six digits: it does not end a table
+_ROUNDED = 5e-6  # relative error of a speed that was written with six digits: it does not end a table
 Coefficient = float | tuple[tuple[float, float], tuple[float, float]]  # isotropic, or ((xx, xy), (yx, yy))
 Pair = float | tuple[float, float]  # in both directions, or in x and in y
 KINDS = (
@@ -148,7 +123,7 @@ class Pedestal:
     def __post_init__(self) -> None:
         check_numbers(self, "pedestal")
         for name in ("stiffness", "damping"):
-            value = _canonical(getattr(self, name), np.ones(2), f"pedestal: {name}")
+            value = _canonical(getattr(self, name), (2,), f"pedestal: {name}")
             object.__setattr__(self, name, value)
         if min(self.xy("stiffness")) <= 0:
             raise ValueError("pedestal: stiffness must be above 0 in x and y; leave out a rigid pedestal")
@@ -217,7 +192,7 @@ class Support:
                 value = [value] * n
             if len(value) != n:
                 raise ValueError(f"{its} has {len(value)} values for {n} speeds")
-            values = tuple(_canonical(entry, np.eye(2), its, signed) for entry in value)
+            values = tuple(_canonical(entry, (2, 2), its, signed) for entry in value)
             object.__setattr__(self, name, values if speeds else values[0])
 
     @property
@@ -225,13 +200,15 @@ class Support:
         """Whether stiffness and damping are the same at all speeds."""
         return not self.speeds
 
-    @property
+    @cached_property
     def symmetric(self) -> bool:
         """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
-        turned = self.table[..., ::-1, ::-1] * ((1, -1), (-1, 1))
+        if self.plain:
+            return True
+        xx, xy, yx, yy = self.table.reshape(-1, 4).T
         stand = self.pedestal
         alike = stand is None or {type(stand.stiffness), type(stand.damping)} == {float}
-        return alike and np.array_equal(self.table, turned)
+        return alike and np.array_equal((xx, xy), (yy, -yx))
 
     @property
     def plain(self) -> bool:
@@ -258,18 +235,17 @@ class Support:
         """
         omega = np.asarray(omega, dtype=float)
         if self.constant:
-            k, c = self.table[:, np.zeros(omega.shape, dtype=int)]
+            k, c = self.table.repeat(omega.size, axis=1).reshape(2, *omega.shape, 2, 2)
             return k, c
-        speeds = np.array(self.speeds)
-        first, last = speeds[[0, -1]]
+        first, last = self.speeds[0], self.speeds[-1]
         near = np.clip(omega, first, last)
-        outside = omega[~(np.abs(omega - near) <= ROUNDED * last)]
+        outside = omega[~(np.abs(omega - near) <= _ROUNDED * last)]
         if outside.size:
             raise ValueError(
                 f"{attachment(self)}: its table holds {first:.6g} to {last:.6g} rad/s, not "
                 f"{outside[0]:.6g} rad/s; it is not extrapolated"
             )
-        hats = np.array([np.interp(near, speeds, row) for row in np.eye(speeds.size)])
+        hats = np.array([np.interp(near, self.speeds, row) for row in np.eye(len(self.speeds))])
         k, c = np.einsum("n...,knij->k...ij", hats, self.table)
         return k, c
 
@@ -282,7 +258,7 @@ class Support:
         bearing, stand = self.dynamic_parts(omega, speed)
         if stand is None:
             return bearing
-        return np.asarray(bearing - bearing @ np.linalg.solve(bearing + stand, bearing))
+        return bearing - bearing @ np.linalg.solve(bearing + stand, bearing)
 
     def dynamic_parts(
         self, omega: ArrayLike, speed: ArrayLike | None = None
@@ -301,25 +277,23 @@ class Support:
     def table(self) -> FloatArray:
         """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
         rows = (*self.stiffness, *self.damping) if self.speeds else (self.stiffness, self.damping)
-        matrices = [row if isinstance(row, tuple) else row * np.eye(2) for row in rows]
+        matrices = [row if isinstance(row, tuple) else ((row, 0.0), (0.0, row)) for row in rows]
         return np.reshape(matrices, (2, -1, 2, 2))
 
 
-def _canonical(value: Any, isotropic: FloatArray, what: str, signed: bool = False) -> Any:  # noqa: ANN401
-    """A number where it is the same in all directions, else tuples, in the shape of what is isotropic."""
-    array = np.array(value, dtype=float) + 0.0  # no negative zero
+def _canonical(value: Any, shape: tuple[int, ...], what: str, signed: bool = False) -> Any:  # noqa: ANN401
+    """A number where it is the same in all directions, else tuples of this shape."""
+    array = np.array(value, dtype=float)
     if not array.ndim:
-        array = np.where(isotropic, array, 0.0)
-    if array.shape != isotropic.shape:
-        raise ValueError(f"{what} must be a number or of the shape {isotropic.shape}, not {value!r}")
-    right = np.isfinite(array) & (signed | (array >= 0) | (isotropic == 0))
-    if not right.all():
-        size = "finite" if signed else "finite and not negative"
-        raise ValueError(f"{what} must be {size}, not {array[~right][0]}")
-    first = float(array.flat[0])
-    if np.array_equal(array, first * isotropic):
+        return number(value, what, signed=signed)
+    if array.shape != shape:
+        raise ValueError(f"{what} must be a number or of the shape {shape}, not {value!r}")
+    entries = [number(entry, what, signed=True) for entry in array.flat]
+    between = len(entries) - 1
+    first, last = (number(entry, what, signed=signed) for entry in entries[::between])
+    if first == last and not any(entries[1:between]):
         return first
-    return tuple(tuple(row) if isinstance(row, list) else row for row in array.tolist())
+    return tuple(entries) if between == 1 else (tuple(entries[:2]), tuple(entries[2:]))
 
 
 @dataclass(frozen=True)
@@ -406,12 +380,8 @@ class Calibration:
             if len({*labels}) < len(labels):
                 raise ValueError(f"calibration: one of its {name} comes twice")
         n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
-        for name, shape in {
-            "values": (n,),
-            "covariance": (n, n),
-            "speeds": (S,),
-            "lack_of_fit": (S, C),
-        }.items():
+        shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
+        for name, shape in shapes.items():
             array = np.array(getattr(self, name), dtype=float)
             if (array.size and array.shape != shape) or not np.isfinite(array).all():
                 raise ValueError(f"calibration: {name} must be finite and of the shape {shape}")
@@ -419,18 +389,18 @@ class Calibration:
             read_only(array)
             object.__setattr__(self, name, array)
         R = self.correlation
-        if not np.allclose(R, R.T, rtol=0.0, atol=1e-9):
-            raise ValueError("calibration: the covariance must be symmetric")
-        if (np.linalg.eigvalsh(R) < -1e-9).any() or (self.lack_of_fit < 0).any():
+        possible = np.allclose(R, R.T, rtol=0.0, atol=1e-9) and (np.linalg.eigvalsh(R) > -1e-9).all()
+        if not possible or (self.lack_of_fit < 0).any():
             raise ValueError(
-                "calibration: lack_of_fit not negative, covariance must not be negative in any direction"
+                "calibration: the covariance must be symmetric and must not be negative in any direction, "
+                "lack_of_fit not negative"
             )
 
     @property
     def readings(self) -> dict[str, float]:
         """Those of the parameters that are no numbers of a rotor: angles in degrees, and gains."""
-        values = dict(zip(self.names, self.values.tolist(), strict=True))
-        return {name: values[name] for name in filter(is_reading, values)}
+        values = zip(self.names, self.values.tolist(), strict=True)
+        return {name: value for name, value in values if is_reading(name)}
 
     @property
     def std(self) -> FloatArray:
@@ -441,7 +411,7 @@ class Calibration:
     def correlation(self) -> FloatArray:
         """Correlations of the parameters, shape (n, n); 0 of what has no error."""
         scale = np.where(self.std > 0, self.std, 1.0)
-        return np.asarray(self.covariance / scale / scale[:, None])
+        return self.covariance / scale / scale[:, None]
 
     def columns(self) -> FloatArray:
         """Principal columns L of the covariance, L Lᵀ = covariance, shape (n, m).
@@ -450,7 +420,7 @@ class Calibration:
         """
         values, V = np.linalg.eigh(self.correlation)
         kept = values > 1e-12 * max(values, default=0.0)
-        return np.asarray(self.std[:, None] * V[:, kept] * np.sqrt(values[kept]))
+        return np.asarray(np.diag(self.std) @ V[:, kept] * np.sqrt(values[kept]))
 
     def lack_at(self, speeds: ArrayLike, sensors: Sequence[str]) -> FloatArray:
         """Lack of fit at other speeds, rad/s, and sensors, shape (S', C').
@@ -460,9 +430,10 @@ class Calibration:
         omega = np.atleast_1d(speeds)
         if not self.lack_of_fit.size:
             return np.zeros((omega.size, len(sensors)))
-        lack = np.column_stack((self.lack_of_fit, self.lack_of_fit.max(axis=1)))
-        columns = [self.sensors.index(c) if c in self.sensors else -1 for c in sensors]
-        return np.asarray(lack[np.abs(omega[:, None] - self.speeds).argmin(axis=1)][:, columns])
+        lack = self.lack_of_fit[np.abs(omega[:, None] - self.speeds).argmin(axis=1)].T
+        columns = dict(zip(self.sensors, lack, strict=True))
+        values = [columns.get(sensor, lack.max(axis=0)) for sensor in sensors]
+        return np.reshape(values, (-1, omega.size)).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -517,20 +488,20 @@ class Rotor:
     calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
-        n = max(1, *(np.size(getattr(self, name)) for name in PER_ELEMENT))
-        for name, (low, high, limit) in PER_ELEMENT.items():
+        n = max(1, *(np.size(getattr(self, name)) for name in _PER_ELEMENT))
+        for name, (low, high, limit) in _PER_ELEMENT.items():
             array = np.empty(n)
             try:
                 array[:] = getattr(self, name)
             except (TypeError, ValueError):
                 raise ValueError(f"{name} must be a number, or one for each of {n} elements") from None
-            _every((array >= low) & (array <= high) & np.isfinite(array), name, array, f"finite and {limit}")
             read_only(array)
             object.__setattr__(self, name, array)
+            self._every((low < array) & (array < high), name, limit)
         least = f"1/{SHORTEST} of its longer neighbour's at least, for float64 (join the two)"
-        _every(~too_short(self.length), "length", self.length, least)
+        self._every(~too_short(self.length), "length", least)
         thinner = self.inner_diameter < self.outer_diameter
-        _every(thinner, "inner_diameter", self.inner_diameter, "smaller than outer_diameter")
+        self._every(thinner, "inner_diameter", "smaller than outer_diameter")
         for name, kind in (("discs", Disc), ("supports", Support), ("forces", NodeForce)):
             items = tuple(getattr(self, name))
             for i, item in enumerate(items, start=1):
@@ -542,14 +513,20 @@ class Rotor:
         stations = {
             str(name): self._node(node, f"station {name!r}: ") for name, node in self.stations.items()
         }
-        object.__setattr__(self, "stations", MappingProxyType(stations))
+        object.__setattr__(self, "stations", stations)
+
+    def _every(self, right: BoolArray, name: str, limit: str) -> None:
+        """Refuse the first element that is not right."""
+        if not right.all():
+            i = np.argmin(right)
+            raise ValueError(f"element {i + 1}: {name} must be {limit}, not {getattr(self, name)[i]}")
 
     __hash__ = None  # type: ignore[assignment]  # compared by value, and arrays have no hash
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Rotor):
             return NotImplemented
-        names = vars(self).keys() - {"calibration"}
+        names = {*self.__match_args__} - {"calibration"}
         return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in names)
 
     def __repr__(self) -> str:
@@ -559,10 +536,6 @@ class Rotor:
             f"{self.total_mass:.4g} kg, {counted(len(self.discs), 'disc')}, "
             f"{counted(len(self.supports), 'support')}{forces})"
         )
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        # A mapping proxy can be neither pickled nor deep-copied: rebuild from plain data.
-        return type(self), tuple((vars(self) | {"stations": dict(self.stations)}).values())
 
     def node(self, name_or_number: str | int) -> int:
         """Number of a node, given as the name of a station or as a number, from 1.
@@ -600,25 +573,29 @@ class Rotor:
         """Number of nodes, one more than elements."""
         return len(self.length) + 1
 
-    @property
+    @cached_property
     def positions(self) -> FloatArray:
         """Axial position of each node from the left end, m, shape (n + 1,)."""
-        return np.append(0.0, np.cumsum(self.length))
+        positions = np.append(0.0, np.cumsum(self.length))
+        read_only(positions)
+        return positions
 
-    @property
+    @cached_property
     def area(self) -> FloatArray:
         """Cross-section of each element, m², shape (n,)."""
-        return np.asarray(math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
+        area = math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2)
+        read_only(area)
+        return area
 
     @property
     def second_moment(self) -> FloatArray:
         """Second moment of area of each element about a diameter, m⁴, shape (n,)."""
-        return np.asarray(self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16)
+        return self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16
 
     @property
     def shear_modulus(self) -> FloatArray:
         """G = E / (2 (1 + ν)) of each element, Pa, shape (n,)."""
-        return np.asarray(self.youngs_modulus / (2 * (1 + self.poisson_ratio)))
+        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
 
     @property
     def shear_coefficient(self) -> FloatArray:
@@ -629,7 +606,7 @@ class Rotor:
         """
         nu, m2 = self.poisson_ratio, (self.inner_diameter / self.outer_diameter) ** 2
         ring = (1 + m2) ** 2
-        return np.asarray(6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * m2))
+        return 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * m2)
 
     @property
     def symmetric(self) -> bool:
@@ -658,18 +635,18 @@ class Rotor:
         return float(shaft) + sum(disc.mass for disc in self.discs)
 
 
-_ABOVE_ZERO = math.ulp(0.0), math.inf, "greater than zero"
-_FROM_ZERO = 0.0, math.inf, "not negative"
-PER_ELEMENT = {
+_ABOVE_ZERO = 0.0, math.inf, "finite and greater than zero"
+_FROM_ZERO = -math.ulp(0.0), math.inf, "finite and not negative"
+_PER_ELEMENT = {
     "length": _ABOVE_ZERO,
     "outer_diameter": _ABOVE_ZERO,
-    "youngs_modulus": _ABOVE_ZERO,
-    "poisson_ratio": (math.nextafter(-1, 0), 0.5, "above -1, at most 0.5"),
     "inner_diameter": _FROM_ZERO,
+    "youngs_modulus": _ABOVE_ZERO,
     "density": _FROM_ZERO,
+    "poisson_ratio": (-1.0, math.nextafter(0.5, 1.0), "finite and above -1, at most 0.5"),
     "material_damping": _FROM_ZERO,
 }
-"""What is given for each element: its limits, and their words."""
+"""What is given for each element: between which values, and their words."""
 
 
 def too_short(length: FloatArray) -> BoolArray:
@@ -685,14 +662,7 @@ def too_short(length: FloatArray) -> BoolArray:
     Shape (n,).
     """
     beside = np.pad(length, 1)
-    return np.asarray(SHORTEST * length < np.maximum(beside[:-2], beside[2:]))
-
-
-def _every(right: BoolArray, name: str, values: FloatArray, limit: str) -> None:
-    """Refuse the first element that is not right."""
-    if not right.all():
-        i = int(np.argmin(right))
-        raise ValueError(f"element {i + 1}: {name} must be {limit}, not {values[i]}")
+    return SHORTEST * length < np.maximum(beside[:-2], beside[2:])
 
 
 def refined(rotor: Rotor, times: int) -> Rotor:
@@ -714,7 +684,7 @@ def refined(rotor: Rotor, times: int) -> Rotor:
     def moved(node: int) -> int:
         return times * (node - 1) + 1
 
-    new: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
+    new: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in _PER_ELEMENT}
     new["length"] /= times
     for name in ("discs", "supports", "forces"):
         new[name] = [replace(item, node=moved(item.node)) for item in getattr(rotor, name)]

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fem.result import Result
 from fem.rotor import Rotor, Support
-from fem.undamped import Result, lowest_critical_speeds
+from fem.undamped import lowest_critical_speeds
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.json import plain

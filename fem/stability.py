@@ -16,15 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from fem.assembly import both_planes
 from fem.forces import InternalDamping
 from fem.orbits import DIRECTION_NAMES
+from fem.result import Result
 from fem.rotor import Rotor
-from fem.undamped import Result
 from fem.whirl import (
     GROWTH,
     NONE,
@@ -40,10 +40,7 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text, speed_text
-from rotorid.base.tables import Column, Table, frame
-
-if TYPE_CHECKING:
-    import pandas as pd
+from rotorid.base.tables import Column, Table
 
 AWAY = 1e-6
 """Part of the lowest frequency above which a real eigenvalue runs away."""
@@ -56,6 +53,8 @@ _PARTS = 20  # of a range over tables, at least
 _ROUNDS = 6  # of halving
 _BACK = 1e-5  # of a step: to which the slope at an edge belongs
 _PAIR = 1e-6  # relative distance of forward and backward whirl that coincide
+_SECANTS = 60  # at most
+_EXACT = 1e-9  # relative change of a root by the last secant
 
 Status = Literal["stable", "threshold", "unstable"]
 
@@ -124,7 +123,7 @@ class Window:
 def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:
     """Which speeds, shape (S,), lie in one of the windows."""
     inside = ((window.first <= speeds) & (speeds <= window.last) for window in windows)
-    return sum(inside, np.zeros(speeds.shape, dtype=bool))
+    return sum(inside, np.zeros(speeds.shape, bool))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,7 +178,7 @@ class Stability(Result):
                 "lowest_rad_s": self.lowest,
                 "highest_rad_s": self.highest,
                 "threshold_rad_s": self.threshold,
-                "threshold_rpm": None if self.threshold is None else self.threshold * RPM,
+                "threshold_rpm": self.threshold and self.threshold * RPM,
                 "mode": self.mode,
                 "frequency_rad_s": self.frequency,
                 "whirl_ratio": self.whirl_ratio,
@@ -193,10 +192,6 @@ class Stability(Result):
         """One row, all but the warnings."""
         *row, _ = self.to_dict().items()
         return (Table("stability", tuple(Column(key, (value,), key=key) for key, value in row)),)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The same as a DataFrame."""
-        return frame(self.tables()[0])
 
     def sentence(self) -> str:
         """Whether it is stable, or from which speed on which mode grows."""
@@ -312,6 +307,24 @@ def _scan(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
     return grid, rates
 
 
+def roots(
+    function: Callable[[FloatArray], FloatArray], ends: FloatArray, values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Where functions vanish, each between two ends with values of unlike signs, and what they are there.
+
+    By secants, with half of the value at an end that stays (Illinois); ends and values of shape (2, B).
+    """
+    (old, new), (f, g) = ends, values
+    for _ in range(_SECANTS):
+        last, new = new, (old * g - new * f) / (g - f)
+        h = function(new)
+        stays = (h < 0) == (g < 0)
+        old, f, g = np.where(stays, old, last), np.where(stays, f / 2, g), h
+        if (np.abs(new - last) <= _EXACT * new).all():
+            break
+    return new, g
+
+
 def root(function: Callable[[float], float], ends: FloatArray, values: FloatArray) -> float:
     """Where a function of speed vanishes between two ends with these values, which it need not repeat."""
     from scipy.optimize import brentq
@@ -321,7 +334,7 @@ def root(function: Callable[[float], float], ends: FloatArray, values: FloatArra
     def value(speed: float) -> float:
         return there[speed] if speed in there else function(speed)
 
-    return float(brentq(value, *ends, xtol=1e-14 * max(ends), rtol=1e-15))
+    return float(brentq(value, *ends, xtol=1e-10 * max(ends), rtol=1e-15))
 
 
 def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, bool, complex]:
@@ -349,6 +362,8 @@ def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     """Ranges of growth of a whirl that has all modes that may grow."""
     grid, rates = _scan(whirl)
     grows = rates > GROWTH
+    if not grows.any():
+        return ()
     edges = [_edge(whirl, grid[k : k + 2], rates[k : k + 2]) for k in np.flatnonzero(np.diff(grows))]
     if grows[0]:
         edges.insert(0, (float(grid[0]), False, fastest(whirl)[0][0]))

@@ -10,20 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fem.assembly import Planes, WholeBand, both_planes, free_motions, multiply, rounding_error
+from fem.result import Result
 from fem.rotor import Rotor
-from fem.undamped import Result
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, Table, frame, terminal
-
-if TYPE_CHECKING:
-    import pandas as pd
+from rotorid.base.tables import Column, Table, terminal
 
 GRAVITY = 9.80665  # m/s²
 
@@ -60,7 +57,7 @@ class StaticDeflection(Result):
         return np.hypot(self.x, self.y)
 
     def tables(self) -> tuple[Table, ...]:
-        """The deflection, a row for each node; and the reactions."""
+        """The reactions; and the deflection, a row for each node."""
         supports = self.rotor.supports
         nodes = (
             Column("node", range(1, self.rotor.n_nodes + 1)),
@@ -73,11 +70,7 @@ class StaticDeflection(Result):
             Column("reaction x, N", self.reaction_x, "{:.6g}".format, "reactions.*.x_N"),
             Column("y, N", self.reaction_y, "{:.6g}".format, "reactions.*.y_N"),
         )
-        return Table("deflection", nodes), Table("reactions", reactions)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per node."""
-        return frame(self.tables()[0])
+        return Table("reactions", reactions), Table("deflection", nodes)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -101,7 +94,7 @@ class StaticDeflection(Result):
 
     def summary(self) -> str:
         """Weight, largest deflection and reactions, as text."""
-        return f"{self.sentence()}\n{terminal(self.tables()[1])}"
+        return f"{self.sentence()}\n{terminal(self.tables()[0])}"
 
 
 def static_deflection(

@@ -2,9 +2,9 @@
 
 Turning at Ω = ω, a rotor whirls in orbits x + i y = F e^{iωt} + b e^{−iωt}: the gyroscopic moment is an
 inertia, M − G for the forward wave F and M + G for the backward wave b. Thin discs make M − G indefinite; a
-forward mode of negative mass has λ < 0 and no critical speed. With x = F + b and y = −i (F − b) a stiffness k
-of (x, y) acts as T⁻¹ k T on (F, b), T = [[1, 1], [−i, i]]: Hermitian for a symmetric k, real without
-cross-coupling, and diagonal where x and y are alike: then F stands alone. A pedestal is one more unknown of
+forward mode of negative mass has λ < 0 and no critical speed. With x = F + b and y = −i (F − b) a symmetric
+stiffness k of (x, y) is on (F, b) the mean of kxx and kyy on the diagonal, and (kxx − kyy) / 2 ± i kxy beside
+it: real without cross-coupling, and where x and y are alike F stands alone. A pedestal is one more unknown of
 each wave beside its node.
 
 With the Cholesky factor K + σ M = Uᴴ U (σ > 0 only where supports are soft or missing), U⁻ᴴ M U⁻¹ has the
@@ -18,15 +18,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fem.assembly import (
-    FROM_XY,
     TO_XY,
     Matrices,
     assemble,
@@ -38,17 +36,15 @@ from fem.assembly import (
 )
 from fem.elements import strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.result import NORMAL_95, Result
 from fem.rotor import Pedestal, Rotor, refined
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
-from rotorid.base.tables import Column, Table, frame, html, terminal
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, listing, percent
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
@@ -61,34 +57,6 @@ _UNSTABLE = (
     "free rotor, which soft supports at two nodes would hold"
 )
 _PARTS = (1 - np.cos(np.linspace(0, np.pi, 11))) / 2  # of an interval of the tables: fine at its ends
-_NORMAL_95 = 1.959964
-
-
-class Result(Answered):
-    """A result with tables and one sentence."""
-
-    @abstractmethod
-    def tables(self) -> tuple[Table, ...]:
-        """The numbers."""
-
-    def to_frame(self) -> pd.DataFrame:
-        """The last of the tables: of modes, a row per node."""
-        return frame(self.tables()[-1])
-
-    @abstractmethod
-    def sentence(self) -> str:
-        """The answer."""
-
-    @property
-    def answer(self) -> Answer:
-        """The sentence and the first table."""
-        return Answer(self.sentence(), terminal(self.tables()[0]))
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.sentence()})"
-
-    def _repr_html_(self) -> str:
-        return "\n".join(map(html, self.tables()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,7 +133,7 @@ class Modes(Result):
         """The critical speeds; and the shapes, a row for each node."""
         shown, hertz = "{:.4f}".format, self.frequencies / math.tau
         whirl = np.where(self.frequencies > 0, self.direction, "rigid body")
-        errors = () if self.std is None else (_NORMAL_95 * RPM * self.std,)
+        errors = () if self.std is None else (NORMAL_95 * RPM * self.std,)
         speeds = (
             Column("mode", range(1, self.frequencies.size + 1)),
             Column("whirl", whirl.tolist()),
@@ -344,26 +312,34 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
         rigid = pencil.rigid.shape[1]
-        parts = [_positive(pencil, most + rigid).only(slice(most + rigid))]
+        parts = [_positive(pencil, most + rigid)]
         if (count := parts[0].squares.size - rigid) < least:
             raise ValueError(
                 f"{least} critical speeds cannot be found: the model has 1 to {count}; divide the shaft into "
                 "more elements (discs whose polar inertia exceeds the diametral one take some away)"
             )
     else:
-        parts, beyond, cut = _over_speed(rotor, A, most)
+        rigid, (parts, beyond, cut) = 0, _over_speed(rotor, A, most)
         warnings = beyond + warnings
-    squares = np.concatenate([part.squares for part in parts])
-    x, y, tilt_x, tilt_y = np.concatenate([part.motion for part in parts], axis=2)
-    in_x = np.abs(x).max(axis=0) >= np.abs(y).max(axis=0) * (1 - 1e-6)
-    major, tilt = np.where(in_x, (x, tilt_x), (y, tilt_y))
-    largest = major[np.abs(major).argmax(axis=0), np.arange(squares.size)]
-    scale = 1 / np.where(np.abs(major[0]) > 1e-6 * np.abs(largest), major[0], largest)
-    direction = tuple(DIRECTION_NAMES[way] for way in whirl_direction(x.T, y.T).tolist())
-    arrays = np.sqrt(squares), (major * scale).real, (tilt * scale).real, x * scale, y * scale
-    read_only(*arrays)
-    warnings += fine_mesh_warning(rotor, np.concatenate([part.rounding for part in parts]))
-    return Modes(*arrays[:3], rotor, direction, *arrays[3:], warnings, cut)
+    last = most + rigid
+    squares, rounding = (
+        np.concatenate([getattr(part, name) for part in parts])[:last] for name in ("squares", "rounding")
+    )
+    motion = np.concatenate([part.motion for part in parts], axis=2)[..., :last]
+    sizes = motion[:2].real ** 2 + motion[:2].imag ** 2
+    largest = sizes.max(axis=1)
+    in_x = largest[0] >= largest[1] * (1 - 2e-6)
+    size, major = np.where(in_x, *sizes), np.where(in_x, motion[::2], motion[1::2])
+    first = np.where(size[0] > 1e-12 * np.where(in_x, *largest), 0, size.argmax(axis=0))
+    scale = 1 / major[0, first, np.arange(squares.size)]
+    x, y = motion[:2] * scale
+    one_wave = len(parts[0].pencil.waves) == 1
+    ways = np.ones(squares.size) if one_wave else whirl_direction(x.T, y.T)
+    direction = tuple(DIRECTION_NAMES[way] for way in ways.tolist())
+    frequencies, (shapes, slopes) = np.sqrt(squares), (major * scale).real
+    read_only(frequencies, shapes, slopes, x, y)
+    warnings += fine_mesh_warning(rotor, rounding)
+    return Modes(frequencies, shapes, slopes, rotor, direction, x, y, warnings, cut)
 
 
 def critical_speeds_below(rotor: Rotor, top: float, most: float = np.inf) -> FloatArray:
@@ -468,29 +444,27 @@ def _brackets(rotor: Rotor, A: Matrices, knots: FloatArray) -> tuple[float, list
     from scipy.optimize import minimize_scalar
 
     top = (1.01 * knots[-1]) ** 2
-    squares = _positive(whole_rotor(rotor, A, knots[0]), 1, top).squares
-    lowest, brackets = math.sqrt(squares[0]), []
-    for low, high in itertools.pairwise(knots):
-        speeds, lists = low + (high - low) * _PARTS, [squares]
-        for speed in speeds[1:]:
-            squares = _positive(whole_rotor(rotor, A, speed), squares.size, top).squares
-            lists.append(squares)
-        if 0 < squares[0] < 1e-12 * top:
-            raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
-        steps = np.diff(speeds)
-        for k, mode in enumerate(itertools.zip_longest(*lists, fillvalue=top)):
-            gaps = mode - speeds**2
-            slopes, signs, points = np.diff(gaps) / steps, np.sign(gaps), dict(zip(speeds, gaps, strict=True))
-            right, left = gaps[1:-2] + slopes[:-2] * steps[1:-1], gaps[2:-1] - slopes[2:] * steps[1:-1]
-            inside = np.array([gaps[2:-1], -right, -left]) * signs[1:-2]
-            for i in 1 + np.flatnonzero((inside > 0).all(axis=0)):
-                ends, args = speeds[i : i + 2], (rotor, A, k, signs[i])
-                turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * high})
-                points[turn.x] = signs[i] * turn.fun
-            for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
-                if (one > 0) != (other > 0):
-                    brackets.append((b, a, k))
-    return lowest, sorted(brackets)
+    parts = knots[:-1, None] + np.diff(knots)[:, None] * _PARTS[:-1]
+    speeds = np.append(parts, knots[-1])
+    lists = [np.zeros(1)]
+    for speed in speeds:
+        lists.append(_positive(whole_rotor(rotor, A, speed), lists[-1].size, top).squares)
+    modes = np.array([*itertools.zip_longest(*lists[1:], fillvalue=top)])
+    brackets, steps = [], np.diff(speeds)
+    if 0 < modes[0, -1] < 1e-12 * top:
+        raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
+    for k, gaps in enumerate(modes - speeds**2):
+        slopes, signs, points = np.diff(gaps) / steps, np.sign(gaps), dict(zip(speeds, gaps, strict=True))
+        right, left = gaps[1:-2] + slopes[:-2] * steps[1:-1], gaps[2:-1] - slopes[2:] * steps[1:-1]
+        inside = np.array([gaps[2:-1], -right, -left]) * signs[1:-2]
+        for i in 1 + np.flatnonzero((inside > 0).all(axis=0)):
+            ends, args = speeds[i : i + 2], (rotor, A, k, signs[i])
+            turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * ends[1]})
+            points[turn.x] = signs[i] * turn.fun
+        for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
+            if (one > 0) != (other > 0):
+                brackets.append((b, a, k))
+    return math.sqrt(modes[0, 0]), sorted(brackets)
 
 
 def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
@@ -519,9 +493,9 @@ class Pencil:
     shaft
         All unknowns of the shaft, shape (w, size of its matrices).
     springs
-        Unknowns, shape (u,), and their Hermitian stiffness, shape (u, u).
+        Pairs of unknowns (i, j) and the stiffness between them, shape (e,) each.
     hold
-        Their sum, N/m, tilting springs as such at the end of the rotor.
+        Sum of the springs, N/m, tilting springs as such at the end of the rotor.
     rigid
         Motions that strain nothing, shape (size, r).
     """
@@ -533,7 +507,7 @@ class Pencil:
     waves: IndexArray
     tilts: IndexArray
     shaft: IndexArray
-    springs: list[tuple[IndexArray, AnyArray]]
+    springs: tuple[IndexArray, IndexArray, AnyArray]
     hold: float
     rigid: AnyArray
 
@@ -544,9 +518,12 @@ class Pencil:
 
     def energy(self, X: AnyArray) -> AnyArray:
         """Xᴴ K X, shape (m, m), summed from strains: few digits are lost."""
-        parts = [strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1]) for unknowns in self.shaft]
-        energies = [S.conj().T @ S for S in parts] + [X[u].conj().T @ k @ X[u] for u, k in self.springs]
-        return np.asarray(sum(energies))
+        i, j, k = self.springs
+        energy = (X[i].conj().T * k) @ X[j]
+        for unknowns in self.shaft:
+            S = strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1])
+            energy = energy + S.conj().T @ S
+        return energy
 
 
 def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, float] | None = None) -> Pencil:
@@ -593,49 +570,54 @@ def _pencil(
     rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, FloatArray, Pedestal | None]]
 ) -> Pencil:
     """Pencil on springs: node, stiffness in (x, y), shape (2, 2), and what they stand on."""
-    held = [spring for spring in held if spring[1].any()]
-    planes, w = len(whirls), A.deflections
-    feet = [(A.deflection(node), pedestal) for node, _, pedestal in held if pedestal]
-    order = np.append(np.arange(A.size), [at + 0.5 for at, _ in feet]).argsort(kind="stable")
+    planes, w, s = len(whirls), A.deflections, rotor.positions
+    held = [each for each in held if each[1].any()]
+    feet = [(A.deflection(node) + 0.5, pedestal.mass) for node, _, pedestal in held if pedestal]
     # Waves alternate, and a foot stands behind the deflection of its node.
+    order = np.append(np.arange(A.size), [at for at, _ in feet]).argsort(kind="stable")
     places = planes * order.argsort() + np.arange(planes)[:, None]
-    shaft, stands = places[:, : A.size], iter(range(A.size, order.size))
-    springs: list[tuple[IndexArray, AnyArray]] = []
+    entries: list[tuple[Any, ...]] = []
 
     def spring(k: FloatArray, *ends: int) -> None:
-        form = np.real_if_close((FROM_XY @ k @ TO_XY)[:planes, :planes])
-        springs.append(
-            (places[:, ends].T.ravel(), form if len(ends) < 2 else np.kron([[1, -1], [-1, 1]], form))
-        )
+        mean, differ = (k[0, 0] + k[1, 1]) / 2, (k[0, 0] - k[1, 1]) / 2 + (k[0, 1] and 1j * k[0, 1])
+        form, largest = ((mean, differ), (differ.conjugate(), mean)), abs(mean) + abs(differ)
+        for one, other in itertools.product(ends, repeat=2):
+            for a, b in itertools.product(range(planes), repeat=2):
+                entry = form[a][b] if one == other else -form[a][b]
+                entries.append((places[a, one], places[b, other], entry, entry / largest))
 
+    stands = itertools.count(A.size)
     for node, k, pedestal in held:
-        foot = [next(stands)] if pedestal else []
-        spring(k, A.deflection(node), *foot)
+        ends = [A.deflection(node)]
         if pedestal:
-            spring(np.diag(pedestal.xy("stiffness")), *foot)
-    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
-    kind = np.result_type(float, *(form for _, form in springs))
-    K, M = np.zeros((2, places.size, width + 1), kind).transpose(0, 2, 1)
-    inertia = A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
-    for off in range(A.width + 1):
-        i, j = shaft[:, : A.size - off], shaft[:, off:]
-        K[width + i - j, j], M[width + i - j, j] = A.shaft[-1 - off, off:], inertia[:, -1 - off, off:]
-    M[-1, places[:, A.size :]] = [pedestal.mass for _, pedestal in feet]
-    for u, form in springs:
-        a, b = np.nonzero(u[:, None] <= u)
-        np.add.at(K, (width + u[a] - u[b], u[b]), form[a, b])
+            ends.append(next(stands))
+            spring(np.diag(pedestal.xy("stiffness")), ends[1])
+        spring(k, *ends)
+    attached = len(entries)
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
             spring(support.tilting_stiffness * np.eye(2), A.deflection(support.node) + 1)
-    s, R = rotor.positions / rotor.positions[-1], np.zeros((places.size, 2 * planes))
+    i, j = np.array([entry[:2] for entry in entries], np.intp).reshape(-1, 2).T
+    k, alike = np.array([entry[2:] for entry in entries]).reshape(-1, 2).T
+    shaft = places[:, : A.size]
+    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
+    bands = np.zeros((2, places.size * (width + 1)), k.dtype)
+    columns, inertia = width * (1 + shaft), A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
+    for off in range(A.width + 1):
+        at, row = shaft[:, : A.size - off] + columns[:, off:], A.width - off
+        bands[0, at], bands[1, at] = A.shaft[row, off:], inertia[:, row, off:]
+    K, M = bands.reshape(2, -1, width + 1).transpose(0, 2, 1)
+    M[-1, places[:, A.size :]] = [mass for _, mass in feet]
+    for one, other, stiffness, _ in entries[:attached]:
+        if one <= other:
+            K[width + one - other, other] += stiffness
+    R = np.zeros((places.size, 2 * planes))
     for wave, row in enumerate(shaft):
-        turn = wave - planes
-        R[row[w], wave], R[row[w], turn], R[row[w + 1], turn] = 1.0, s, 1 / rotor.positions[-1]
-    energies = [(R[u].T @ form @ R[u], np.abs(form).max()) for u, form in springs]
-    hold = float(sum(np.trace(E).real for E, _ in energies)) / planes
-    values, V = np.linalg.eigh(sum((E / largest for E, largest in energies), np.zeros((2 * planes,) * 2)))
+        R[row[w], wave], R[row[w], planes + wave], R[row[w + 1], planes + wave] = 1.0, s / s[-1], 1 / s[-1]
+    values, V = np.linalg.eigh((R[i].T * alike) @ R[j])
     rigid = R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
-    return Pencil(rotor, A, K, M, shaft[:, w], shaft[:, w + 1], shaft, springs, hold, rigid)
+    hold = float((k @ (R[i] * R[j])).real.sum()) / planes
+    return Pencil(rotor, A, K, M, shaft[:, w], shaft[:, w + 1], shaft, (i, j, k), hold, rigid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -649,8 +631,6 @@ class Spectrum:
         for rigid-body modes, negative where a mode has negative mass.
     vectors
         All unknowns, scaled to |φᵀ M φ| = 1 kg, shape (size, m).
-    signs
-        The sign of φᵀ M φ, shape (m,).
     shift
         σ ≥ 0 of the matrix K + σ M that was factored; 0 for a supported rotor.
     factor
@@ -664,7 +644,6 @@ class Spectrum:
 
     squares: FloatArray
     vectors: AnyArray
-    signs: FloatArray
     shift: float
     factor: AnyArray
     rounding: FloatArray
@@ -672,14 +651,14 @@ class Spectrum:
 
     def only(self, which: slice | IndexArray) -> Spectrum:
         """Some modes."""
-        squares, signs, rounding = (array[which] for array in (self.squares, self.signs, self.rounding))
-        return replace(self, squares=squares, vectors=self.vectors[:, which], signs=signs, rounding=rounding)
+        squares, rounding = self.squares[which], self.rounding[which]
+        return replace(self, squares=squares, vectors=self.vectors[:, which], rounding=rounding)
 
     @property
     def motion(self) -> ComplexArray:
         """Amplitudes of x and y and of their slopes, shape (4, N, m)."""
-        waves = [self.vectors[unknowns] for unknowns in (self.pencil.waves, self.pencil.tilts)]
-        return np.concatenate([np.einsum("aw,wnk->ank", TO_XY[:, : len(wave)], wave) for wave in waves])
+        X = self.vectors[np.array((self.pencil.waves, self.pencil.tilts))]
+        return (TO_XY[:, : X.shape[1]] @ X.reshape(*X.shape[:2], -1)).reshape(4, *X.shape[2:])
 
 
 def finite_modes(A: Matrices | Pencil) -> int:
@@ -710,10 +689,11 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     from scipy.linalg import lapack
 
     rotor, free = pencil.rotor, pencil.rigid.shape[1] > 0
-    if not rotor.total_mass:
+    mass = rotor.total_mass
+    if not mass:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
     bending = 500 * (rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / rotor.positions[-1] ** 4
-    scale = float(bending / rotor.total_mass)
+    scale = float(bending / mass)
     pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
     for shift in (scale,) if free else (0.0,) if pencil.hold >= 1e-3 * bending else (scale, 0.0):
         U, info = pbtrf(pencil.stiffness + shift * pencil.mass)
@@ -745,33 +725,33 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     """
     pencil = pencil or one_plane(rotor, A)
     shift, U = factor(pencil)
-    R = pencil.rigid
-    free, elastic = R.shape[1], max(m - R.shape[1], 0)
-    G = R.conj().T @ multiply(pencil.mass, R)
-    if free and np.linalg.cond(G) > 1e13:
-        raise ValueError(NO_MASS)
-    fixed = (
-        np.linalg.solve(np.linalg.cholesky(G), R.conj().T).conj().T
-    )  # first the translation, then the turn
+    fixed, free = pencil.rigid, pencil.rigid.shape[1]
+    if free:
+        G = fixed.conj().T @ multiply(pencil.mass, fixed)
+        if np.linalg.cond(G) > 1e13:
+            raise ValueError(NO_MASS)
+        # First the translation, then the turn.
+        fixed = np.linalg.solve(np.linalg.cholesky(G), fixed.conj().T).conj().T
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
-    moving = _vectors(pencil, U, elastic, multiply(pencil.mass, fixed))
+    elastic = max(m - free, 0)
+    K = pencil.stiffness + shift * pencil.mass
     try:
-        L = np.linalg.inv(np.linalg.cholesky(pencil.energy(moving)))
+        moving = _vectors(pencil, K, U, elastic, multiply(pencil.mass, fixed))
+        mu, Y = _largest(moving.conj().T @ multiply(pencil.mass, moving), elastic, pencil.energy(moving))
     except np.linalg.LinAlgError:
         raise ValueError(_UNSTABLE) from None
-    mu, Y = _largest(L @ (moving.conj().T @ multiply(pencil.mass, moving)) @ L.conj().T, elastic)
-    X = np.hstack((fixed, moving @ (L.conj().T @ Y / np.sqrt(np.abs(mu)))))[:, :m]
-    signs = np.append(np.ones(free), np.sign(mu))[:m]
-    squares = np.append(np.zeros(free), 1 / mu)[:m]
+    X = np.hstack((fixed, moving @ Y / np.sqrt(np.abs(mu))))[:, :m]
+    mu = np.append(np.full(free, np.inf), mu)[:m]
+    squares = 1 / mu
     if shift:  # the softest beside stiff ones
-        squares = signs * pencil.energy(X).diagonal().real * (np.arange(m) >= free)
-    rounding = rounding_error(pencil.stiffness + shift * pencil.mass, X, np.abs(squares + shift))
+        squares = np.sign(mu) * pencil.energy(X).diagonal().real * (np.arange(m) >= free)
+    rounding = rounding_error(K, X, np.abs(squares + shift))
     if rounding.max(initial=0.0) > 1e-2:
         raise ValueError(
             f"the mesh of {rotor.n_elements} elements is too fine for float64: join neighbouring elements, "
             "50 to 200 are ample for a rotor"
         )
-    return Spectrum(squares, X, signs, shift, U, rounding, pencil)
+    return Spectrum(squares, X, shift, U, rounding, pencil)
 
 
 def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
@@ -785,49 +765,63 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
     )
 
 
-def _largest(T: AnyArray, m: int) -> tuple[FloatArray, AnyArray]:
-    """The m eigenvalues of largest size, and their vectors."""
-    mu, Q = np.linalg.eigh(T)
+def _largest(
+    T: AnyArray, m: int, energy: AnyArray | None = None, ends: tuple[int, int] | None = None
+) -> tuple[FloatArray, AnyArray]:
+    """The m eigenvalues of largest size, of those at `ends` if given, and their vectors of energy 1."""
+    from scipy.linalg import eigh
+
+    mu, Q = np.linalg.eigh(T) if energy is None else eigh(T, energy, subset_by_index=ends, check_finite=False)
     order = np.argsort(-np.abs(mu), kind="stable")[:m]
     return mu[order], Q[:, order]
 
 
-def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> AnyArray:
+def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) -> AnyArray:
     """U⁻¹ times eigenvectors of U⁻ᴴ M U⁻¹ of the largest eigenvalues: m, and one that may be less exact.
 
     None of them is a rigid motion: `rigid` is M times these.
     """
     from scipy.linalg import lapack
 
-    tbtrs, adjoint = (lapack.ztbtrs, "C") if np.iscomplexobj(U) else (lapack.dtbtrs, "T")
+    real = np.isrealobj(U)
+    tbtrs, adjoint = (lapack.dtbtrs, "T") if real else (lapack.ztbtrs, "C")
+    geqrf, orgqr = (lapack.dgeqrf, lapack.dorgqr) if real else (lapack.zgeqrf, lapack.zungqr)
     size, block = pencil.size, 4  # equal frequencies are not missed
     most = min(m + 1, size - rigid.shape[1])
 
-    def operator(V: AnyArray) -> AnyArray:
-        W = tbtrs(U, V)[0]
-        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
+    def inertia(W: AnyArray) -> AnyArray:
+        loads = multiply(pencil.mass, W)
+        if rigid.size:
+            loads = loads - rigid @ (rigid.conj().T @ W)
         return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
 
+    def operator(V: AnyArray) -> AnyArray:
+        return inertia(tbtrs(U, V)[0])
+
+    def orthonormal(Z: AnyArray) -> tuple[AnyArray, AnyArray]:
+        packed, tau, *_ = geqrf(Z)
+        return orgqr(packed, tau)[0], np.triu(packed[:block])
+
     if size > DENSE:
-        V = np.random.default_rng(0).standard_normal((block, size)).astype(U.dtype).T
-        V = np.linalg.qr(operator(operator(V)))[0]
-        basis = image = V[:, :0]
-        residual = np.inf
-        while basis.shape[1] < size / 2 - block:
+        # Smooth loads, which differ from one to the other wave.
+        s = np.linspace(1, 2, size) * (1 + np.arange(size) % len(pencil.waves))
+        V = operator(inertia(np.cos(np.outer(np.arange(block), s)).astype(U.dtype).T))
+        V, residual = orthonormal(V)[0], np.inf
+        spaces = np.empty((2, size // 2, size), U.dtype).swapaxes(1, 2)
+        for k in range(block, size // 2, block):
             Z = operator(V)
-            basis, image = np.hstack((basis, V)), np.hstack((image, Z))
+            spaces[:, :, k - block : k] = V, Z
+            basis, image = spaces[:, :, :k]
             for _ in range(2):
                 Z = Z - basis @ (basis.conj().T @ Z)
-            V, beta = np.linalg.qr(Z)
-            if basis.shape[1] < 2 * m + block:
+            V, beta = orthonormal(Z)
+            if k < 2.5 * m + 6:
                 continue
             mu, Q = _largest(basis.conj().T @ image, most)
             # What the operator adds outside the basis; on fine meshes rounding stops it before the tolerance.
             outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / np.abs(mu[:m])
             last, residual = residual, outside.max(initial=0.0)
-            if residual < 3e-10 or last / 3 < residual < 1e-5:
-                return np.asarray(tbtrs(U, basis @ Q)[0])
-    T = dense(pencil.mass) - rigid @ rigid.conj().T
-    for _ in range(2):
-        T = tbtrs(U, T, trans=adjoint)[0].conj().T
-    return np.asarray(tbtrs(U, _largest(T, most)[1])[0])
+            if residual < 1e-9 or last / 3 < residual < 1e-5:
+                return np.asarray(tbtrs(U, image @ Q)[0])
+    ends = None if pencil.matrices.gyroscopic.any() else (size - most, size - 1)  # only M - G may be negative
+    return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]

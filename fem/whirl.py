@@ -3,8 +3,8 @@
 λ² M + λ D(Ω) + K(Ω) of both planes (see `assembly`) is solved in one basis of the shaft for all speeds.
 
 Basis. Let K₀ be the stiffness of the rotor on springs like its supports, σ ≥ 0, and Uᵀ U = K₀ + σ M. The
-basis begins with the static answers to the inertia of the lowest modes of K₀ and to unit forces at the
-supports, so that no force of a support is ever missing. For a pair (λ, x) of the reduced equations the shaft
+basis begins with the static answers to unit forces at the supports, so that no force of a support is ever
+missing, and to the inertia of the lowest modes of K₀. For a pair (λ, x) of the reduced equations the shaft
 is left with the loads
 
     r = (λ² − σ) M x + λ B x + Ω J (λ G + B) x,      J (x, y) = (y, −x), or −i of z = x + i y,
@@ -12,8 +12,9 @@ is left with the loads
 as far as the basis does not answer them: with e the part of U⁻ᵀ r outside of its images U x, the relative
 error of λ is about |e|² / (xᴴ K₀ x + |λ|² xᴴ M x), of second order as that of a Rayleigh quotient. Vectors
 have xᴴ K₀ x ≈ 1, images are orthonormal (in them low modes keep their digits), and |e|² is the estimate.
-Where it is too large the largest directions of all such e join the basis: they are static answers to
-gyroscopic loads, to the inertia of the support vectors, to material damping that differs along the shaft.
+Where it is too large, the vectors corrected by their e, at a few speeds, are spanned by as few directions as
+leave out 0.8 of the tolerance of none of them: these take the place of the modes. If that is not enough, the
+largest directions of the new e join them.
 
 Eigenvalues. With λ = σ + 1/μ the problem is μ² K_σ + μ D_σ + M with K_σ = K + σ D + σ² M and
 D_σ = D + 2 σ M: the slowest modes are the largest μ, and mass may be zero. σ > 0 leaves room for rigid-body
@@ -26,32 +27,30 @@ Small real parts. With λ = ς + iω the imaginary part of xᴴ (λ² M + λ D +
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.result import Result
 from fem.rotor import Rotor, Support
-from fem.undamped import Result, Spectrum, finite_modes, lowest_modes
+from fem.undamped import Spectrum, finite_modes, lowest_modes
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
-from rotorid.base.tables import Column, Table, frame
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 GROWTH = 1e-14
 """Re λ / |λ| above which a mode grows: rounding of what damps and drives it."""
 NONE = complex(np.nan, np.nan)
 """No mode: neither part of it may pass for a number."""
-_TOLERANCE = 6e-9  # of eigenvalues, relative to their size
-_FEW = 8  # speeds, about, for which the basis is made first
+_TOLERANCE = 8e-9  # of eigenvalues, relative to their size
+_FEW = 3  # speeds, about, for which the basis is made first
 _SHIFT = 0.3  # σ in units of the reference frequency
 _STILL = 1e-6  # |λ| below this part of the reference frequency is a rigid-body motion
 _REAL = 0.1  # |Im λ| below this part of |λ| is no oscillation: log decrement above 62
@@ -188,7 +187,10 @@ def _answers(
 ) -> ComplexArray:
     """(λ² M + λ D + K)⁻¹ of loads (S, m, R) beside values λ (S, m)."""
     lam = values[..., None, None] * (1 + 1e-14)  # beside an eigenvalue, where the matrix is singular
-    dynamic = lam * (lam * M + D[:, None]) + K[:, None]
+    dynamic = lam * M
+    dynamic += D[:, None]  # in place, as they are many
+    dynamic *= lam
+    dynamic += K[:, None]
     loads = np.broadcast_to(loads, dynamic.shape[:-1])[..., None]
     try:
         return np.asarray(np.linalg.solve(dynamic, loads)[..., 0])
@@ -199,6 +201,9 @@ def _answers(
 
 def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray) -> ComplexArray:
     """Values (S, m) whose small real parts have the digits of what damps and drives them."""
+    quiet = np.abs(values.real) < _QUIET * np.abs(values)
+    if not quiet.any():
+        return values
 
     def form(A: AnyArray, sign: int) -> ComplexArray:
         part = A + sign * np.swapaxes(A.conj(), -1, -2)
@@ -207,7 +212,6 @@ def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: C
     omega = values.imag
     power = omega * form(D, 1).real + form(K, -1).imag
     inertia = 2 * omega * form(M, 1).real + form(D, -1).imag
-    quiet = np.abs(values.real) < _QUIET * np.abs(values)
     return np.where(quiet, 1j * omega - power / inertia, values)
 
 
@@ -244,20 +248,16 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
 
 
 def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
-    """Modes of the rotor on supports as at the middle speed, without pedestals, and its lowest frequency.
+    """The m lowest modes of a plane on supports as at the middle speed, without pedestals; their scale.
 
     Parameters
     ----------
-    P
-        The rotor as both planes see it.
-    speeds
-        rad/s, shape (S,).
-    m
-        How many modes.
+    P, speeds, m
+        As in `solve_whirl`, m of one plane.
 
     Returns
     -------
-    The modes of one plane, and the lowest frequency that is not 0, rad/s.
+    The modes, and the lowest frequency that is not 0, rad/s.
     """
     K, _ = P.supports(speeds[speeds.size // 2, None])
     springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
@@ -271,11 +271,11 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
 
 
 def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m: int) -> Whirl:
-    """The same in a basis that begins with modes, and grows for a few speeds, then for all."""
+    """The same in a basis that is made for a few speeds, then for all."""
     from scipy.linalg.lapack import dtbtrs
 
-    A, U = P.A, spectrum.factor
-    loads = np.hstack((multiply(A.mass, spectrum.vectors), np.eye(A.size)[:, P.rows]))
+    A, U, kept = P.A, spectrum.factor, P.rows.size
+    loads = np.hstack((np.eye(A.size)[:, P.rows], multiply(A.mass, spectrum.vectors)))
     Y = np.linalg.qr(dtbtrs(U, loads, trans="T")[0])[0]
     some = speeds[:: -1 - speeds.size // _FEW][::-1]  # with the last, where gyroscopic loads are largest
     while True:
@@ -284,28 +284,30 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
         images = dtbtrs(U, loads, trans="T")[0]
         outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
         whirl = solve(Q, some, m, scale)
-        left = _loads(whirl, spectrum.shift) @ triangle.T
-        errors = (left**2).sum(axis=(2, 3))
-        wrong = (errors > _TOLERANCE) & (Y.shape[1] < A.size)
-        if wrong.any():
-            columns = left[wrong].reshape(-1, len(triangle))
-            sizes, directions = np.linalg.eigh(columns.T @ columns)
-            new = outside @ directions[:, np.cumsum(sizes) > 0.9 * _TOLERANCE]
-            Y = np.hstack((Y, new - Y @ (Y.T @ new)))
+        x, r = _vectors_and_loads(whirl, spectrum.shift)
+        missing = -r @ triangle.T
+        error = float((np.abs(missing) ** 2).sum(axis=(2, 3)).max())
+        if error > _TOLERANCE and Y.shape[1] < A.size:
+            parts = np.concatenate((x[..., kept:], missing), axis=3)
+            columns = parts.reshape(-1, parts.shape[3])
+            directions = np.linalg.eigh((columns.conj().T @ columns).real)[1]
+            dropped = (np.abs(parts @ directions) ** 2).sum(axis=2).cumsum(axis=2).max(axis=(0, 1))
+            new = np.hstack((Y[:, kept:], outside)) @ directions[:, dropped > 0.8 * _TOLERANCE]
+            Y = np.linalg.qr(np.hstack((Y[:, :kept], new)))[0]
+            kept = Y.shape[1]
         elif some.size < speeds.size:
             some = speeds
         else:
-            return replace(whirl, error=float(errors.max()))
+            return replace(whirl, error=error)
 
 
-def _loads(whirl: Whirl, shift: float) -> FloatArray:
-    """The loads r: factors of M, G and B times the basis, shape (S, m, real and imaginary planes, 3 d)."""
+def _vectors_and_loads(whirl: Whirl, shift: float) -> tuple[ComplexArray, ComplexArray]:
+    """Shaft vectors x, and the factors of M, G and B times the basis in r, (S, m, planes, d or 3 d)."""
     p, d = whirl.Q.P.planes, whirl.Q.basis.shape[1]
     lam, speed = np.nan_to_num(whirl.values)[..., None, None], whirl.speeds[:, None, None, None]
     x = np.nan_to_num(whirl.vectors)[..., : p * d].reshape(*whirl.values.shape, p, d)
     turned = speed * (np.array([[-1j]] if p == 1 else [[0.0, 1.0], [-1.0, 0.0]]) @ x)
-    r = np.concatenate(((lam * lam - shift) * x, lam * turned, lam * x + turned), axis=3)
-    return np.concatenate((r.real, r.imag), axis=2)
+    return x, np.concatenate(((lam * lam - shift) * x, lam * turned, lam * x + turned), axis=3)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -378,10 +380,6 @@ class WhirlModes(Result):
             Column("log dec", self.log_decrements, "{:z.4f}".format, "log_decrements.*"),
         )
         return (Table("whirl modes", columns),)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per mode: number, direction, frequency in rpm and rad/s, log decrement."""
-        return frame(self.tables()[0])
 
     def sentence(self) -> str:
         """How many modes there are at this speed, and which of them decays least."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import cycle, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
+from fem.result import NORMAL_95
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -69,19 +71,18 @@ def draw_campbell(
     Where a mode is heavily damped its line is pale. The range of operating speeds, rad/s, is shaded, and 95 %
     of the frequencies of a calibrated rotor.
     """
-    ax = new_axes((WIDTH, 4.8)) if ax is None else ax
-    frequencies = campbell.frequencies * RPM
+    ax = ax or new_axes((WIDTH, 4.8))
+    speeds, frequencies = campbell.speeds * RPM, campbell.frequencies * RPM
     top = 1.15 * float(np.nanmax(frequencies, initial=1e-9))
-    end = min(campbell.speeds.max() * RPM, top)
+    end = min(speeds.max(), top)
     _draw_curves(ax, campbell, frequencies)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
     if campbell.std is not None:
-        half = 1.96 * RPM * campbell.std
-        shade_bands(ax, campbell.speeds * RPM, frequencies, half, cycle(COLORS))
+        shade_bands(ax, speeds, frequencies, NORMAL_95 * RPM * campbell.std, cycle(COLORS))
     note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top", fontsize=11)
     if campbell.criticals:
-        _mark_criticals(ax, [(speed * RPM, decrement) for speed, decrement in campbell.criticals], top)
+        _mark_criticals(ax, campbell.criticals, top)
     for way in np.unique(campbell.direction[np.isfinite(frequencies)]):
         ax.plot([], [], color=QUIET, label=f"{DIRECTION_NAMES[way]} whirl", **_STYLES[way])
     if (campbell.log_decrements > campbell.heavy).any():
@@ -106,7 +107,7 @@ def draw_log_decrements(campbell: Campbell, ax: Axes, operating: tuple[float, fl
     low = max(1.2 * np.nanmin(decrements, initial=-0.1 * high), -_HIGHEST)
     ax.set(ylim=(low, high), xlabel="speed, rpm", ylabel="logarithmic decrement")
     ax.axhline(0.0, color="black", linewidth=1.1)
-    ax.axhspan(low, 0.0, facecolor=VERMILION, alpha=0.10, hatch="///", edgecolor=VERMILION, linewidth=0)
+    ax.axhspan(low, 0.0, color=VERMILION, alpha=0.10, hatch="///", linewidth=0)
     note(ax, "unstable", (0.01, 0.02), xycoords="axes fraction", color=WARNING)
     plain(ax)
     shade_operating(ax, operating)
@@ -120,19 +121,18 @@ def draw_speed_map(
 
     Speeds that are not positive are left out; the range of operating speeds, rad/s, is shaded.
     """
-    ax = new_axes((WIDTH, 5)) if ax is None else ax
+    ax = ax or new_axes((WIDTH, 5))
     for mode, curve in enumerate(chart.speeds.T):
         speeds = np.where(curve > 0, curve * RPM, np.nan)
         ax.plot(chart.stiffness, speeds, linewidth=2, label=f"critical speed {mode + 1}", **look(mode))
     ax.set(xscale="log", yscale="log")
-    for i, (name, stiffness, speeds) in enumerate(chart.own):
+    for (name, stiffness, speeds), marker in zip(chart.own, cycle(MARKERS), strict=False):
         style: dict[str, Any] = {"label": name, "color": DARK, "linestyle": ":", "linewidth": 1.3}
         if speeds.size:
-            style |= {"marker": MARKERS[i % len(MARKERS)], "markerfacecolor": "white", "scaley": False}
-            ax.plot(stiffness, speeds * RPM, **style)
+            ax.plot(stiffness, speeds * RPM, marker=marker, markerfacecolor="white", scaley=False, **style)
         else:
             ax.axvline(stiffness[0], **style)
-    if operating is not None:
+    if operating:
         first, last = operating
         ax.axhspan(first * RPM, last * RPM, color="black", alpha=0.07, linewidth=0, label="operating range")
     ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm (both log)")
@@ -148,31 +148,29 @@ def _draw_curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
     """Curves in stretches of one direction and of light or heavy damping; the mode's number at the end."""
     speeds, S = campbell.speeds * RPM, campbell.speeds.size
     step, last = max(S // 8, 1), speeds[-1]
-    for k, (way, curve) in enumerate(zip(campbell.direction.T, values.T, strict=True)):
-        color, heavy = COLORS[k % len(COLORS)], campbell.log_decrements[:, k] > campbell.heavy
-        breaks = np.flatnonzero(np.diff(2 * way + heavy)) + 1
+    opaque = np.where(campbell.log_decrements > campbell.heavy, _PALE, 1.0)
+    for k, (way, alpha, curve) in enumerate(zip(campbell.direction.T, opaque.T, values.T, strict=True)):
+        color = COLORS[k % len(COLORS)]
+        breaks = np.flatnonzero(np.diff(2 * way + alpha)) + 1
         for start, stop in pairwise([0, *breaks, S]):
             part = slice(start, stop + 1)  # reaches to the next stretch: the curve has no gaps
-            ax.plot(speeds[part], curve[part], color=color, linewidth=1.8, alpha=_PALE if heavy[start] else 1,
+            ax.plot(speeds[part], curve[part], color=color, linewidth=1.8, alpha=alpha[start],
                     markevery=(3 * k % step, step), **_STYLES[way[start]])  # fmt: skip
-        if np.isfinite(curve[-1]):
-            note(ax, str(k + 1), (last, curve[-1]), (5 + 9 * (k % 4), 0), va="center", color=color,
-                 fontweight="bold", annotation_clip=True)  # fmt: skip
+        note(ax, str(k + 1), (last, curve[-1]), (5 + 9 * (k % 4), 0), va="center", color=color,
+             fontweight="bold", annotation_clip=True)  # fmt: skip
     ax.set_xlim(0.0, 1.12 * last or 1.0)
 
 
-def _mark_criticals(ax: Axes, criticals: list[tuple[float, float]], top: float) -> None:
+def _mark_criticals(ax: Axes, criticals: Sequence[tuple[float, float]], top: float) -> None:
     """Circles with speed, rpm, and logarithmic decrement: below the 1× line in its first part, then above."""
-    speeds = [speed for speed, _ in criticals]
+    speeds = [speed * RPM for speed, _ in criticals]
     ax.plot(speeds, speeds, "o", color="black", markerfacecolor="#F0E442", markersize=9, zorder=6,
             label="damped critical speed")  # fmt: skip
     middle = np.mean(ax.get_xlim())
     for side, ha, va in ((-1, "left", "top"), (1, "right", "bottom")):
         height = -np.inf
-        for speed, decrement in sorted(criticals, key=lambda one: side * one[0]):
+        for speed, (_, decrement) in sorted(zip(speeds, criticals, strict=True))[::side]:
             if side * (speed - middle) >= 0:
                 height = max(side * speed, height + 0.05 * top)  # away from the last one's words
-                words = f"{speed:.0f} rpm, δ = {decrement:z.2f}"
-                note(
-                    ax, words, (speed, side * height), (-9 * side, 5 * side), ha=ha, va=va, bbox=BOX, zorder=7
-                )
+                words, at = f"{speed:.0f} rpm, δ = {decrement:z.2f}", (speed, side * height)
+                note(ax, words, at, (-9 * side, 5 * side), ha=ha, va=va, bbox=BOX, zorder=7)

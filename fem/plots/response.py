@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from fem.orbits import DIRECTION_NAMES, orbits
 from fem.peaks import smooth_curves
 from fem.plots.rotor import draw_rotor
+from fem.result import NORMAL_95
 from fem.rotor import SensorLike, as_sensor, label
 from fem.stability import Window, within
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
@@ -66,7 +67,7 @@ def draw_response(
         nodes = list(dict.fromkeys([*named, int(response.nodes[np.argmax(largest)])]))
     labels = [f"node {node}" for node in nodes]
     curves = 1e6 * response.major[:, [response.column(node) for node in nodes]]
-    return _amplitudes(ax, response.speeds, curves, labels, "amplitude, µm peak", response.windows)
+    return _amplitudes(ax, response, curves, labels, "amplitude, µm peak")
 
 
 def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
@@ -75,7 +76,7 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
         f"sensor {label(sensor)}, plane {plane}" for sensor in influence.sensors for plane in influence.planes
     ]
     W = influence.W.reshape(-1, len(labels))
-    return _amplitudes(ax, influence.speeds, W, labels, "influence, µm per g·mm", influence.windows)
+    return _amplitudes(ax, influence, W, labels, "influence, µm per g·mm")
 
 
 def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
@@ -85,12 +86,11 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
     grid = figure.add_gridspec(1 + len(names), 2)
     draw_rotor(rotor, figure.add_subplot(grid[0, :]), planes=influence.planes, sensors=influence.sensors)
     labels = [f"plane {plane}" for plane in influence.planes]
-    speeds, windows = influence.speeds, influence.windows
     for c, name in enumerate(names):
         sizes, phases = (figure.add_subplot(grid[1 + c, k]) for k in (0, 1))
         W, words = influence.W[:, c], f"sensor {name}\nµm per g·mm"
-        _amplitudes(sizes, speeds, W, labels, words, windows).legend_ = None
-        _phases(phases, speeds, W, labels, windows)
+        _amplitudes(sizes, influence, W, labels, words).legend_ = None
+        _phases(phases, influence, W, labels)
     legend_below(figure, (sizes,), 3)
     return figure
 
@@ -123,10 +123,10 @@ def bode_figure(
     omega, Z, labels = response.speeds, response.readings(sensors), [str(label(each)) for each in sensors]
     shade_operating(above, operating)
     shade_operating(below, operating)
-    _amplitudes(above, omega, 1e6 * Z, labels, "amplitude, µm peak", response.windows).set_xlabel("")
-    _phases(below, omega, Z, labels, response.windows)
+    _amplitudes(above, response, 1e6 * Z, labels, "amplitude, µm peak").set_xlabel("")
+    _phases(below, response, Z, labels)
     if std is not None:
-        middle, half = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan), 1.96 * 1e6 * std
+        middle, half = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan), NORMAL_95 * 1e6 * std
         shade_bands(above, omega * RPM, middle, half, cycle(COLORS))
         above.set_ylim(top=np.nanmax(middle + half, initial=above.get_ylim()[1]))
     for k, each in enumerate(peaks):
@@ -276,15 +276,14 @@ def right_angles(ax: Axes) -> MultipleLocator:
 
 def _over_speed(
     ax: Axes,
-    speeds: FloatArray,
+    result: Response | InfluenceCoefficients,
     readings: AnyArray,
     labels: Sequence[str],
-    windows: Sequence[Window],
     value: Callable[[AnyArray], FloatArray],
 ) -> None:
     """A value of the readings, shape (S, C), over speed, where there is a steady state and motion."""
-    order = np.argsort(speeds, kind="stable")
-    omega = speeds[order]
+    order, windows = np.argsort(result.speeds, kind="stable"), result.windows
+    omega = result.speeds[order]
     for k, (reading, name) in enumerate(zip(readings[order].T, labels, strict=True)):
         there, curve = ~within(windows, omega) & (reading != 0), np.full(omega.size, np.nan)
         curve[there] = value(reading[there])
@@ -297,15 +296,14 @@ def _over_speed(
 
 def _amplitudes(
     ax: Axes | None,
-    speeds: FloatArray,
+    result: Response | InfluenceCoefficients,
     readings: AnyArray,
     labels: Sequence[str],
     ylabel: str,
-    windows: Sequence[Window],
 ) -> Axes:
     """Sizes over speed, in logarithms where they span much, with a legend above."""
     ax = new_axes() if ax is None else ax
-    _over_speed(ax, speeds, readings, labels, windows, np.abs)
+    _over_speed(ax, result, readings, labels, np.abs)
     least, most = ax.dataLim.minposy, ax.dataLim.y1
     if most > 30 * least:
         ax.set(yscale="log", ylim=(max(least / 2, 1e-6 * most), None))
@@ -317,9 +315,9 @@ def _amplitudes(
 
 
 def _phases(
-    ax: Axes, speeds: FloatArray, readings: ComplexArray, labels: Sequence[str], windows: Sequence[Window]
+    ax: Axes, result: Response | InfluenceCoefficients, readings: ComplexArray, labels: Sequence[str]
 ) -> None:
-    _over_speed(ax, speeds, readings, labels, windows, _lag)
+    _over_speed(ax, result, readings, labels, _lag)
     ax.set_ylabel("phase (lead), degrees")
     ax.yaxis.set_major_locator(right_angles(ax))
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.forces import NodeForce, kind_of
-from fem.rotor import Rotor, SensorLike, Support, as_sensor, label
+from fem.forces import kind_of
+from fem.rotor import Rotor, SensorLike, as_sensor, label
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.plot_style import (
     COLORS,
@@ -72,18 +73,18 @@ def draw_rotor(
     ValueError
         If a plane or sensor is no node of the rotor.
     """
-    at_planes = np.array([rotor.node(plane) for plane in planes], int) - 1
-    at_sensors = np.array([rotor.node(as_sensor(sensor, rotor).node) for sensor in sensors], int) - 1
-    ax = new_axes((WIDTH, 2.8)) if ax is None else ax
+    at_planes = [rotor.node(plane) - 1 for plane in planes]
+    at_sensors = [rotor.node(as_sensor(sensor, rotor).node) - 1 for sensor in sensors]
+    ax = ax or new_axes((WIDTH, 2.8))
     positions, outside = rotor.positions, surface(rotor)
-    scale = 1e3 if height is None else height / outside.max()
+    top = 1e3 * outside.max() if height is None else height
+    scale = top / outside.max()
     at, mass, radius, width = _discs(rotor)
     points, width = radius == 0, np.maximum(width, 0.004 * positions[-1])
-    words = f"disc, {_kg(mass[~points])}"
     for left, length, diameter, color, layer, name in (
         (positions[:-1], rotor.length, rotor.outer_diameter, "#d9dde3", 1.0, ""),
         (positions[:-1], rotor.length, rotor.inner_diameter, "white", 1.5, ""),
-        (positions[at] - width / 2, width, 2 * radius, "#aab3bf", 0.8, words),
+        (positions[at] - width / 2, width, 2 * radius, "#aab3bf", 0.8, f"disc, {_kg(mass[~points])}"),
     ):
         if (there := diameter > 0).any():
             d = scale * diameter[there]
@@ -97,19 +98,24 @@ def draw_rotor(
     ax.margins(x=0.02)
     ax.spines[["top", "right"]].set_visible(False)
     if height is None:
-        top = scale * outside.max()
         ax.set(xlabel="position, m", ylabel="radius, mm", ylim=(-2.2 * top, 2.0 * top))
     low, high = ax.get_ylim()
-    inside = 0.2 * (high - low)
-    if planes:
-        end = high - inside
-        _mark(ax, positions[at_planes], np.full(len(planes), -end), end, planes, label="correction plane",
-              color=COLORS[1], linestyle=(0, (5, 2, 1, 2)))  # fmt: skip
+    inside, below = 0.2 * (high - low), -scale * outside[at_sensors]
+    above = np.full(len(planes), inside - high)
+    for words, names, nodes, starts, end, color, line in (
+        ("correction plane", planes, at_planes, above, high - inside, COLORS[1], (0, (5, 2, 1, 2))),
+        ("sensor", [*map(label, sensors)], at_sensors, below, low + inside, COLORS[0], "-"),
+    ):
+        if nodes:
+            ax.vlines(positions[nodes], starts, end, label=words, color=color, linestyle=line, linewidth=1.2,
+                      zorder=5)  # fmt: skip
+        for row, k in enumerate(np.argsort(nodes)):
+            shift = np.copysign(12 if row % 2 and len(nodes) > 4 else 2, end)  # of many in two rows
+            va = "bottom" if end > 0 else "top"
+            note(ax, str(names[k]), (positions[nodes[k]], end), (0, shift), ha="center", va=va, color=color)
     if sensors:
-        x, below = positions[at_sensors], -scale * outside[at_sensors]
-        names = [label(sensor) for sensor in sensors]
-        _mark(ax, x, below, low + inside, names, label="sensor", color=COLORS[0])
-        ax.scatter(x, below, marker="^", s=46, color=COLORS[0], edgecolor="white", linewidth=0.6, zorder=5.5)
+        ax.scatter(positions[at_sensors], below, marker="^", s=46, color=COLORS[0], edgecolor="white",
+                   linewidth=0.6, zorder=5.5)  # fmt: skip
     if height is None and ax.get_legend_handles_labels()[0]:
         legend_above(ax, marker_scale=0.7)
     return ax
@@ -119,13 +125,12 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
     """Draw mode shapes, each to its largest value 1, over the rotor with its supports and masses."""
     ax = _over_rotor(modes.rotor, ax, 1.0, "deflection, largest = 1")
     x, curves = smooth_shapes(modes)
-    ways = zip(modes.frequencies, modes.direction, curves.T, strict=True)
-    for k, (omega, way, curve) in enumerate(ways):
-        words = f"{k + 1}: {omega * RPM:.5g} rpm = {omega:.5g} rad/s" if omega else f"{k + 1}: rigid body"
+    for k, (omega, way) in enumerate(zip(modes.frequencies, modes.direction, strict=True)):
+        words = f"{omega * RPM:.5g} rpm = {omega:.5g} rad/s" if omega else "rigid body"
         if omega and way != "forward":
             words += f", {way}"
-        shape = curve / np.abs(curve).max()
-        ax.plot(x, shape, label=words, linewidth=2.2, zorder=5, **look(k, x.size))
+        shape = curves[:, k] / np.abs(curves[:, k]).max()
+        ax.plot(x, shape, label=f"{k + 1}: {words}", linewidth=2.2, zorder=5, **look(k, x.size))
     legend_above(ax, 2, marker_scale=0.6)
     return ax
 
@@ -150,22 +155,21 @@ def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> 
     The longer half axis of each node's orbit, µm peak, times the cosine of its phase less that of the node
     that moves most, over the rotor.
     """
-    size, phase = 1e6 * response.major[k], np.angle(response.amplitudes[k])
+    size, phase, rotor = 1e6 * response.major[k], np.angle(response.amplitudes[k]), response.rotor
     shape = size * np.cos(phase - phase[np.argmax(size)])
     words = f"deflection at {response.speeds[k] * RPM:.0f} rpm, µm peak"
-    ax = _over_rotor(response.rotor, ax, float(size.max()), words)
-    ax.plot(
-        response.rotor.positions[response.nodes - 1], shape, "o-", color=COLORS[0], markersize=4, zorder=5
-    )
+    ax = _over_rotor(rotor, ax, float(size.max()), words)
+    ax.plot(rotor.positions[response.nodes - 1], shape, "o-", color=COLORS[0], markersize=4, zorder=5)
     legend_above(ax, 2, marker_scale=0.6)
     return ax
 
 
 def draw_deflection(deflection: StaticDeflection, ax: Axes | None = None) -> Axes:
     """Draw the static deflection in x and y along the rotor; return the axes."""
-    ax = new_axes((WIDTH, 3.2)) if ax is None else ax
+    ax = ax or new_axes((WIDTH, 3.2))
     positions = deflection.rotor.positions
-    for k, (name, values) in enumerate((("x", deflection.x), ("y", deflection.y))):
+    for k, name in enumerate("xy"):
+        values = getattr(deflection, name)
         if values.any():
             ax.plot(positions, 1e6 * values, label=name, **look(k, positions.size))
     ax.set(xlabel="position, m", ylabel="static deflection, µm")
@@ -176,8 +180,8 @@ def draw_deflection(deflection: StaticDeflection, ax: Axes | None = None) -> Axe
 
 def radii(rotor: Rotor) -> FloatArray:
     """Radius of the shaft at each node, the larger of its two elements, m, shape (N,)."""
-    left, right = np.insert(rotor.outer_diameter, 0, 0.0), np.append(rotor.outer_diameter, 0.0)
-    return np.asarray(np.maximum(left, right) / 2)
+    beside = np.pad(rotor.outer_diameter, 1)
+    return np.maximum(beside[:-1], beside[1:]) / 2
 
 
 def surface(rotor: Rotor) -> FloatArray:
@@ -202,49 +206,25 @@ def _kg(masses: FloatArray) -> str:
 
 def _over_rotor(rotor: Rotor, ax: Axes | None, largest: float, ylabel: str) -> Axes:
     """Axes for curves up to this size over the rotor as scenery."""
-    ax = new_axes() if ax is None else ax
-    draw_rotor(rotor, ax, height=0.22 * largest)
+    ax = draw_rotor(rotor, ax or new_axes(), height=0.22 * largest)
     ax.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
     ax.set(xlabel="position, m", ylabel=ylabel, ylim=(-1.12 * largest, 1.12 * largest))
     return ax
 
 
-def _mark(
-    ax: Axes,
-    x: FloatArray,
-    start: FloatArray,
-    end: float,
-    names: Sequence[str | int],
-    **style: Any,  # noqa: ANN401  of matplotlib
-) -> None:
-    """Lines to names above or below the rotor, of many in two rows."""
-    ax.vlines(x, start, end, linewidth=1.2, zorder=5, **style)
-    for row, k in enumerate(np.argsort(x)):
-        shift = np.copysign(2 + 10 * (row % 2 if len(x) > 4 else 0), end)
-        va = "bottom" if end > 0 else "top"
-        note(ax, str(names[k]), (x[k], end), (0, shift), ha="center", va=va, color=style["color"])
-
-
-def _looks(item: Support | NodeForce) -> str:
-    """What a support or a force is drawn as, in words."""
-    if isinstance(item, NodeForce):
-        return kind_of(item).replace("_", " ")
-    return f"{'damped ' if item.damped else ''}{item.kind}{' on pedestal' if item.pedestal else ''}"
-
-
 def _draw_supports(rotor: Rotor, ax: Axes, scale: float) -> None:
     """Bearings, seals and forces that are not linear; those that look alike have one name."""
-    groups: dict[str, list[int]] = {}
-    items: list[Support | NodeForce] = [*rotor.supports, *rotor.forces]
-    for item in items:
-        groups.setdefault(_looks(item), []).append(item.node - 1)
-    for number, (words, at) in enumerate(groups.items()):
+    groups = defaultdict(list)
+    for s in rotor.supports:
+        words = f"{'damped ' if s.damped else ''}{s.kind}{' on pedestal' if s.pedestal else ''}"
+        groups[words].append(s.node - 1)
+    for force in rotor.forces:
+        groups[kind_of(force).replace("_", " ")].append(force.node - 1)
+    for number, (words, at) in enumerate(groups.items(), start=4):
         seal, holds = "seal" in words, "bearing" in words or "film" in words
+        sides, radius = ((-1, 1), surface(rotor)) if seal else ((-1,), radii(rotor))
         marker: Any = _TIP if holds else "s" if seal else "D"
-        color = DARK if words.startswith("bearing") else COLORS[(4 + number) % len(COLORS)]
-        style = {"marker": marker, "s": 200 if holds else 60, "facecolor": color, "edgecolor": "black",
-                 "linewidth": 1.8 if "pedestal" in words else 1.0, "zorder": 4}  # fmt: skip
-        x, radius = rotor.positions[at], scale * (surface(rotor) if seal else radii(rotor))[at]
-        ax.scatter(x, -radius, label=words, **style)
-        if seal:
-            ax.scatter(x, radius, **style)
+        color = DARK if words.startswith("bearing") else COLORS[number % len(COLORS)]
+        ax.scatter(np.tile(rotor.positions[at], len(sides)), scale * np.outer(sides, radius[at]), label=words,
+                   marker=marker, s=200 if holds else 60, facecolor=color, edgecolor="black",
+                   linewidth=1.8 if "pedestal" in words else 1.0, zorder=4)  # fmt: skip

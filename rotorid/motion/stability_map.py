@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.forces import short_film
+from fem.forces import law
 from rotorid.base.arrays import FloatArray
 
 
@@ -45,7 +45,7 @@ def always_stable_above() -> float:
 def _whirl(e: float) -> tuple[float, float]:
     """κ and γ²: neither depends on the axes, so that the line of centres may be one of them."""
     out = np.empty((2, 6))
-    short_film(1.0, 1.0, e, 0.0, 0.0, 0.0, 1.0, False, out)
+    law(0, np.array([1.0, 1.0, 0.0, 0.0, 1.0]), e, 0.0, 0.0, 0.0, 1.0, out)
     W = np.hypot(*out[:, 0])
     (kxx, kxy), (kyx, kyy) = -out[:, 1:3] / W
     (cxx, cxy), (cyx, cyy) = -out[:, 3:5] / W

@@ -72,7 +72,7 @@ class MotionSystem:
 
     @cached_property
     def law_tables(self) -> tuple[IndexArray, FloatArray, IndexArray]:
-        """Codes (f,) and parameters (f, 7) of the laws, and where x and y of their nodes stand, (f, 2)."""
+        """Codes (f,) and parameters (f, 8) of the laws, and where x and y of their nodes stand, (f, 2)."""
         places = np.array([self.index(force.node) for force in self.forces], dtype=np.intp).reshape(-1, 2)
         return *tables(self.forces), places
 

@@ -82,7 +82,7 @@ def test_damped_critical_speeds_are_roots():
     ):
         there = whirl_exactly(rotor, speed, 6)
         k = int(np.argmin(np.abs(there.frequencies - speed)))
-        assert there.frequencies[k] == pytest.approx(speed, rel=1e-10)
+        assert there.frequencies[k] == pytest.approx(speed, rel=1e-9)
         assert there.log_decrements[k] == pytest.approx(delta, abs=1e-9)
         assert there.direction[k] == way
         column = found.frequencies[:, mode - 1] - found.speeds
@@ -99,7 +99,7 @@ def test_undamped_forward_critical_speeds_are_those_of_critical_speeds():
     rotor = symmetric(damping=0.0)
     found = fem.campbell(rotor, np.linspace(0.0, 1300.0, 20), n=8)
     forward = found.critical_speeds[found.critical_direction > 0]
-    np.testing.assert_allclose(forward, fem.critical_speeds(rotor, forward.size).frequencies, rtol=1e-9)
+    np.testing.assert_allclose(forward, fem.critical_speeds(rotor, forward.size).frequencies, rtol=3e-9)
     assert forward.size >= 3
 
 

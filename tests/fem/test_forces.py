@@ -14,7 +14,7 @@ from cases import each_of
 from scipy.optimize import brentq, root
 
 import fem
-from fem.forces import law, short_film, tables
+from fem.forces import law, tables
 
 BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
 SPEED = 50 * math.pi  # 1500 rpm
@@ -117,9 +117,10 @@ def test_a_stop():
     assert faster == pytest.approx(complex(-1, 0.3) * (50 * 0.3 + 3 * 0.1))
 
 
-def film(x, y, vx, vy, omega, line_of_centres, C=3.0, c=1.0):
+def film(x, y, vx, vy, omega, line_of_centres, C=3.0, function=law):
     out = np.empty((2, 6))
-    short_film(C, c, x, y, vx, vy, omega, line_of_centres, out)
+    values = np.array([1.0, C, line_of_centres, 0.0, 1.0, 0.0, 0.0, 0.0])
+    function(0, values, *map(float, (x, y, vx, vy, omega)), out)
     return out
 
 
@@ -242,18 +243,16 @@ def test_at_the_wall_there_is_no_number():
     for gap in (1e-13, 1e-15, 1e-16):
         angle = rng.uniform(0, 7, 200).tolist()
         for a in angle:
-            out = np.empty((2, 6))
             r = 1 - gap
-            short_film(1.0, 1.0, r * math.cos(a), r * math.sin(a), 0.3, 0.2, 1.0, a > 3, out)
+            out = film(r * math.cos(a), r * math.sin(a), 0.3, 0.2, 1.0, a > 3, C=1.0)
             assert np.isfinite(out).all() or np.isnan(out).all()
 
 
 @pytest.mark.parametrize("line_of_centres", [False, True])
 def test_a_film_interpreted_and_compiled_agree(line_of_centres):
-    machine = getattr(short_film, "machine", short_film)
+    machine = getattr(law, "machine", law)
     for state in states(5, seed=3):
-        out = np.empty((2, 6))
-        machine(3.0, 1.0, *map(float, state), line_of_centres, out)
+        out = film(*state, line_of_centres, function=machine)
         np.testing.assert_allclose(out, film(*state, line_of_centres), rtol=1e-12, atol=1e-14)
 
 

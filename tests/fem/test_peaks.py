@@ -172,6 +172,13 @@ def test_one_peak_a_critical_speed():
     assert [peak.speed for _, peak in chief] == pytest.approx([100, 140], rel=0.02)
 
 
+def test_one_end_of_a_half_power_band_is_enough_to_belong_together():
+    hidden = fem.Peak(100.0, 1.0, None, 102.5, None, None, None)
+    clear = fem.Peak(102.2, 2.0, 99.5, 105.0, 18.6, None, None)
+    each = [fem.Peaks((peak,), None) for peak in (hidden, clear)]
+    assert critical_peaks(["x", "y"], each) == [("y", clear)]
+
+
 def test_what_is_not_known_and_what_to_do():
     speeds, rpm = np.linspace(90.0, 104.0, 200), 30 / math.pi
     found = peaks_of(speeds, damped(0.05), operating=(115.0, 120.0))

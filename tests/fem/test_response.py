@@ -373,3 +373,9 @@ def test_direction_of_whole_modes():
     assert fem.whirl_direction(circle, 2 * circle) == 0
     many = fem.whirl_direction(np.ones((2, 4, 3)), np.full((2, 4, 3), -1j))
     np.testing.assert_array_equal(many, np.ones((2, 4)))
+
+
+def test_a_standing_rotor_alone(rotor23):
+    # one speed, zero: nothing whirls, and unbalance does nothing
+    found = fem.influence(rotor23, [7], [7], [0.0])
+    assert not found.W.any()

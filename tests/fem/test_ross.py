@@ -100,7 +100,8 @@ def compare_whirl(modes, answer, frequency, decrement):
     found = [int(np.argmin(np.abs(modes.eigenvalues - value))) for value in expected]
     assert found == list(range(6))  # the same six lowest modes in the same order
     assert modes.frequencies == pytest.approx(answer["wd"], rel=frequency)
-    assert modes.log_decrements == pytest.approx(answer["log_dec"], rel=decrement)
+    # A decrement near zero is as sure as the eigenvalue, not as itself.
+    assert modes.log_decrements == pytest.approx(answer["log_dec"], rel=decrement, abs=1e-9)
     # ROSS says M where nodes whirl in different directions, however small the orbit.
     told = [(d, word) for d, word in zip(modes.direction, answer["direction"], strict=True) if word != "M"]
     assert all(d == {"F": 1, "B": -1}[word] for d, word in told)

@@ -39,8 +39,6 @@ def test_a_scalar_counts_for_all_elements_and_nothing_can_be_written():
         rotor.length[0] = 1.0
     with pytest.raises(AttributeError):
         rotor.density = 1.0
-    with pytest.raises(TypeError):
-        rotor.stations["a"] = 1
 
 
 def test_mass_and_sections_of_a_tube():
@@ -228,7 +226,7 @@ def test_a_rotor_with_everything_survives_copying():
         (lambda: fem.Support(1, [1.0, 2.0]), r"stiffness must be a number or of the shape \(2, 2\)"),
         (
             lambda: fem.Support(1, 0.0, ((1, math.nan), (0, 1))),
-            "damping must be finite and not negative, not nan",
+            "damping must be finite, not nan",
         ),
         (lambda: fem.Support(2, [1.0, 2, 3], speeds=[1, 2]), "stiffness has 3 values for 2 speeds"),
         (

@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime, brentq
 
 import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
-from fem.forces import short_film
+from fem.forces import law
 from rotorid.motion.equilibrium import equilibria, equilibrium
 from rotorid.motion.linear_coefficients import coefficients, linear_rotor, threshold
 from rotorid.motion.rotor_system import rotor_system
@@ -63,7 +63,7 @@ def test_critical_mass_and_whirl_ratio_of_a_rigid_rotor():
 def test_at_the_critical_mass_an_eigenvalue_lies_on_the_axis(e):
     """The eigenvalues of the rigid rotor about its equilibrium, in natural units: c = Ω = 1."""
     out = np.empty((2, 6))
-    short_film(1.0, 1.0, e, 0.0, 0.0, 0.0, 1.0, False, out)
+    law(0, np.array([1.0, 1.0, 0.0, 0.0, 1.0]), e, 0.0, 0.0, 0.0, 1.0, out)
     W = np.hypot(*out[:, 0])
     mass, ratio = critical_mass(e)
     for share, grows in ((0.99, False), (1.01, True)):

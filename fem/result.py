@@ -1,0 +1,41 @@
+"""What all results of `fem` have in common: tables, one sentence, and how they are shown."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING
+
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.tables import Table, frame, html, terminal
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NORMAL_95 = 1.959964  # standard deviations on each side that hold 95 % of a normal distribution
+
+
+class Result(Answered):
+    """A result with tables and one sentence."""
+
+    @abstractmethod
+    def tables(self) -> tuple[Table, ...]:
+        """The numbers."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """The last of the tables: of modes, a row per node."""
+        return frame(self.tables()[-1])
+
+    @abstractmethod
+    def sentence(self) -> str:
+        """The answer."""
+
+    @property
+    def answer(self) -> Answer:
+        """The sentence and the first table."""
+        return Answer(self.sentence(), terminal(self.tables()[0]))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.sentence()})"
+
+    def _repr_html_(self) -> str:
+        return "\n".join(map(html, self.tables()))
