@@ -377,5 +377,5 @@ def test_direction_of_whole_modes():
 
 def test_a_standing_rotor_alone():
     # one speed, zero: nothing whirls, and unbalance does nothing
-    found = influence(rotor23(), [7], [7], [0.0])
+    found = fem.influence(rotor23(), [7], [7], [0.0])
     assert not found.W.any()
