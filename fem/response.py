@@ -646,7 +646,8 @@ class Series:
         V, signs, R = modes.vectors, np.where(modes.squares < 0, -1, 1), columns
         MV = multiply(whole.mass, V) * signs
         factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
-        self.powers = np.arange(1 if m == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS))))[:, None]
+        needed = 1 if m == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS)))
+        self.powers = np.arange(needed)[:, None]
         for _ in self.powers:
             R = dpbtrs(modes.factor, R)[0]
             R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
