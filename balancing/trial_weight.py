@@ -3,33 +3,52 @@
 **Amount from the force.** A weight m at the radius r turns into the force m r ω²; a first trial weight
 makes a fraction f (10 %) of the load that the plane carries, m r ω² = f · load, with load = m_rotor g /
 planes or the stated bearing load. More than 25 % is a risk. **Amount from coefficients**: the weight that
-changes a reading by a stated share (40 %) of the largest one, and every other reading by less.
+changes a reading by a stated share (40 %) of the largest one, and every other reading by less. With
+coefficients no lag has to be guessed: angle = arg(−Wᴴ Y₀) makes Σ |Y₀ + W T|² as small as a weight of that
+amount can.
 
-**Angle**: opposite to the heavy spot, from phase and lag (`balancing.trial_angle`). With coefficients
-(stored, or of a model) no lag has to be guessed: angle = arg(−Wᴴ Y₀) makes Σ |Y₀ + W T|² over all readings
-as small as a weight of that amount can.
+**Angle without coefficients**: opposite to the heavy spot, from phase and lag. A reading with phase φ
+(positive = lead) at a sensor at the angle α is A cos(ωt + φ), with t = 0 when the mark passes the key
+phasor, at the angle κ; angles count with the rotation. At time t the mark stands at κ + ωt, the high spot,
+at the angle h from the mark, at κ + ωt + h. The sensor reads its largest value when the high spot passes
+it: κ + ωt + h = α at ωt = −φ, hence
+
+    h = φ + α − κ.
+
+The vibration lags the unbalance that causes it by ψ (0 far below the critical speed, 90° at it, towards
+180° above), so the heavy spot is ahead of the high spot, at h + ψ, and the trial weight opposite,
+
+    angle = φ + α − κ + ψ + 180°.
+
+For one mode ψ = atan2(2 ζ η, 1 − η²), η = speed / critical speed. A velocity leads its displacement by 90°,
+an acceleration by 180°: these are taken off φ first.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.coefficients.trial_effects import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
-from balancing.data.conventions import Labels
-from balancing.data.reading_errors import reading_covariance
-from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
-from balancing.trial_weight_result import TrialWeight
-from rotorid.base.arrays import ComplexArray
+from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
+from balancing.conventions import Labels
+from balancing.errors import RunErrors, mean_variance, reading_covariance
+from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import rpm
 from rotorid.base.suggestions import did_you_mean
+from rotorid.base.words import Quantity as Quantity
 
 if TYPE_CHECKING:
-    from balancing.coefficients.influence import Influence
-    from balancing.coefficients.run_errors import RunErrors
-    from balancing.data.trials import ReadingErrors
+    import pandas as pd
+
+    from balancing.influence import Influence
+    from balancing.trials import ReadingErrors
 
 
 GRAVITY = 9.80665
@@ -42,11 +61,182 @@ SHARE = 0.40
 _SEEN = 2.448 * math.sqrt(2)
 """Standard deviations of a reading that the difference of two must exceed to be no chance (95 %)."""
 
+DAMPING = 0.05
+"""Damping ratio of the critical speed if nobody says."""
+
+_LAGS = {"below": (0.0, 45.0, 90.0), "at": (90.0, 90.0, 90.0), "above": (90.0, 135.0, 180.0)}
+_LEAD = {"displacement": 0.0, "velocity": math.pi / 2, "acceleration": math.pi}
+
+
+@dataclass(frozen=True)
+class Lag:
+    """How far a vibration lags the unbalance behind it.
+
+    Attributes
+    ----------
+    expected, low, high
+        rad: expected, least and largest.
+    words
+        Why.
+    """
+
+    expected: float
+    low: float
+    high: float
+    words: str
+
+
+@dataclass(frozen=True, eq=False)
+class TrialWeight(Answered):
+    """A proposed trial weight for one plane.
+
+    Attributes
+    ----------
+    plane
+        Name.
+    amount
+        kg (with `radius`) or kg·m.
+    angle
+        rad with the rotation; None where nothing is known to choose it by.
+    angle_reach
+        How far the best angle may be from it, rad, either side; 0 from coefficients; None as before.
+    basis
+        Where amount and angle come from, in words.
+    radius
+        m; None where the amount is an unbalance.
+    speed
+        rad/s, the highest at which it will turn.
+    load
+        N, that the plane carries; None: unknown.
+    speeds, sensors, before, expected
+        Readings (S, C) without and with it; None where there are no coefficients.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    plane: str
+    amount: float
+    angle: float | None
+    angle_reach: float | None
+    basis: str
+    radius: float | None
+    speed: float
+    load: float | None = None
+    speeds: FloatArray | None = None
+    sensors: tuple[str, ...] = ()
+    before: ComplexArray | None = None
+    expected: ComplexArray | None = None
+    labels: Labels = field(default_factory=Labels)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def force(self) -> float | None:
+        """Centrifugal force at the highest speed, N; None for masses without a radius."""
+        if self.radius is None and not self.labels.unbalances:
+            return None
+        return self.amount * (1.0 if self.radius is None else self.radius) * self.speed**2
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        size, angle = self._weight()
+        share = None if self.force is None or self.load is None else 100 * self.force / self.load
+        expected = self._columns()
+        document = {
+            "plane": self.plane,
+            "mass": size,
+            "unit": self.labels.weight_unit,
+            "angle_deg": angle,
+            "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
+            "basis": self.basis,
+            "radius_m": self.radius,
+            "speed_rpm": rpm(self.speed),
+            "force_N": self.force,
+            "load_N": self.load,
+            "force_percent": share,
+            "expected": None if expected is None else rows(expected),
+            "conventions": self.labels.conventions(),
+            "warnings": self.warnings,
+        }
+        return plain(document)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and sensor with the expected readings; one row without coefficients."""
+        size, angle = self._weight()
+        expected = self._columns()
+        n = 1 if expected is None else len(expected[0].values)
+        return frame(
+            (
+                Column("plane", (self.plane,) * n),
+                Column("mass", np.full(n, size)),
+                Column("unit", (self.labels.weight_unit,) * n),
+                Column("angle_deg", np.full(n, angle)),
+                *(expected or ()),
+            )
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """Amount and place, what for, and the readings expected with it."""
+        found, labels = self.to_dict(), self.labels
+        at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
+        angle = "at any angle (no phase, or no lag, is known)"
+        if found["angle_deg"] is not None:
+            angle = f"at {found['angle_deg']:.0f}° {labels.angle_words}"
+            if self.angle_reach:
+                angle += f" (± {math.degrees(self.angle_reach):.0f}°)"
+        lines = [f"Plane {self.plane}: {self.basis}"]
+        if self.force is not None:
+            share = "" if self.load is None else f", {found['force_percent']:.3g} % of the load"
+            lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N{share}"
+        table: tuple[str, ...] = ()
+        if self.speeds is not None and self.before is not None and self.expected is not None:
+            largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.expected)
+            lines.append(f"  largest with it{largest}")
+            head = f"Plane {self.plane}, now and with the weight, {labels.vibration_in}"
+            table = (f"{head}\n{text(self._columns() or (), left=2)}",)
+        return Answer(
+            f"Trial weight in plane {self.plane}: {found['mass']:.4g} {labels.weight_in}{at}, {angle}.",
+            "\n".join(lines),
+            ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
+            tables=table,
+            more="every reading",
+        )
+
+    def _weight(self) -> tuple[float, float]:
+        """Size in the job's unit and angle in degrees; NaN: nothing is known to choose it by."""
+        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        return float(size), np.nan if self.angle is None else float(angle)
+
+    def _columns(self) -> tuple[Column, ...] | None:
+        """Readings without and with it, one row per speed and sensor; None without coefficients."""
+        if self.speeds is None or self.before is None or self.expected is None:
+            return None
+        change = np.abs(self.expected - self.before) * self.labels.vibration_scale
+        return (
+            *reading_columns(self.labels, self.speeds, self.sensors),
+            *vector_columns(self.labels, "before", self.before),
+            *vector_columns(self.labels, "after", self.expected),
+            Column("change", change.ravel(), three_figures),
+        )
+
 
 def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int = 1) -> float | None:
-    """What a plane carries, N: its share of the rotor's mass, kg, or the load of its bearing, N.
+    """What a plane carries.
 
-    None where nothing is known.
+    Parameters
+    ----------
+    rotor_mass
+        kg, of which each of the `planes` carries a share; None: not known.
+    bearing_load
+        N, of the bearing beside the plane; None: not known.
+    planes
+        How many there are.
+
+    Returns
+    -------
+    N; None where nothing is known.
 
     Raises
     ------
@@ -233,7 +423,7 @@ def trial_from_coefficients(  # noqa: PLR0913, PLR0915
     direction = -np.vdot(w, Y)
     angle = float(np.angle(direction)) % (2 * math.pi)
     expected = Y + w * amount * np.exp(1j * angle)
-    warnings += _seen(Y, expected, errors or influence.errors, influence.run_errors, plane)
+    warnings += _seen(Y, expected, errors or influence.reading.errors, influence.run_errors, plane)
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(
@@ -266,8 +456,11 @@ def _seen(
     """Warn of a weight that changes too little: within the errors, or below the engineers' 30 % or 30°."""
     change = np.abs(expected - before)
     if errors is not None:
-        single = np.trace(reading_covariance(before, errors), axis1=-2, axis2=-1) / 2
-        if (change**2 <= _SEEN**2 * (single + run.variance(before, 0 * before))).all():
+        alone, common, _, further = run.typical**2
+        squares = np.abs(before) ** 2
+        between = (alone + common) * squares + further * squares.mean()
+        single = mean_variance(reading_covariance(before, errors)) + between
+        if (change**2 <= _SEEN**2 * single).all():
             return (
                 f"the trial weight in plane {plane!r} changes no reading by more than the errors of two "
                 "readings (95 %): its effect would not be determined",
@@ -301,3 +494,86 @@ def _check_limit(plane: str, amount: float, limit: float, labels: Labels, remedy
             f"the trial weight of {first} is larger than the largest weight of plane {plane!r}, "
             f"{second}: {remedy}"
         )
+
+
+def expected_lag(
+    where: str | None = None,
+    *,
+    degrees: float | None = None,
+    ratio: float | None = None,
+    damping: float = DAMPING,
+) -> Lag:
+    """How far the vibration lags, from one of these.
+
+    Parameters
+    ----------
+    where
+        "below", "at" or "above" the critical speed.
+    degrees
+        The lag.
+    ratio, damping
+        Speed / critical speed, of one mode with this damping ratio.
+
+    Raises
+    ------
+    ValueError
+        Unless exactly one is given, and for impossible numbers.
+    """
+    if sum(x is not None for x in (where, degrees, ratio)) != 1:
+        raise ValueError("give one of: below, at or above the critical speed; a lag; the critical speed")
+    if where is not None:
+        if where not in _LAGS:
+            raise ValueError(f"the speed is below, at or above the critical speed, not {where!r}")
+        low, middle, high = (math.radians(x) for x in _LAGS[where])
+        return Lag(middle, low, high, f"{where} the critical speed")
+    if degrees is not None:
+        if not 0 <= degrees <= 360:
+            raise ValueError(f"a lag is from 0 to 360 degrees, not {degrees:g}")
+        lag = math.radians(degrees)
+        return Lag(lag, lag, lag, f"{degrees:g}°, as stated")
+    assert ratio is not None
+    positive("ratio of the speed to the critical speed", ratio)
+    positive("damping ratio", damping)
+    lag = math.atan2(2 * damping * ratio, 1 - ratio**2)
+    words = f"one mode at {ratio:.3g} times the critical speed, damping {damping:g}"
+    low, high = (0.0, math.pi / 2) if ratio < 1 else (math.pi / 2, math.pi)
+    return Lag(lag, low, high, words)
+
+
+def opposing_angle(
+    phase: float,
+    lag: float,
+    *,
+    sensor_angle: float = 0.0,
+    key_phasor: float = 0.0,
+    quantity: Quantity = "displacement",
+) -> float:
+    """Angle opposite to the heavy spot, rad with the rotation, 0 ≤ angle < 2π (derived in the module).
+
+    Parameters
+    ----------
+    phase
+        Of the reading, rad, positive = lead.
+    lag
+        ψ, rad.
+    sensor_angle, key_phasor
+        α and κ, rad with the rotation, from any common origin.
+    quantity
+        What the sensor reads.
+    """
+    if quantity not in _LEAD:
+        raise ValueError(f"quantity must be one of {', '.join(_LEAD)}, not {quantity!r}")
+    angle = phase - _LEAD[quantity] + sensor_angle - key_phasor + lag + math.pi
+    return angle % (2 * math.pi)
+
+
+def positive(what: str, value: float) -> None:
+    """Refuse a number that is not positive and finite.
+
+    Raises
+    ------
+    ValueError
+        Naming it.
+    """
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"the {what} must be a finite number above 0, not {value:g}")

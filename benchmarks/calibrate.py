@@ -19,7 +19,7 @@ import ross
 from scipy.optimize import least_squares
 
 import fem
-from balancing import ReadingErrors, Trials
+from balancing import ReadingErrors, RunScatter, Trials
 from benchmarks.rotors import ROSS, Bearing, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, once, relative_difference
 from fem.parameters import parameter_value
@@ -76,7 +76,7 @@ def readings(read: np.ndarray) -> RunReadings:
         Y,
         weights,
         errors=ReadingErrors(0.01, np.radians(1.0)),
-        run_errors=(0.0, 0.0),
+        run_errors=RunScatter(0.0),
     )
     return RunReadings(trials, PLANES, np.ones(2), sensors)
 

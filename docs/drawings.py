@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from rotorid.report.conventions_explained import phase_figure
 
 if TYPE_CHECKING:

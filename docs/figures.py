@@ -87,15 +87,9 @@ GALLERY = (
         "discs",
         "balancing",
         f"balance {TURBO}/holes.toml --split",
-        "Ten pieces and their holes, seen from the end from which the rotor turns counter-clockwise; the "
-        "weight that they make in each plane (bold) is up to 41 g·mm off the wanted one (dashed).",
-    ),
-    Picture(
-        "trade-off",
-        "balancing",
-        f"balance {TURBO}/job.toml --best-planes 2 --trade-off",
-        "With two planes half the weight leaves half the vibration; the least vibration needs about "
-        "920 g·mm in all.",
+        "Six pieces and their holes, seen from the end from which the rotor turns counter-clockwise: the "
+        "fewest that leave less than a fifth of the vibration, though what they make in each plane (bold) is "
+        "far from the weights that would leave least (dashed).",
     ),
     Picture(
         "grade",

@@ -1,6 +1,6 @@
 """A balancing job from its file to its sheet: correct, choose pieces in the holes, judge, write.
 
-`rotorid.workflows.balance` does what `rotorid balance` does. Run `python examples/balance_workflow.py
+`rotorid.commands.balance` does what `rotorid balance` does. Run `python examples/balance_workflow.py
 [sheet.html]`.
 """
 

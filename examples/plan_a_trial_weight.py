@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import balancing
-from balancing.trial_angle import expected_lag
+from balancing import expected_lag
 from rotorid import read_job
 
 JOB = Path(__file__).parents[1] / "sample_data" / "model_job" / "job.toml"

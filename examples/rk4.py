@@ -15,15 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, fdtri
 
 import balancing
-from balancing.coefficients.run_errors import (
-    marginal,
-    run_columns,
-    runs_of,
-)
-from balancing.data.reading_errors import ErrorModel, mean_covariance
 from rotorid import read_job
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"
@@ -103,41 +96,13 @@ class Estimated(NamedTuple):
 
 def estimated(influence: balancing.Influence, one: balancing.Trials, method: str) -> Estimated:
     """Weights of a run from what it differs from the bare rotor by, beside what was mounted."""
-    correction = balancing.correct(difference(influence, one), refuse=False, method=method)
-    error = DISC_1_2_AND_SUM @ (-correction.weights - one.weights[0])
-    covariance, radius2 = regions(correction)
-    z = np.column_stack([error.real, error.imag])
-    inside = np.einsum("ki,kij,kj->k", z, np.linalg.inv(covariance), z) <= radius2
-    sizes = np.sqrt(radius2 * np.linalg.eigvalsh(covariance)[:, -1])
-    return Estimated(G_MM * np.abs(error), G_MM * sizes, inside, bool(correction.warnings))
-
-
-def difference(influence: balancing.Influence, one: balancing.Trials) -> balancing.Influence:
-    """The coefficients with what a run differs from the bare rotor by as the vibration to correct."""
-    known = (influence.baseline, influence.covariance, influence.common, influence.errors)
-    bare, covariance, common, errors = known
-    assert bare is not None
-    assert covariance is not None
-    assert common is not None
-    assert errors is not None
-    columns = run_columns(influence.run_errors, runs_of(one.mean, one.weights, influence.W))
-    flip = np.array([-1.0, -1.0, *np.ones(covariance.shape[-1] - 2)])  # −Y₀, and the new run's own
-    more = np.zeros((2, columns.common.shape[2], *common.shape[2:]), dtype=complex)
-    more[..., 0] = columns.common[:, 0]
-    joint = covariance * np.outer(flip, flip) + marginal(more)
-    own = mean_covariance(one, ErrorModel(errors))[0] + columns.own[0, ..., None, None] * np.eye(2)
-    joint[..., :2, :2] += own
-    both = np.concatenate((common * flip[::2], more), axis=1)
-    model = None if influence.parameters is None else influence.parameters * flip[::2]
-    return replace(influence, baseline=one.mean[0] - bare, covariance=joint, common=both, parameters=model)
-
-
-def regions(correction: balancing.Correction) -> tuple[NDArray[np.float64], float]:
-    """Covariances (3, 2, 2) of both discs and of their sum, and the square of the 95 % radius."""
-    L = np.kron(DISC_1_2_AND_SUM, np.eye(2))
-    joint = (L @ np.asarray(correction.covariance) @ L.T).reshape(3, 2, 3, 2)
-    dof = correction.dof
-    return np.einsum("kakb->kab", joint), chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)
+    correction = balancing.correct(balancing.change_of_run(influence, one), refuse=False, method=method)
+    weights, draws = correction.weights @ DISC_1_2_AND_SUM.T, correction.draws @ DISC_1_2_AND_SUM.T
+    true = -one.weights[0] @ DISC_1_2_AND_SUM.T
+    regions = [balancing.Region.of(draws[:, [k]], weights[[k]]) for k in range(len(true))]
+    inside = np.array([region.holds(true[[k]]) for k, region in enumerate(regions)])
+    sizes = np.array([each.radius * np.sqrt(np.linalg.eigvalsh(each.covariance)[-1]) for each in regions])
+    return Estimated(G_MM * np.abs(weights - true), G_MM * sizes, inside, bool(correction.warnings))
 
 
 def of(trials: balancing.Trials, runs: Sequence[str]) -> balancing.Trials:

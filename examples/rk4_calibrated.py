@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 import balancing
 import fem
-from balancing.coefficients.baseline import starting_point
 from rotorid import read_job, read_rotor
 from rotorid.calibration import CalibratedRotor
+from rotorid.commands.coefficients import choose
 from rotorid.workflows.calibration.calibrate import CalibrateOptions, calibrate
-from rotorid.workflows.coefficients import choose
 
 sys.path.insert(0, str(Path(__file__).parent))
 from rk4 import BARE, FEW, FOLDER, estimated, lines, of
@@ -91,19 +90,7 @@ def known(rpm: int, kind: str, rotor: fem.Rotor | None = None) -> balancing.Infl
     """Coefficients at a speed, measured, computed or combined, with the bare rotor's vibration."""
     job = read_job(FOLDER / JOBS[rpm][0])
     found = choose(job if rotor is None else replace(job, rotor=rotor), kind)[0]
-    if found.baseline is not None:
-        return found
-    bare = starting_point(found, of(job.trials, [BARE]))
-    return replace(
-        found,
-        baseline=bare.readings,
-        covariance=bare.covariance,
-        common=bare.common,
-        parameters=bare.parameters,
-        errors=bare.model.errors,
-        reading_dof=bare.model.dof,
-        error_source=bare.model.source,
-    )
+    return found if found.has_baseline else found.rebased(of(job.trials, [BARE]))
 
 
 def others(rpm: int) -> dict[str, balancing.Trials]:

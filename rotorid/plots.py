@@ -54,17 +54,14 @@ def _rotors() -> Pictures:
 
 def _balancing() -> Pictures:
     import balancing
-    from balancing.plots import correction_polar, tolerances, trade_off_curve
-    from balancing.plots.unbalance_along_shaft import unbalance_vectors
-    from balancing.trial_weight_result import TrialWeight
+    from balancing import plots
 
     return {
-        balancing.Correction: correction_polar.draw_correction,
-        balancing.TradeOff: trade_off_curve.draw_trade_off,
-        balancing.Verdict: tolerances.residuals,
-        balancing.Tolerance: tolerances.tolerance_line,
-        balancing.Unbalance: unbalance_vectors,
-        TrialWeight: tolerances.trial_arrow,
+        balancing.Correction: plots.draw_correction,
+        balancing.Verdict: plots.draw_verdict,
+        balancing.Tolerance: plots.draw_tolerance,
+        balancing.Unbalance: plots.draw_unbalance,
+        balancing.TrialWeight: plots.draw_trial_weight,
     }
 
 

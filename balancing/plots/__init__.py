@@ -1,1 +1,23 @@
-"""Pictures of corrections, discs, tolerances and trade-offs. Nothing is shown or saved: the caller does."""
+"""Pictures of balancing: a table of contents. Nothing is shown or saved here."""
+
+from balancing.plots.along_shaft import draw_tolerance, draw_unbalance, draw_verdict
+from balancing.plots.correction import correction_figure, draw_correction, residual_figure
+from balancing.plots.discs import draw_disc, mounted_discs, weight_figure
+from balancing.plots.machine_types import type_figure
+from balancing.plots.polar import draw_readings, draw_trial_weight, trial_figure
+
+__all__ = [
+    "correction_figure",
+    "draw_correction",
+    "draw_disc",
+    "draw_readings",
+    "draw_tolerance",
+    "draw_trial_weight",
+    "draw_unbalance",
+    "draw_verdict",
+    "mounted_discs",
+    "residual_figure",
+    "trial_figure",
+    "type_figure",
+    "weight_figure",
+]

@@ -46,7 +46,8 @@ def entry(package: str, module: object, name: str) -> list[str]:
         return [f".. autoclass:: {package}.{name}", "   :members:", ""]
     if callable(value):
         return [f".. autofunction:: {package}.{name}", ""]
-    return [f".. py:data:: {package}.{name}", f"   :value: {value!r}", ""]
+    shown = [f"   :value: {value!r}"] if isinstance(value, (int, float, str)) else []
+    return [f".. py:data:: {package}.{name}", *shown, ""]
 
 
 def plain(lines: list[str]) -> list[str]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+_S = TypeVar("_S", bound=str)
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
@@ -32,7 +35,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f" (did you mean {near!r}?)" if near else ""
 
 
-def one_of(value: str, what: str, known: Sequence[str]) -> str:
+def one_of(value: str, what: str, known: Sequence[_S]) -> _S:
     """A name out of a few.
 
     Raises
@@ -44,4 +47,4 @@ def one_of(value: str, what: str, known: Sequence[str]) -> str:
         raise ValueError(
             f"{what} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
         )
-    return value
+    return next(one for one in known if one == value)

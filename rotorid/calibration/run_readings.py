@@ -15,11 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.coefficients.run_error_estimate import known_run_errors
-from balancing.coefficients.run_errors import run_columns, runs_of
-from balancing.data.reading_errors import error_model, mean_covariance
-from balancing.data.trials import Trials
-from balancing.solvers.error_propagation import real_columns, whitening
+from balancing import Trials, white_rows
 from fem import (
     MatrixChange,
     Rotor,
@@ -170,23 +166,11 @@ class RunReadings:
 
     def rows(self, W: ComplexArray) -> ReadingRows:
         """The rows with their errors, which coefficients W (S, C, P + q) of about this size tell."""
-        trials, P = self.trials, len(self.nodes)
-        Y = trials.mean
-        R, S, C = Y.shape
-        model = error_model(trials)
-        reading = mean_covariance(trials, model)
-        runs = runs_of(Y, trials.weights, W[..., :P])
-        run = known_run_errors(trials, runs)
-        columns = run_columns(run, runs)
+        R = len(self.trials.runs)
         take = np.eye(R) if self.modelled else np.column_stack((-np.ones(R - 1), np.eye(R - 1)))
-        n, least = len(take) * C, (NO_ERROR * np.abs(Y).max()) ** 2
-        each = reading + (columns.own + least)[..., None, None] * np.eye(2)
-        own = np.einsum("xr,rscij,yr,cd->sxciydj", take, each, take, np.eye(C)).reshape(S, 2 * n, 2 * n)
-        # a column of a run stands in all rows that the run is part of
-        common = np.einsum("xr,krmsc->krmsxc", take, columns.common).reshape(2, -1, S, n)
-        white, _ = whitening(own, real_columns(common[1]), real_columns(common[0]))
-        stated = "assumed" not in (model.source, run.origin)
-        return ReadingRows(self, take, white, np.einsum("sii->si", own), stated)
+        least = NO_ERROR * float(np.abs(self.trials.mean).max())
+        rows = white_rows(self.trials, W[..., : len(self.nodes)], take, least)
+        return ReadingRows(self, take, *rows)
 
 
 class Bare(NamedTuple):

@@ -22,16 +22,21 @@ from rotorid.cli.commands import (
     runup,
     schema,
     simulate,
-    split,
-    tolerance,
-    trial_weight,
-    unbalance,
     vectors,
 )
 from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
 from rotorid.cli.worksheet import worksheet
-from rotorid.commands import campbell, critical, influence, response
+from rotorid.commands import (
+    campbell,
+    critical,
+    influence,
+    response,
+    split,
+    tolerance,
+    trial_weight,
+    unbalance,
+)
 from rotorid.commands.app import run, typer_command, written_help
 from rotorid.commands.terminal import markup_mode
 from rotorid.commands.verbose import verbosely
@@ -49,10 +54,10 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "balance": balance.balance,
         "worksheet": worksheet,
         "vectors": vectors.vectors,
-        "trial-weight": trial_weight.trial_weight,
-        "split": split.split,
-        "tolerance": tolerance.tolerance,
-        "unbalance": unbalance.unbalance,
+        "trial-weight": typer_command(trial_weight),
+        "split": typer_command(split),
+        "tolerance": typer_command(tolerance),
+        "unbalance": typer_command(unbalance),
         "fleet": fleet,
     },
     "Compute rotors": {

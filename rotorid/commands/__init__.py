@@ -3,20 +3,37 @@
 `app` makes commands of a terminal of them, `quantities` reads texts of options, `outcome` is what they give.
 """
 
+from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.outcome import Outcome
 from rotorid.commands.response import ResponseOptions, response
+from rotorid.commands.split import SplitOptions, split
+from rotorid.commands.tolerance import ToleranceOptions, tolerance
+from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
+from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 
 __all__ = [
+    "Balance",
+    "BalanceOptions",
     "CampbellOptions",
     "CriticalOptions",
     "InfluenceOptions",
     "Outcome",
     "ResponseOptions",
+    "SplitOptions",
+    "ToleranceOptions",
+    "TrialWeightOptions",
+    "TrialWeights",
+    "UnbalanceOptions",
+    "balance",
     "campbell",
     "critical",
     "influence",
     "response",
+    "split",
+    "tolerance",
+    "trial_weight",
+    "unbalance",
 ]

@@ -42,7 +42,7 @@ import typer
 from typer.models import OptionInfo
 
 from rotorid.base.answer import LINES, kinds
-from rotorid.commands.outcome import Delivered, options_of
+from rotorid.commands.outcome import USUAL, WITH_REPORT, Delivered, options_of
 from rotorid.commands.progress import busy
 
 if TYPE_CHECKING:
@@ -51,9 +51,6 @@ if TYPE_CHECKING:
 
 _R = TypeVar("_R", bound=Delivered)
 Command = Callable[..., None]
-USUAL = ("plot", "output", "table", "json")
-WITH_REPORT = ("report", *USUAL)
-EQUATIONS = ("show", "latex")
 INPUT, OUTPUT = "Input", "Output"
 RotorArgument = Annotated[
     Path,
@@ -271,24 +268,27 @@ def command(
 
 
 def typer_command(work: Callable[..., Delivered]) -> Command:
-    """The command of a function: what it takes before `options` are files."""
+    """The command of a function: what it takes before `options` is an argument, then required options."""
     kind = options_of(work)
     about = _documentation(work)
-    first, *others = [name for name in inspect.signature(work).parameters if name != "options"]
+    given = {name: one for name, one in inspect.signature(work).parameters.items() if name != "options"}
 
-    def deliver(options: Any, to: Destination, **files: Any) -> None:  # noqa: ANN401 - of that kind
-        to.deliver(work.__name__, lambda: work(*(files[name] for name in (first, *others)), options))
+    def deliver(options: Any, to: Destination, **values: Any) -> None:  # noqa: ANN401 - of that kind
+        what = work.__name__.replace("_", " ")
+        to.deliver(what, lambda: work(*(values[name] for name in given), options))
 
-    argument = typer.Argument(metavar=about[first].metavar, help=about[first].text)
-    hints: dict[str, Any] = {first: Annotated[Path, argument]}
-    for name in others:
-        option = typer.Option(f"--{name}", metavar=about[name].metavar, help=about[name].text)
-        hints[name] = Annotated[str, option]
-    names = (*hints, "options", "to")
-    parameters = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in names]
+    hints: dict[str, Any] = {}
+    parameters = []
+    for name, one in given.items():
+        told: dict[str, Any] = {"metavar": about[name].metavar, "help": about[name].text}
+        declared = typer.Option(f"--{name}", **told) if hints else typer.Argument(**told)
+        taken: Any = Path if "Path" in str(one.annotation) and not hints else str
+        hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
+        parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
+    parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]
     deliver.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     deliver.__annotations__ = hints
-    made = command(kind, panels=getattr(kind, "panels", {}), to=WITH_REPORT)(deliver)
+    made = command(kind, panels=getattr(kind, "panels", {}), to=getattr(kind, "to", WITH_REPORT))(deliver)
     made.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
     return made
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered, together
 from rotorid.base.logs import workflows as log
 from rotorid.base.tables import Table, file_bytes, frame, terminal
 from rotorid.base.text import capital, listing
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+USUAL = ("plot", "output", "table", "json")
+WITH_REPORT = ("report", *USUAL)
+EQUATIONS = ("show", "latex")
+"""Fields of `app.Destination` that a command has."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -95,7 +99,7 @@ class Outcome(Delivered):
     pictures
         What makes each, by its caption; the first is that of `--plot`.
     title, rotor
-        Of the page: its heading, and what `rotorid.report.rotor_description.rotor_sheet` takes.
+        Of the page, if there is one: its heading, and what `rotor_description.rotor_sheet` takes.
     warnings, notes
         Clauses without "Warning: " and "Note: ", the worst first.
     """
@@ -106,8 +110,8 @@ class Outcome(Delivered):
     file: Table
     keys: Mapping[str, Any]
     pictures: Mapping[str, Callable[[], Figure]]
-    title: str
-    rotor: Mapping[str, Any]
+    title: str = ""
+    rotor: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     more: tuple[Table, ...] = ()
     behind: tuple[Table, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -155,6 +159,57 @@ class Outcome(Delivered):
             pictures=self.pictures,
             rotor=self.rotor,
         )
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Parts(Delivered):
+    """Results of the library beside each other."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> Mapping[str, Any]:
+        """Results by their keys in the document, where "" is its top; None: not asked for."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
+        return {**known.pop("", {}), **known}
+
+    @property
+    def equations(self) -> Equations:
+        """Those of the first."""
+        from rotorid.report.equations_of_results import equations_of
+
+        return equations_of(next(iter(self.parts.values())))
+
+    @property
+    def answer(self) -> Answer:
+        """Those of the parts, one after the other."""
+        return together(part.answer for part in self.parts.values() if part is not None)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table of the first."""
+        frame: pd.DataFrame = next(iter(self.parts.values())).to_frame()
+        return frame
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Found(Parts):
+    """One result of the library as it is."""
+
+    found: Any
+
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """That one."""
+        return {"": self.found}
+
+    def figure(self) -> Figure:
+        """Its picture."""
+        from rotorid.base.plot_style import on_figure
+        from rotorid.plots import plot
+
+        return on_figure(lambda ax: plot(self.found, ax))
 
 
 def options_of(function: Callable[..., Any]) -> type[DataclassInstance]:

@@ -266,6 +266,13 @@ def coverage_factor(dof: float | None) -> float | None:
     return float(stdtrit(dof, 0.975)) if dof > 0 else None
 
 
+def region_radius(dof: float | None, n: int = 2) -> float:
+    """Radius of the joint 95 % region of n numbers, in standard deviations (n = 2, stated errors: 2.448)."""
+    from scipy.special import chdtri, fdtri
+
+    return float(np.sqrt(chdtri(n, 0.05) if dof is None else n * fdtri(n, dof, 0.95)))
+
+
 def value_digits(value: float, std: float | None) -> int:
     """Significant digits of a value that show two of its standard deviation, from six to ten."""
     if std is None or not (std > 0 and np.isfinite(std)) or value == 0:

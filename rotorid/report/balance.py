@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_words import method_words
 from rotorid.base.rpm import RPM
 from rotorid.base.text import sentence
 from rotorid.report import conventions_explained
 from rotorid.report.balance_data import sheet_data
-from rotorid.report.balance_figures import plane_figure, residual_figure
+from rotorid.report.balance_figures import plane_figure
 from rotorid.report.number_tables import every_warning
 from rotorid.report.page import inline_svg, render_report
 from rotorid.tables.reader import units
@@ -22,9 +21,7 @@ from rotorid.tables.reader import units
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from balancing import Correction, Influence
-    from balancing.correction.verdict import Verdict
-    from balancing.mounting.mount_result import Mounted
+    from balancing import Correction, Influence, Mounted, Verdict
     from rotorid.tables import Job
 
 _SOURCES = {
@@ -55,8 +52,7 @@ def balance_report(
         only the sheet shows under the key "sheet".
     parts
         What the document is made of, by its keys: "" (the `Correction`), and, None where there is none,
-        "mounting" (`Mounted`), "left_to_do" (`LeftToDo`), "verdict" (`Verdict`, whose tolerances are drawn),
-        "trade_off" (`TradeOff`).
+        "mounting" (`Mounted`), "left_to_do" (`LeftToDo`), "verdict" (`Verdict`, whose tolerances are drawn).
     influence, job
         Coefficients and job of the correction.
     provenance
@@ -69,9 +65,9 @@ def balance_report(
     ValueError
         If the document holds a number that is not finite.
     """
-    from balancing.plots.trade_off_curve import overview
+    from balancing.plots import residual_figure
 
-    result, mounted, verdict, curve = (parts[key] for key in ("", "mounting", "verdict", "trade_off"))
+    result, mounted, verdict = (parts[key] for key in ("", "mounting", "verdict"))
     labels = result.labels
     sheet = sheet_data(result, influence, job, mounted)
     whole = {**document, "sheet": sheet}
@@ -79,15 +75,13 @@ def balance_report(
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
-    shown, left = result, parts["left_to_do"]
-    if mounted is not None:
-        shown = replace(result, after=mounted.after, after_covariance=mounted.after_covariance)
+    left, source = parts["left_to_do"], result.influence.reading.source
     text: dict[str, Any] = {
         "vibration": labels.vibration_in,
         "weight": labels.weight_in,
         "seen": conventions_explained.seen_from(labels),
         "method": _method(result),
-        "errors": _SOURCES.get(result.error_source, result.error_source),
+        "errors": _SOURCES.get(source, source),
         "coefficients": _coefficients(influence, job, provenance),
         "turn": _turn(result),
         "turning": labels.turning_in_words(),
@@ -119,10 +113,9 @@ def balance_report(
         ),
         discs=discs,
         residual_figure=inline_svg(
-            residual_figure(shown),
+            residual_figure(result, mounted),
             "Vibration before and predicted after",
         ),
-        trade_off_figure="" if curve is None else inline_svg(overview(curve), "Residual over total weight"),
         influence_planes=influence.planes,
         several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
         forbidden=result.limits is not None and any(result.limits.forbidden),
@@ -141,7 +134,7 @@ def _name(job: Job) -> str:
 
 def _method(result: Correction) -> str:
     """How the weights were found."""
-    words = method_words(result.method, weighted=result.row_weights is not None)
+    words = result.method_in_words
     if len(result.speeds) == 1 or result.method == "minmax":
         return words
     return f"{words} Den Hartog's method: influence coefficients at several speeds, least squares."
@@ -152,9 +145,9 @@ def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any])
     kind = provenance["options"].get("coefficients")
     if kind == "combined":
         return "from the runs and the rotor model together"
-    if influence.last_run is not None:
-        return "from the runs above"
-    return "stored ones" if job.influence is not None and kind != "computed" else "from the rotor model"
+    if job.influence is not None and kind != "computed":
+        return "stored ones"
+    return "from the runs above" if influence.mounted.run else "from the rotor model"
 
 
 def _turn(result: Correction) -> str:

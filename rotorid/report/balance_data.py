@@ -8,19 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_result import HELD
-from balancing.data.result_columns import INVISIBLE, known, mounted_rows, reading_columns, vector_columns
-from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import rpm
-from rotorid.regression import coverage_factor
+from rotorid.regression import coverage_factor, region_radius
 from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
-    from balancing import Correction, Influence
-    from balancing.data.trials import Trials
-    from balancing.mounting.mount_result import Mounted
+    from balancing import Correction, Influence, Mounted, Trials
     from rotorid.tables import Job
 
 
@@ -92,8 +87,8 @@ def _runs(trials: Trials) -> list[dict[str, Any]]:
             ]
             for place in np.ndindex(*size.shape[2:])
         ]
-        readings = (*reading_columns(trials.labels, trials.speeds, trials.sensors), Column("values", values))
-        weights = mounted_rows(trials.labels, trials.planes, trials.weights[r])
+        readings = (*_places(trials.speeds, trials.sensors), Column("values", values))
+        weights = _mounted(trials, trials.weights[r])
         found.append({"run": run, "weights": weights, "readings": rows(readings)})
     return found
 
@@ -105,9 +100,28 @@ def _slow_roll(job: Job) -> list[dict[str, Any]] | None:
     trials = job.trials
     by_speed = job.slow_roll.ndim == 2
     speeds = trials.speeds if by_speed else np.full(1, np.nan)
-    size, phase = vector_columns(trials.labels, "amplitude", job.slow_roll)
+    size, phase = (part.ravel() for part in trials.labels.vibration(job.slow_roll))
+    vectors = Column("amplitude", size), Column("phase_deg", phase)
+    return rows((*_places(speeds, trials.sensors), *vectors))
+
+
+def _places(speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
+    """Speed and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
+    turns = np.repeat([rpm(speed) for speed in speeds], len(sensors))
+    return Column("speed_rpm", turns), Column("sensor", tuple(sensors) * len(speeds))
+
+
+def _mounted(trials: Trials, weights: ComplexArray) -> list[dict[str, Any]]:
+    """Rows of the planes in which there is something."""
+    there, labels = np.flatnonzero(weights).tolist(), trials.labels
+    mass, angle = labels.weight(weights[there])
     return rows(
-        (*reading_columns(trials.labels, speeds, trials.sensors), size, replace(phase, name="phase_deg"))
+        (
+            Column("plane", [trials.planes[p] for p in there]),
+            Column("mass", mass),
+            Column("unit", (labels.weight_unit,) * len(there)),
+            Column("angle_deg", angle),
+        )
     )
 
 
@@ -116,7 +130,7 @@ def _influence(f: Influence) -> dict[str, Any]:
     size = np.abs(f.W) * (f.labels.vibration_scale / f.labels.weight_scale)
     along, across = _widths(f)
     share = 100 * along / np.where(np.abs(f.W) > 0, np.abs(f.W), np.nan)
-    readings = reading_columns(f.labels, f.speeds, f.sensors)
+    readings = _places(f.speeds, f.sensors)
     table = (
         *(replace(column, values=np.repeat(list(column.values), len(f.planes))) for column in readings),
         Column("plane", f.planes * (len(f.speeds) * len(f.sensors))),
@@ -130,11 +144,13 @@ def _influence(f: Influence) -> dict[str, Any]:
 
 def _widths(f: Influence) -> tuple[FloatArray, FloatArray]:
     """Half widths (S, C, P) of 95 % intervals: of sizes, and of phases in degrees (NaN: not determined)."""
-    factor = coverage_factor(f.dof)
-    if f.covariance is None or factor is None:
-        return known(None, f.W.shape), known(None, f.W.shape)
+    dof = f.reading.dof if np.isfinite(f.reading.dof) else None
+    factor = coverage_factor(dof)
+    if not f.known_errors or factor is None:
+        unknown: FloatArray = np.full(f.W.shape, np.nan)
+        return unknown, unknown
     S, C, P = f.W.shape
-    own = f.covariance[..., 2:, 2:].reshape(S, C, P, 2, P, 2)
+    own = f.channels()[..., 2:, 2:].reshape(S, C, P, 2, P, 2)
     blocks = np.stack([own[:, :, p, :, p, :] for p in range(P)], axis=2)
     unit = np.where(np.abs(f.W) > 0, f.W, 1.0) / np.where(np.abs(f.W) > 0, np.abs(f.W), 1.0)
     found = []
@@ -143,7 +159,7 @@ def _widths(f: Influence) -> tuple[FloatArray, FloatArray]:
         variance = np.einsum("scpi,scpij,scpj->scp", u, blocks, u)
         found.append(factor * np.sqrt(np.maximum(variance, 0.0)))
     along, across = found
-    clear = np.abs(f.W) > region_radius(f.dof) / factor * np.maximum(along, across)
+    clear = np.abs(f.W) > region_radius(dof) / factor * np.maximum(along, across)
     angle = np.degrees(across / np.where(np.abs(f.W) > 0, np.abs(f.W), 1.0))
     return along, np.where(clear, angle, np.nan)
 
@@ -158,7 +174,7 @@ def _corrections(c: Correction, job: Job) -> list[dict[str, Any]]:
             Column("place_deg", c.places(c.planes, c.weights)),
             Column("mass_95", sizes * c.labels.weight_scale),
             Column("angle_95_deg", np.degrees(angles)),
-            Column("held_by_a_limit", sizes < HELD * np.abs(c.weights)),
+            Column("held_by_a_limit", c.held),
             Column("mass_at_radius", _masses_at_radius(c, job, c.planes, c.weights)),
             Column("mass_unit", (c.labels.weight_unit.partition("_")[0],) * n),
         )
@@ -167,9 +183,9 @@ def _corrections(c: Correction, job: Job) -> list[dict[str, Any]]:
 
 def _add(c: Correction, job: Job) -> list[dict[str, Any]] | None:
     """What to add (or remove: opposite) where the weights of the last run stay mounted."""
-    if c.mounted is None or c.to_add is None or not np.any(c.mounted[2]):
+    if not c.mounted.weights.any():
         return None
-    planes = c.mounted[1]
+    planes = c.mounted.planes
     return rows(
         (
             Column("plane", planes),
@@ -196,13 +212,14 @@ def _masses_at_radius(
 
 def _residuals(c: Correction, mounted: Mounted | None) -> list[dict[str, Any]]:
     """Vibration before and after, as it will be mounted, with the radius of its 95 % region and its limit."""
-    covariance = c.after_covariance if mounted is None else mounted.after_covariance
-    limit = None if c.limits is None else c.limits.residual.ravel() * c.labels.vibration_scale
+    limit: FloatArray = np.full(c.before.size, np.nan)
+    if c.limits is not None:
+        limit = c.limits.residual.ravel() * c.labels.vibration_scale
     return rows(
         (
-            *c.vibration_columns(INVISIBLE, None if mounted is None else mounted.after),
-            Column("within_95", c.within(covariance)),
-            Column("limit", known(limit, c.before.size)),
+            *c.vibration_columns(after=None if mounted is None else mounted.after),
+            Column("within_95", c.within.ravel()),
+            Column("limit", limit),
         )
     )
 

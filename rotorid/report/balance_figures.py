@@ -9,9 +9,7 @@ from rotorid.report.conventions_explained import plain
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import Correction
-    from balancing.mounting.holes import Holes
-    from balancing.mounting.mount_result import Mounted
+    from balancing import Correction, Holes, Mounted
 
 _WIDTH, _REACH, _TALL = 3.4, (1.95, 2.15), 1.42
 """Of a picture of a plane: inches on paper; half its width (of two, of more planes) and height in radii."""
@@ -43,15 +41,15 @@ def plane_figure(
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from balancing.plots.discs import disc
+    from balancing.plots import draw_disc
 
     p = result.planes.index(plane)
     labels = result.labels
     wanted, mounting = complex(result.weights[p]), None
     if mounted is not None:
-        holes, mounting = mounted.holes[p], mounted.found.mountings[p]
-        if mounted.on_top_of is not None and result.to_add is not None and result.mounted is not None:
-            wanted = complex(result.to_add[result.mounted[1].index(plane)])
+        holes, mounting = mounted.holes[p], mounted.discrete.mountings[p]
+        if mounted.on_top_of is not None:
+            wanted = complex(result.to_add[result.mounted.planes.index(plane)])
     loose = (wanted,) if mounting is None and wanted != 0 else ()
     if mounted is not None and mounting is None and mounted.weights[p] != 0:
         loose = (complex(mounted.weights[p]),)
@@ -63,7 +61,7 @@ def plane_figure(
         height = axes + 0.37 + 0.15 * lines  # a title above the axes, lines of text below
         figure = Figure(figsize=(_WIDTH, height))
         ax = figure.add_axes((0.0, 1 - (axes + 0.25) / height, 1.0, axes / height))
-        disc(
+        draw_disc(
             ax,
             plain(plane),
             holes,
@@ -76,17 +74,4 @@ def plane_figure(
             forbidden=arcs,
         )
         ax.set(xlim=(-reach, reach), ylim=(-_TALL, _TALL))
-    return figure
-
-
-def residual_figure(result: Correction) -> Figure:
-    """Draw readings before and after; what is left a second time, larger, where it is small."""
-    from balancing.plots.amplitude_bars import amplitudes, left_is_small, sizes_of
-    from rotorid.base.plot_style import legend_below, new_figure
-
-    small = left_is_small(*sizes_of(result, None))
-    figure = new_figure(3.6 if small else 2.8, 5.8)
-    ax, *closer = figure.subplots(1 + small, sharex=True, squeeze=False)[:, 0]
-    amplitudes(result, ax, closer=closer[0] if small else None)
-    legend_below(figure, [ax])
     return figure

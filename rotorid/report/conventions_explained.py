@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from balancing.data.conventions import Labels
+    from balancing import Labels
 
 _SAMPLE = 60.0
 """Angle, degrees, of the weight and of the phase that the figures show."""

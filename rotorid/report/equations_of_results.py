@@ -7,9 +7,7 @@ from functools import singledispatch
 import numpy as np
 from sympy import Add, I, Integer, Matrix, Symbol, collect, eye, factor_terms
 
-from balancing import Correction, Influence
-from balancing.coefficients.baseline import match_speeds
-from balancing.correction.selected_planes import plane_indices
+from balancing import Correction
 from rotorid.base.text import counted
 from rotorid.expressions import names, parse
 from rotorid.harmonic import Experiments, HarmonicModel, Identification
@@ -92,11 +90,10 @@ def _rows_in_symbols(model: HarmonicModel, tests: Experiments, ones: list[float]
     return rows
 
 
-def correction_equations(found: Correction, influence: Influence) -> Equations:
+def correction_equations(found: Correction) -> Equations:
     """The stretched W D = −Y of all speeds and sensors, [S] (29)–(33), (40), in the units of the job."""
     labels, planes, factors = found.labels, found.planes, np.ones(found.before.size)
-    at = match_speeds(found.speeds, influence.speeds)
-    W = influence.part(at, None, plane_indices(influence, planes)).W.reshape(-1, len(planes))
+    W = found.influence.W.reshape(-1, len(planes))
     notes = [
         f"D in {labels.weight_in}, Y in {labels.vibration_in or 'the unit of the readings'}; phases lead and "
         "angles count with the rotation, whatever the job writes"

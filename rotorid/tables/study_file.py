@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.data.trials import ReadingErrors
+from balancing import ReadingErrors
 from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.tables.reader import units, value_kinds

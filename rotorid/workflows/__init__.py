@@ -4,17 +4,28 @@ Nothing here prints; the command line, reports, the demo, a notebook and a works
 """
 
 from rotorid.commands import (
+    Balance,
+    BalanceOptions,
     CampbellOptions,
     CriticalOptions,
     InfluenceOptions,
     ResponseOptions,
+    SplitOptions,
+    ToleranceOptions,
+    TrialWeightOptions,
+    TrialWeights,
+    UnbalanceOptions,
+    balance,
     campbell,
     critical,
     influence,
     response,
+    split,
+    tolerance,
+    trial_weight,
+    unbalance,
 )
 from rotorid.commands.outcome import Delivered
-from rotorid.workflows.balance import Balance, BalanceOptions, balance
 from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
@@ -27,12 +38,8 @@ from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, 
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
-from rotorid.workflows.split import SplitOptions, SplitWeight, split
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
-from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
-from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
-from rotorid.workflows.unbalance import UnbalanceAtStations, UnbalanceOptions, unbalance
 from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
 from rotorid.workflows.vibration.runup import RunUpOptions, runup
 from rotorid.workflows.vibration.runup_result import RunUp
@@ -65,7 +72,6 @@ __all__ = [
     "MotionOptions",
     "PeriodicMotions",
     "PeriodicOptions",
-    "PermissibleUnbalance",
     "RecordFit",
     "ReduceOptions",
     "ReducedRotor",
@@ -75,14 +81,12 @@ __all__ = [
     "SimulateOptions",
     "Simulation",
     "SplitOptions",
-    "SplitWeight",
     "StudiedMachines",
     "StudiedStarts",
     "StudyOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
     "TrialWeights",
-    "UnbalanceAtStations",
     "UnbalanceOptions",
     "VectorsOfRecords",
     "VectorsOptions",

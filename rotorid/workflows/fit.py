@@ -13,9 +13,8 @@ from rotorid.base.logs import workflows as log
 from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.commands.input_checks import check_choices, file_of, refuse
-from rotorid.commands.outcome import command, phase, provenance, text_of
+from rotorid.commands.outcome import Parts, command, phase, provenance, text_of
 from rotorid.commands.quantities import Times, check_names, number, pairs, times
-from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.logs import workflows as log
 from rotorid.commands.input_checks import check_choices, file_of, refuse
-from rotorid.commands.outcome import command, phase, provenance, text_of
+from rotorid.commands.outcome import Found, Parts, command, phase, provenance, text_of
 from rotorid.commands.quantities import Speeds, speeds
-from rotorid.workflows.result_provenance import Found, Parts
 
 if TYPE_CHECKING:
     import pandas as pd

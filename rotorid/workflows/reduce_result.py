@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
+from rotorid.commands.outcome import Parts
 from rotorid.commands.quantities import one_of
-from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
     import pandas as pd

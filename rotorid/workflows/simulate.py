@@ -233,7 +233,7 @@ def _values(given: Values | None, names: Sequence[str]) -> tuple[dict[str, float
 
 def _amplitude(name: str, shown: str) -> complex:
     """Read "10" or "10@-90"."""
-    from balancing.data.conventions import polar
+    from rotorid.base.complex_numbers import polar
 
     size, at, angle = shown.partition("@")
     value = number(size)

@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotorid.commands.balance import Balance
     from rotorid.commands.outcome import Delivered
     from rotorid.tables import Job
-    from rotorid.workflows.balance import Balance
 
 KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
 """Balances of one job, by the options of `rotorid balance`."""
@@ -167,7 +167,7 @@ def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, A
 
 def convention(phase: str, angles: str) -> str:
     """Two drawings: how the angles of weights count, and what a phase is."""
-    from balancing.data.conventions import Labels
+    from balancing import Labels
     from rotorid.report import conventions_explained as explained
     from rotorid.tables.runs.stated_conventions import as_angles, as_phase
 
@@ -182,7 +182,7 @@ def rows(name: str, data: str, phase: str) -> dict[str, Any]:
 
     A file that says that its phases are others than the job's, `phase`, is refused.
     """
-    from balancing.data.conventions import Labels
+    from balancing import Labels
     from rotorid.tables.reader.grid import show
     from rotorid.tables.reader.input_file import each_file_once
     from rotorid.tables.reader.problems import Problems

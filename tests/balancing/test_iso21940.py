@@ -7,7 +7,7 @@ import pytest
 from cases import each_of
 
 from balancing.iso21940 import GRADES, parse_grade, tolerance
-from rotorid.plots import plot
+from balancing.plots import draw_tolerance as plot
 
 RPM3000 = 100 * pi
 TOTAL = 1000 * 2.5 * 500 / RPM3000  # g·mm, 3978.87

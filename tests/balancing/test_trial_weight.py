@@ -1,15 +1,23 @@
 """First trial weights: amount against the formula, angle against simulated signals and a rotor model."""
 
+from dataclasses import replace
 from math import degrees, inf, pi, radians
 
 import numpy as np
 import pytest
+from balancing_data import stored
 
-from balancing import Influence, Labels, ReadingErrors
-from balancing.coefficients.coefficients_from_model import model_influence
-from balancing.trial_angle import expected_lag, opposing_angle
-from balancing.trial_weight import GRAVITY, plane_load, trial_from_coefficients, trial_from_force
-from rotorid.plots import plot
+from balancing import Labels, ReadingErrors
+from balancing.computed import model_influence
+from balancing.plots import draw_trial_weight as plot
+from balancing.trial_weight import (
+    GRAVITY,
+    expected_lag,
+    opposing_angle,
+    plane_load,
+    trial_from_coefficients,
+    trial_from_force,
+)
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 
@@ -116,8 +124,8 @@ def test_angle_by_the_model_and_by_the_lag_agree_below_the_critical_speed():
 
 def influence(W, **options):
     W = np.asarray(W, dtype=complex)
-    options = {"labels": GRAMS, "speeds": [RPM3000], **options}
-    return Influence(sensors=("a", "b"), planes=("left", "right"), W=W, **options)
+    known = stored(W, speeds=np.array([RPM3000]), planes=("left", "right"), labels=GRAMS)
+    return replace(known, sensors=("a", "b"), **options)
 
 
 COEFFICIENTS = [[[4.0, 1j], [1.0, -2.0]]]

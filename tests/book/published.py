@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from balancing import Influence, Labels, Limits, Trials, correct, estimate_influence
+from balancing import Gaussian, Influence, Limits, Trials, correct, estimate_influence
 from book.printed import below, lines, read
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
@@ -96,7 +96,8 @@ def _correction(coefficients, initial, *, method="least-squares", limits=None):
         tuple(f"{c + 1}" for c in range(sensors)),
         PLANES[:planes],
         coefficients[None],
-        labels=Labels(),
+        np.full((1, sensors), np.nan),
+        Gaussian.none(1, sensors, planes),
     )
     return correct(influence, np.array([[polar(text) for text in initial]]), method=method, limits=limits)
 

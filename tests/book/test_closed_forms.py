@@ -7,7 +7,7 @@ import pytest
 from exact_solutions import SOLVERS
 
 import fem
-from balancing import Influence, Labels, correct
+from balancing import Gaussian, Influence, correct
 from fem.assembly import WholeBand, both_planes
 from rotorid.reduction import equivalent_masses, natural_frequencies
 
@@ -116,5 +116,5 @@ def test_least_squares_over_two_speeds():
     """One plane and one sensor: D = −Σ W̄ Y / Σ |W|²."""
     W, Y = np.array([[[2 + 1j]], [[1 - 3j]]]), np.array([[4 - 1j], [2 + 5j]])
     exact = -((2 - 1j) * (4 - 1j) + (1 + 3j) * (2 + 5j)) / (5 + 10)
-    influence = Influence(np.array([1.0, 2.0]), ("1",), ("A",), W, labels=Labels())
-    np.testing.assert_allclose(correct(influence, Y, method="least-squares").weights, [exact], rtol=1e-12)
+    influence = Influence(np.array([1.0, 2.0]), ("1",), ("A",), W, Y, Gaussian.none(2, 1, 1))
+    np.testing.assert_allclose(correct(influence, method="least-squares").weights, [exact], rtol=1e-12)

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 import fem
-from balancing import Labels, ReadingErrors, Trials, UndeterminedError, compare_check
-from balancing.data.trials import RunScatter
+from balancing import Labels, ReadingErrors, RunScatter, Trials, UndeterminedError, compare_check
 from fem import receptance_with_derivatives
 from fem.assembly import assemble, multiply
 from fem.parameters import with_parameters

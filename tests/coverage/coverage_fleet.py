@@ -15,14 +15,22 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, fdtri
 
-from balancing import Correction, ReadingErrors, Trials, UndeterminedError, correct
-from balancing.coefficients.machine_type import MachineRecord, MachineType, fit_type, why_odd
-from balancing.correction.update_coefficients import update
-from balancing.data.conventions import Labels
+from balancing import (
+    Correction,
+    Labels,
+    MachineRecord,
+    MachineType,
+    ReadingErrors,
+    Trials,
+    UndeterminedError,
+    correct,
+    fit_type,
+    update,
+)
+from balancing.regions import NORMAL_RADIUS
+from rotorid.commands.type_coefficients import LEVEL
 from rotorid.regression import stretch
-from rotorid.workflows.fleet.type_coefficients import LEVEL
 
 ComplexArray = NDArray[np.complex128]
 KINDS = {"each coefficient": (1, 1, 1, 1), "planes alike": (1, 1, 1, 0), "machine alike": (1, 0, 0, 0)}
@@ -120,21 +128,12 @@ def judged(
     foreign: bool,
 ) -> Shot:
     """Against the truth, and a check run."""
-    assert found.covariance is not None
-    assert found.after_covariance is not None
-    assert found.check_rms is not None
-    d, n = stretch(found.weights - D), 2 * len(D)
     off = stretch((check - found.after).ravel()).reshape(-1, 2, 1)
     far = (np.swapaxes(off, 1, 2) @ np.linalg.solve(found.after_covariance.reshape(-1, 2, 2), off)).ravel()
-    weights = bool(d @ np.linalg.solve(found.covariance, d) < bound(n, found.dof))
     size = float(np.sqrt(np.mean(np.abs(check) ** 2)))
-    readings = float(np.mean(far < bound(2, found.dof)))
+    readings = float(np.mean(far < NORMAL_RADIUS**2))
+    weights = found.region().holds(D)
     return Shot(left, weights, readings, size < found.check_rms, bool(found.warnings), foreign)
-
-
-def bound(n: int, dof: float | None) -> float:
-    """95 % quantile of the squared distance of n numbers."""
-    return float(chdtri(n, 0.05) if dof is None else n * fdtri(n, dof, 0.95))
 
 
 def odd_machines(rng: np.random.Generator, drawn: Type) -> tuple[list[tuple[str, bool, bool]], list[bool]]:
@@ -149,7 +148,7 @@ def odd_machines(rng: np.random.Generator, drawn: Type) -> tuple[list[tuple[str,
         other = {"lag for lead": np.conj(W), "another keyphasor mark": turned}.get(what, W[:, order])
         records[m] = record(m, other)
     kind = fit_type(records, *drawn[2:])
-    odd = {each.job: why_odd(kind, each) for each, _ in kind.odd}
+    odd = {each.job: kind.why_odd(each) for each, _ in kind.odd}
     told = [
         (what, str(m) in odd, word in odd.get(str(m), ""))
         for (what, word), m in zip(ODD.items(), chosen, strict=True)

@@ -13,11 +13,8 @@ import pytest
 import sure
 from balancing_data import complex_normal
 from repetitions import FULL, highest_share, lowest_share
-from scipy.special import chdtri
 
-from balancing import UndeterminedError, estimate_influence
-from balancing.solvers.effective_variance import effective_variance
-from rotorid.regression import stretch
+from balancing import UndeterminedError, correct, estimate_influence
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +44,13 @@ def test_good_jobs_are_seldom_warned(good):
 
 
 def test_errors_twice_as_large_as_stated():
-    """Those that a test can see are warned of; regions of others are too small, which the bounds notice."""
+    """Spare runs tell of them, in most jobs by a warning, and widen the regions; else these are too small."""
     n = 500 if FULL else 200
     found = example.simulate(n // 3, "stated, spare runs", "independent", told=2.0)
     said = [bool(one.words) for one in found if one.inside is not None and one.redundant >= 8]
-    assert np.mean(said) >= lowest_share(len(said), 0.95)
+    assert np.mean(said) >= lowest_share(len(said), 0.80)
+    inside = [one.inside for one in found if one.inside is not None]
+    assert np.mean(inside) >= lowest_share(len(inside), 0.93)
     inside = silent(example.simulate(n // 2, "stated", "common to a run", told=2.0))
     assert np.mean(inside) < lowest_share(len(inside), 0.93)
 
@@ -63,9 +62,7 @@ def test_assumed_errors_that_are_not_too_small():
 
 def test_errors_in_common_taken_as_independent_are_noticed(monkeypatch):
     """The bounds refuse the wrong model: every error between runs its own."""
-    import balancing.coefficients.run_error_estimate as run_likelihood
-
-    monkeypatch.setattr(run_likelihood, "SHARES", (1.0,))
+    monkeypatch.setattr("balancing.errors.OWN_SHARES", np.ones(1))
     n = 500 if FULL else 180
     found = [one for kind in example.KINDS[2:] for one in example.simulate(n // 3, "stated", kind)]
     inside = silent(found)
@@ -99,15 +96,10 @@ def test_a_residual_beyond_the_errors_keeps_the_truth_in_the_region():
         outside *= 0.2 * np.linalg.norm(Y) / np.linalg.norm(outside)
         readings = job.trials.readings + outside.reshape(clean.baseline.shape)
         try:
-            found = estimate_influence(replace(job.trials, readings=readings))
+            found = correct(estimate_influence(replace(job.trials, readings=readings)))
         except UndeterminedError:
             continue
-        channels = found.covariance.reshape(-1, *found.covariance.shape[-2:])
-        fit = effective_variance(found.W.reshape(W.shape), found.baseline.ravel(), channels)
-        d = stretch(fit.weights - job.D)
-        inside.append(
-            d @ np.linalg.solve(fit.covariance * fit.inflation**2, d) < chdtri(2 * len(job.D), 0.05)
-        )
+        inside.append(found.region().holds(job.D))
     assert np.mean(inside) >= lowest_share(n, 0.93), np.mean(inside)
 
 

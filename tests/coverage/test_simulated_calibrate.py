@@ -5,7 +5,7 @@ import pytest
 from helpers.calibration.jobs import Runs, machine
 from scipy.stats import chi2
 
-from balancing.data.trials import ReadingErrors
+from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 

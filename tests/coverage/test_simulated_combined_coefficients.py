@@ -7,21 +7,25 @@ import pytest
 from balancing_data import complex_normal, synthetic
 from repetitions import FULL
 
-from balancing import Influence, Labels, ReadingErrors, correct, estimate_influence
-from balancing.coefficients.combined_coefficients import combine
+from balancing import (
+    Gaussian,
+    Influence,
+    Labels,
+    ReadingErrors,
+    combine,
+    correct,
+    estimate_influence,
+    with_parameters,
+)
 
 ERRORS = ReadingErrors(0.03, 0.03)
 
 
 def model(W, error, planes="AB", sensors=("s0", "s1", "s2", "s3"), speeds=(100.0, 200.0, 300.0), unit="g"):
     """Computed coefficients with a covariance as `model_influence` makes it."""
-    S, C, P = W.shape
-    covariance = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    own = np.arange(2, 2 * P + 2)
-    covariance[..., own, own] = np.repeat((error * np.abs(W)) ** 2, 2, axis=-1)
-    return Influence(
-        np.array(speeds), sensors, tuple(planes), W, covariance=covariance, labels=Labels(weight_unit=unit)
-    )
+    nothing, none = np.full(W.shape[:2], np.nan), Gaussian.none(*W.shape)
+    exact = Influence(np.array(speeds), sensors, tuple(planes), W, nothing, none, Labels(weight_unit=unit))
+    return with_parameters(exact, np.zeros((0, *W.shape)), error)
 
 
 def noisy(rng, made, errors=ERRORS):
@@ -47,10 +51,10 @@ def test_combining_reduces_the_error_where_both_are_right():
         squares += [np.sum(np.abs(i.W - W) ** 2) for i in (measured, computed, found)]
         if k % 3 == 0:
             weights += [np.sum(np.abs(correct(i).weights - true) ** 2) for i in (measured, found)]
-        warned += any("measured and computed" in words for words in found.warnings)
+        warned += any("measured and computed" in words for words in found.remarks.warnings)
         error = (found.W - W).view(float)[..., None]
         chi.append(
-            np.mean(np.swapaxes(error, -1, -2) @ np.linalg.solve(found.covariance[..., 2:, 2:], error))
+            np.mean(np.swapaxes(error, -1, -2) @ np.linalg.solve(found.channels()[..., 2:, 2:], error))
         )
     assert squares[2] < 0.8 * squares[:2].min()
     assert weights[1] < 0.9 * weights[0]

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from balancing_data import synthetic
 from repetitions import highest_share, lowest_share, repetitions
-from scipy.stats import chi2
 
-from balancing import correct, estimate_influence
-from balancing.data.reading_errors import turned
-from balancing.data.trials import RunScatter
+from balancing import RunScatter, correct, estimate_influence
+from rotorid.base.complex_numbers import turned
 
 STEADY = RunScatter(0.0, 1e-9)
 """Runs that differ by hardly anything but their readings."""
@@ -46,7 +44,7 @@ def test_coverage_of_weights_with_unequal_deviations():
         trials = measured(replace(exact, readings=drawn(rng, Y, along, across)), along, across)
         found = correct(estimate_influence(replace(trials, run_errors=STEADY)), method="least-squares")
         d = (found.weights - true).view(float)
-        inside += d @ np.linalg.solve(found.covariance, d) < chi2.ppf(0.95, d.size)
+        inside += found.region().holds(true)
         each += np.mean(np.abs(d) < 1.96 * np.sqrt(np.diag(found.covariance)))
     assert lowest_share(n, 0.95) <= inside / n <= highest_share(n, 0.95)
     assert 0.93 <= each / n <= 0.97

@@ -38,7 +38,7 @@ def test_errors_of_the_parameters_are_those_of_drawn_rotors(shot):
         rotor = with_parameters(job.rotor, theta)
         drawn.append(fem.influence(rotor, list(job.planes), places, job.trials.speeds).W)
     spread = np.std(drawn, axis=0)
-    stated = np.sqrt(np.sum(np.abs(influence.parameters[..., 1:]) ** 2, axis=0))
+    stated = np.sqrt(np.sum(np.abs(influence.columns()[..., 1:]) ** 2, axis=0))
     np.testing.assert_allclose(stated, spread, rtol=max(0.2, of_a_spread(draws)))
 
 

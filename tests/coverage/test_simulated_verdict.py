@@ -7,9 +7,7 @@ import numpy as np
 from balancing_data import complex_normal, synthetic
 from repetitions import highest_share, lowest_share, repetitions
 
-from balancing import ReadingErrors, estimate_influence
-from balancing.correction.verdict import verdict_of_check
-from balancing.iso21940 import tolerance
+from balancing import ReadingErrors, estimate_influence, tolerance, verdict_of_check
 
 ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
 

@@ -147,30 +147,26 @@ turbo-limit                 balance {TURBO}/job.toml --limit 5
 turbo-limit-minmax          balance {TURBO}/job.toml --method minmax --limit "probe 1=3" --limit "probe 2=4"
 turbo-max-mass              balance {TURBO}/job.toml --max-mass 300g_mm
 turbo-best-planes           balance {TURBO}/job.toml --best-planes 2
-turbo-trade-off             balance {TURBO}/job.toml --best-planes 2 --trade-off --plot trade-off.png
 turbo-ridge                 balance {TURBO}/job.toml --ridge 0.05
-turbo-ridge-auto            balance {TURBO}/job.toml --ridge auto
-turbo-truncate              balance {TURBO}/job.toml --truncate 2
-turbo-truncate-share        balance {TURBO}/job.toml --truncate 0.1
 turbo-part                  balance {TURBO}/job.toml --planes left,right --speeds 1220,3600
 turbo-lag                   balance {TURBO}/job.toml --phase lag --angles "against rotation"
 turbo-coarse-errors         balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8
-turbo-coarse-ridge          balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8 --ridge auto
+turbo-coarse-ridge          balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8 --ridge 0.05
 turbo-report                balance {TURBO}/job.toml --report sheet.html
 checked                     balance {TURBO}/checked.toml
-checked-verbose             balance {TURBO}/checked.toml --verbose --history --output sheet.xlsx
+checked-verbose             balance {TURBO}/checked.toml --verbose --output sheet.xlsx
 checked-refine              balance {TURBO}/checked.toml --refine
 checked-refine-minmax       balance {TURBO}/checked.toml --refine --method minmax --report sheet.html
 checked-grade               balance {TURBO}/checked.toml --planes left,right --grade G2.5 --rotor-mass 558kg --service-speed 4500rpm
 checked-grade-positions     balance {TURBO}/checked.toml --planes left,right --grade G6.3 --rotor-mass 558kg --service-speed 4500rpm --positions left=600mm,right=2500mm --bearings 200mm,3000mm --centre 1600mm
 holes-report                balance {TURBO}/holes.toml --split --report sheet.html
 holes-plot                  balance {TURBO}/holes.toml --split --plot discs.png
-holes-minmax                balance {TURBO}/holes.toml --split --best --method minmax --split-seconds 60
+holes-minmax                balance {TURBO}/holes.toml --split --method minmax
 holes-unsplit               balance {TURBO}/holes.toml
 model-job                   balance {MODEL_JOB} --model-error 2
 model-job-assumed           balance {MODEL_JOB}
 model-job-10                balance {MODEL_JOB} --model-error 10
-model-job-ridge             balance {MODEL_JOB} --model-error 10 --ridge auto
+model-job-ridge             balance {MODEL_JOB} --model-error 10 --ridge 0.05
 model-job-weighted          balance {MODEL_JOB} --model-error 2 --method weighted --report sheet.html
 computed                    balance sample_data/model_job/modelled.toml --coefficients computed --model-error 5
 combined                    balance sample_data/model_job/modelled.toml --coefficients combined --model-error 5
@@ -179,7 +175,7 @@ bk-errors                   balance sample_data/bk_two_plane/job.toml --amplitud
 bk-minmax                   balance sample_data/bk_two_plane/job.toml --method minmax
 bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method weighted
 bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --amplitude-error 2 --phase-error 1 --verbose
-left-in                     balance sample_data/left_in/job.toml --history
+left-in                     balance sample_data/left_in/job.toml
 left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
@@ -203,7 +199,6 @@ unbalance-model-job         unbalance {MODEL_JOB} --stations 6,9,12,15,18
 unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2 --output u.csv --plot u.png --verbose
 unbalance-ridge             unbalance {MODEL_JOB} --stations 6,9,12,15,18 --method ridge
 unbalance-ridge-stated      unbalance {MODEL_JOB} --stations 6,12,18 --method ridge --ridge 0.1
-unbalance-modal             unbalance {MODEL_JOB} --stations 6,9,12,15,18 --method modal --modes 2
 unbalance-no-rotor          unbalance {TURBO}/job.toml --stations 6,12
 split-holes                 split 35g@120 --holes 24 --pieces 10g,20g
 split-taken                 split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2 --output s.csv --plot s.png
@@ -604,12 +599,9 @@ STORED = (
     "turbo-limit-minmax",
     "turbo-output",
     "turbo-stored",
-    "turbo-trade-off",
-    "turbo-truncate",
     "type",
     "type-foreign",
     "type-refined",
-    "unbalance-modal",
     "unbalance-model-job",
     "unbalance-ridge",
     "vectors-run-up",

@@ -52,7 +52,7 @@ MUTATIONS = (
     Mutation(
         "sign of phase lag",
         "turbo-lag vectors-run-up",
-        "balancing/data/conventions.py",
+        "balancing/conventions.py",
         'return 1 if self.phase == "lead" else -1',
         'return 1 if self.phase == "lead" else 1',
     ),
@@ -65,10 +65,10 @@ MUTATIONS = (
     ),
     Mutation(
         "stacking of speeds",
-        "turbo turbo-trade-off combined",
-        "balancing/correction/correct.py",
-        "        Y.ravel(),",
-        "        Y[::-1].ravel(),",
+        "turbo combined",
+        "balancing/correct.py",
+        "            part.baseline.ravel(),\n            name,",
+        "            part.baseline[::-1].ravel(),\n            name,",
     ),
     Mutation(
         "one entry of the gyroscopic matrix",
@@ -94,7 +94,7 @@ MUTATIONS = (
     Mutation(
         "rounding of a hole's angle",
         "split-holes split-stock holes-report",
-        "balancing/mounting/holes.py",
+        "balancing/holes.py",
         "np.arange(int(n)) / int(n), 2 * np.pi)",
         "np.arange(int(n)) / int(n) + np.radians(0.5), 2 * np.pi)",
     ),

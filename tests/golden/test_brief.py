@@ -79,8 +79,8 @@ def test_what_does_not_fit_is_found(output, words):
 
 
 JOBS = {
-    "job.toml": {"best_planes": 2, "trade_off": True, "history": True},
-    "checked.toml": {"limit": ("2",), "history": True},
+    "job.toml": {"best_planes": 2},
+    "checked.toml": {"limit": ("2",)},
     "holes.toml": {"split": True},
 }
 

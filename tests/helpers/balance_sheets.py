@@ -4,7 +4,7 @@ from pathlib import Path
 
 from sheets import read_sheet
 
-from rotorid.workflows.balance import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 
 DATA = Path(__file__).parents[2] / "sample_data"
 SETTINGS = """

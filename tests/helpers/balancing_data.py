@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from balancing import Labels, Trials
+from balancing import Gaussian, Influence, Labels, Trials, with_parameters
 
 GRAM = 1e-3
 
@@ -73,3 +73,18 @@ def noisy(rng, Y, errors, shape=()):
     radial, tangential = rng.standard_normal((2, *shape, *Y.shape))
     floor = complex_normal(rng, (*shape, *Y.shape)) * errors.floor
     return Y + unit * np.abs(Y) * (errors.amplitude * radial + 1j * errors.phase * tangential) + floor
+
+
+def stored(W, baseline=None, speeds=None, *, relative=0.0, planes=None, labels=None, errors=None):
+    """Coefficients (S, C, P) as they are read from a file; `relative` error of each, or none known."""
+    W = np.asarray(W, dtype=complex)
+    S, C, P = W.shape
+    baseline = np.full((S, C), np.nan) if baseline is None else baseline
+    speeds = 100.0 * np.arange(1, S + 1) if speeds is None else speeds
+    names = tuple(f"s{c}" for c in range(C)), tuple(planes or "ABCDEFGH"[:P])
+    known = Influence(speeds, *names, W, baseline, errors or Gaussian.none(S, C, P), labels or Labels())
+    return with_parameters(known, np.zeros((0, S, C, P)), relative) if relative else known
+
+
+def rms(z):
+    return float(np.sqrt(np.mean(np.abs(z) ** 2)))

@@ -1,4 +1,4 @@
-"""Drawn problems of the weighted fit within limits, a global search of their objective by SciPy; cones."""
+"""Drawn problems of the weighted fit within limits, a global search of their objective by SciPy."""
 
 from __future__ import annotations
 
@@ -7,13 +7,8 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize
 
-from balancing import Limits
-from balancing.solvers import likelihood
-from balancing.solvers.cone import problem as cone_problem
-from balancing.solvers.cone import solve_cone
-from balancing.solvers.correction_methods import Stack
-from balancing.solvers.effective_variance import effective_variance
-from balancing.solvers.forbidden_angles import allowed_sectors
+from balancing import Limits, solve
+from balancing.cones import allowed_sectors
 
 
 def drawn(seed):
@@ -67,39 +62,23 @@ def limited(W, Y, free, seed):
 
 
 def problem(seed):
-    """Stack and objective of a drawn problem."""
+    """W, Y, covariances of a drawn problem, those with the further error of the fit, and limits."""
     W, Y, channels = drawn(seed)
-    free = effective_variance(W, Y, channels)
-    assert free.converged
-    limits = limited(W, Y, free.weights, seed)
-    N, P = W.shape
-    stack = Stack(
-        W,
-        Y,
-        channels,
-        None,
-        limits,
-        tuple("ABC"[:P]),
-        tuple(f"reading {i}" for i in range(N)),
-        "{:.4g}".format,
-        "{:.4g}".format,
-    )
+    free = solve(W, Y, "weighted", channels=channels)
     wider = channels.copy()
     wider[:, [0, 1], [0, 1]] += free.model_error**2
-    return stack, likelihood.problem_of(W, Y, wider, np.ones(N))
+    return W, Y, channels, wider, limited(W, Y, free.weights, seed)
 
 
-def global_search(stack, fit, tries):
+def global_search(objective_of, W, Y, limits, tries):
     """The least objective of SciPy's SLSQP from many starts for each plane, in every sector."""
     rng = np.random.default_rng(0)
-    W, Y, limits = stack.W, stack.Y, stack.limits
     N, P = W.shape
     size = limits.max_weight
     scale = np.repeat(size, 2)
 
     def objective(x):
-        at = likelihood.evaluate(fit, x * scale)
-        return at.objective, 2 * likelihood.gradient(fit, at) * scale
+        return objective_of(x * scale)
 
     best = np.inf
     real = np.zeros((2, N, 2 * P))
@@ -135,7 +114,6 @@ def global_search(stack, fit, tries):
             found = minimize(
                 objective,
                 z.view(float),
-                jac=True,
                 constraints={"type": "ineq", "fun": kept, "jac": slope},
                 method="SLSQP",
                 options={"ftol": 1e-13, "maxiter": 300},
@@ -143,15 +121,3 @@ def global_search(stack, fit, tries):
             if np.isfinite(found.fun) and kept(found.x).min(initial=0.0) >= -1e-9:
                 best = min(best, float(found.fun))
     return best
-
-
-def least_squares_cone(W, Y, **given):
-    return solve_cone(cone_problem(W, Y, **given))
-
-
-def minmax_cone(W, Y, **given):
-    return solve_cone(cone_problem(W, Y, minmax=True, **given))
-
-
-def weight_budget_cone(W, Y, budget, **given):
-    return solve_cone(cone_problem(W, Y, budget=budget, **given))

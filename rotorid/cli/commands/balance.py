@@ -3,41 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rotorid.commands.app import EQUATIONS, OUTPUT, TABLES, WITH_REPORT, Destination, check_targets, command
-from rotorid.workflows.balance import BalanceOptions
-from rotorid.workflows.balance import balance as work
+from rotorid.commands.app import TABLES, Destination, check_targets, command
+from rotorid.commands.balance import BalanceOptions
+from rotorid.commands.balance import balance as work
 
 
-@command(
-    BalanceOptions,
-    names={"machine_type": ["--type"]},
-    least={
-        "model_error": 0.0,
-        "amplitude_error": 0.0,
-        "phase_error": 0.0,
-        "run_error": 0.0,
-        "split_seconds": 0.1,
-        "best_planes": 1,
-    },
-    panels={
-        "Input and conventions": "phase angles amplitude_error phase_error run_error waveforms",
-        "Method": "method planes speeds best_planes trade_off coefficients",
-        "Limits": "max_mass limit",
-        "Mounting": "split best",
-        "Machines of a type": "machine_type",
-        "Check run": "refine history",
-        "Grade": "grade rotor_mass service_speed positions bearings centre",
-        OUTPUT: "save_influence template",
-        "Expert": "influence model_error ridge truncate split_seconds",
-    },
-    to=(*WITH_REPORT, *EQUATIONS),
-)
+@command(BalanceOptions, panels=BalanceOptions.panels, to=BalanceOptions.to)
 def balance(
     files: Annotated[
         list[Path] | None,
@@ -80,15 +56,10 @@ def balance(
         raise ValueError(
             "give a job (.toml, .xlsx) or a runs table and a weights table; --template writes a form"
         )
-    output = to.output
-    workbook = output if output is not None and output.suffix.lower() == ".xlsx" else None
-    replace(to, output=None if workbook else output).deliver(
+    to.deliver(
         "correction weights",
         lambda: work(files, options),
-        more=[
-            (save_influence, TABLES, lambda found: found.influence_table(save_influence or "")),
-            (workbook, TABLES, lambda found: found.workbook(workbook or "")),
-        ],
+        more=[(save_influence, TABLES, lambda result: result.influence_table(save_influence or ""))],
     )
 
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rotorid.commands.app import EQUATIONS, OUTPUT, WITH_REPORT, Destination, command
+from rotorid.commands.app import OUTPUT, Destination, command
+from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rotorid.commands.app import EQUATIONS, WITH_REPORT, Destination, command
+from rotorid.commands.app import Destination, command
+from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
 from rotorid.workflows.identify import IdentifyOptions, compare
 from rotorid.workflows.identify import identify as work
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from rotorid.commands.app import EQUATIONS, OUTPUT, STATE_SPACES, WITH_REPORT, Destination, command
+from rotorid.commands.app import OUTPUT, STATE_SPACES, Destination, command
+from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
 from rotorid.workflows.reduce import ReduceOptions, View
 from rotorid.workflows.reduce import reduce as work
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.unit_words import Shown, speed_axis
 from rotorid.harmonic.experiments import Experiments

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.data.conventions import polar
 from rotorid.base import result
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words

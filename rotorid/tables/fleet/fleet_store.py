@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.data.conventions import Labels, polar
-from balancing.data.trials import Trials
+from balancing import Labels, Trials
+from rotorid.base.complex_numbers import polar
 from rotorid.tables.fleet.fleet_tables import TABLES, VERSION, Columns, JobRows, arrow, arrow_table
 
 if TYPE_CHECKING:

@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from balancing.coefficients.influence import Influence
-from balancing.coefficients.machine_type import record_of
-from balancing.data.conventions import Labels
-from balancing.data.trials import Trials
+from balancing import Influence, Labels, MachineRecord, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.fleet.fleet_tables import Columns, JobRows
 from rotorid.tables.job.job_data import Job
@@ -102,8 +99,8 @@ def _coefficients(job: Job, influence: Influence) -> dict[str, Any]:
     s, c, p = np.indices(influence.W.shape).reshape(3, -1)
     W = influence.W.ravel()
     own: FloatArray = np.full((len(W), 2, 2), np.nan)
-    if influence.covariance is not None:
-        own = record_of("", "", influence).covariance.reshape(own.shape)
+    if influence.known_errors:
+        own = MachineRecord.of(influence).covariance.reshape(own.shape)
     return {
         "speed_rad_s": influence.speeds[s],
         "sensor": _named(influence.sensors, c),

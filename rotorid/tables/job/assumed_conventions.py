@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from balancing.data.trials import off_axis
 from rotorid.base.arrays import ComplexArray
+from rotorid.base.complex_numbers import off_axis
 from rotorid.tables.job.job_data import Job
 
 

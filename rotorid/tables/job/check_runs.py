@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from balancing.data.trials import Trials
+from balancing import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

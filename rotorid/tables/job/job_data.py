@@ -8,16 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from balancing.coefficients.influence import Influence
-from balancing.data.conventions import Labels
-from balancing.data.limits import Limits
-from balancing.data.trials import Trials
-from balancing.mounting.holes import Holes
+from balancing import Holes, Influence, Labels, Limits, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors, as_phase, check_angles
 
 if TYPE_CHECKING:
-    from balancing.mounting.mount_result import Mounted
+    from balancing import Mounted
     from fem import Rotor, Sensor
 
 
@@ -74,7 +70,7 @@ class Job:
     check_mounted
         Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
     check_pieces
-        The pieces that `check.weights` are then, by `rotorid.workflows.check_pieces`; None: others.
+        The pieces that `check.weights` are then, by `rotorid.commands.after_check`; None: others.
     rotor
         The model that the job names, or None.
     plane_nodes

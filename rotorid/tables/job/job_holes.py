@@ -12,9 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from balancing.data.conventions import Labels
-from balancing.data.limits import Arc, Limits
-from balancing.mounting.holes import Holes, from_list
+from balancing import Holes, Labels, Limits, from_list
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.job.job_keys import FORBIDDEN, HOLES, SAME_DEG
 from rotorid.tables.reader.settings_keys import Said
@@ -44,7 +42,7 @@ def read_holes(
         sound = _fits_together(plane, tuple(holes_at))
         if not (sound and holes_at) or labels is None or name not in planes:
             continue
-        arcs: Sequence[Arc] = ()
+        arcs: Sequence[tuple[float, float]] = ()
         largest = math.inf
         if limits is not None:
             at = list(planes).index(name)
@@ -106,7 +104,7 @@ def _fits_together(plane: Said, names: Sequence[str]) -> bool:
 
 
 def _make(
-    plane: Said, holes: dict[str, float], labels: Labels, arcs: Sequence[Arc], limit: float
+    plane: Said, holes: dict[str, float], labels: Labels, arcs: Sequence[tuple[float, float]], limit: float
 ) -> Holes | None:
     section, available, step = plane.section, plane["available_g"], plane["step_g"]
     radius = None if plane["radius_mm"] is None else plane["radius_mm"].si
@@ -142,7 +140,7 @@ def _make(
         return None
 
 
-def inside(angle: float, arcs: Sequence[Arc]) -> bool:
+def inside(angle: float, arcs: Sequence[tuple[float, float]]) -> bool:
     """Whether an angle lies strictly inside one of the arcs; their ends, to within rounding, do not count."""
     near = math.radians(SAME_DEG)
     return any(near < (angle - start) % (2 * math.pi) < width - near for start, width in arcs)

@@ -347,6 +347,9 @@ ERRORS = (
     Key("floor", number(0.0), "one standard deviation at amplitude 0, in the unit of the readings"),
     Key("run_percent", number(0.0), "what changes from run to run, one standard deviation, percent"),
     Key("run_floor", number(0.0), "the same at amplitude 0, in the unit of the readings"),
+    Key("placement_deg", number(0.0), "one standard deviation of the angle of a mounted weight, degrees"),
+    Key("placement_percent", number(0.0), "one standard deviation of its mass, percent"),
+    Key("drift_percent", number(0.0), "how far readings drift from the first run to the last, percent"),
 )
 _STATED = value_kinds.table(ERRORS)
 KEY_PHASOR = (

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.data.limits import Limits
-from balancing.data.trials import Trials
+from balancing import Limits, Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.job.job_keys import FORBIDDEN
 from rotorid.tables.job.job_planes import Planes

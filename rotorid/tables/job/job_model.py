@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from fem import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

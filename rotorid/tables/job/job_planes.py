@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from balancing.data.trials import Trials
+from balancing import Trials
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.job.job_model import Model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from rotorid.tables.job.assumed_conventions import with_assumed
 from rotorid.tables.job.check_runs import read_check
 from rotorid.tables.job.job_data import Job, Overrides

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import cast
 
-from balancing.coefficients.influence import Influence
-from balancing.data.conventions import Angles, Labels, Phase, Rotation, View
-from balancing.data.trials import Trials
+from balancing import Influence, Labels, Trials
 from rotorid.base.text import listing
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.reader.columns import Source, source_name
@@ -19,8 +17,12 @@ from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slo
 from rotorid.tables.runs.stated_conventions import (
     ANGLES,
     ROTATIONS,
+    Angles,
     Conventions,
+    Phase,
+    Rotation,
     StatedErrors,
+    View,
     as_angles,
     as_phase,
     resolve_angles,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from balancing.coefficients.influence import Influence
+from balancing import Influence
 from rotorid.tables.job.job_from_excel import RESULTS
 from rotorid.tables.reader.excel_pages import Line
 from rotorid.tables.reader.grid import Cell

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from balancing.data.conventions import polar
 from fem import GRAVITY, KINDS
 from fem.forces import FORCES
 from rotorid.base.arrays import FloatArray
+from rotorid.base.complex_numbers import polar
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.motion.small_model import SmallModel

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing.data.conventions import polar
 from fem import Rotor
+from rotorid.base.complex_numbers import polar
 from rotorid.motion.small_model import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, read_table

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing.data.conventions import polar
 from fem import Rotor
+from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.motion.small_model import SmallModel

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, cast, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import Origin, RunErrors
-from balancing.data.conventions import Labels
-from balancing.data.reading_errors import Source
-from balancing.data.trials import ReadingErrors
+from balancing import Influence, Labels, Reading, RunErrors
+from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.base.words import ErrorSource, Origin
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number
 from rotorid.tables.reader.problems import Problems
@@ -38,37 +36,32 @@ ERRORS_MEANING = (
 )
 BASELINE_MEANING = "rows of (baseline): the vibration without weights, in the unit of the vibration"
 _SIZES = ("amplitude_percent", "phase_deg", "floor")
-_RUN = ("run_percent", "run_weights_percent", "run_floor")
-"""Own, common at a speed, common to the run; one number alone: common to the run."""
-_DEGREES = ("degrees_of_freedom", "reading_degrees_of_freedom")
+_DEGREES = ("reading_degrees_of_freedom", "degrees_of_freedom")
+"""Of a reading's errors; older tables have those of the coefficients besides, the second."""
+_RUN = ("run_percent", "run_weights_percent")
+"""Own, common at a speed, common to the run: one number alone is both halves of the variance."""
+_OLD = ("run_floor", "run_share", "run_interval", "run_case", "run_merged")
+"""Of older tables, passed over."""
+_PARTS = ("own", "common", "weights", "unbalance")
+"""Sizes of `RunErrors`, in their order."""
 _KEYS: dict[str, tuple[int, ...] | tuple[str, ...]] = {
     **dict.fromkeys(_SIZES, (1,)),
-    "source": tuple(word for word in get_args(Source) if word != "unknown"),
+    "source": tuple(word for word in get_args(ErrorSource) if word != "unknown"),
     **dict.fromkeys(_DEGREES, (1,)),
     **dict.fromkeys(_RUN, (1, 3)),
     "run_source": get_args(Origin),
-    "run_share": (1,),
-    "run_interval": (2,),
-    "run_case": (4,),
-    "run_merged": ("yes", "no"),
+    "runs": ("{}",),
 }
-"""What may stand at each key: so many numbers, or one of some words."""
+"""What may stand at each key: so many numbers, one of some words, or JSON."""
 _ERRORS = re.compile(r"errors?\s*[.:=].*", re.IGNORECASE)
 _STATEMENT = re.compile(r"errors\.(\w+)\s*=\s*(.*)")
 
 
 class Errors(NamedTuple):
-    """Errors of a single reading, degrees of freedom of the coefficients, where they come from.
+    """Errors of a single reading and between runs."""
 
-    Degrees of freedom of a reading, errors between runs, and their share as `Influence.own_between`.
-    """
-
-    reading: ReadingErrors | None = None
-    dof: float | None = None
-    source: Source = "unknown"
-    reading_dof: float | None = None
-    run: RunErrors = RunErrors()
-    between: float = 0.0
+    reading: Reading
+    run: RunErrors
 
 
 def read_conventions(source: str, comments: Sequence[str], problems: Problems) -> dict[str, str]:
@@ -95,47 +88,72 @@ def read_conventions(source: str, comments: Sequence[str], problems: Problems) -
 
 def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
     """Errors of a reading from comment lines such as `# errors.phase_deg = 2`, or what is unknown."""
-    before = len(problems)
-    numbers: dict[str, list[list[float]]] = {}
+    before, scale = len(problems), vibration.scale
+    numbers: dict[str, list[float]] = {}
     words: dict[str, str] = {}
-    first = ""
+    run, first = RunErrors(np.zeros((1, len(_PARTS))), np.ones(1), "none"), ""
     for number, comment in enumerate(table.comments):
         if _ERRORS.fullmatch(comment) is None:
             continue
         statement = _STATEMENT.fullmatch(comment)
         key, text = statement.groups() if statement else ("", "")
+        first = first or comment
+        if key in _OLD:
+            continue
         try:
             if key not in _KEYS:
                 hint = did_you_mean(key, _KEYS)
                 raise NotANumber(f"# errors.KEY = VALUE with one of the keys {listing(_KEYS)}{hint}")
-            if (key in numbers or key in words) and key != "run_case":
+            if key in numbers or key in words:
                 raise NotANumber(f"errors.{key} once")
-            if isinstance(_KEYS[key][0], str):
+            if key == "runs":
+                words[key], run = text, _runs(text, scale)
+            elif isinstance(_KEYS[key][0], str):
                 words[key] = _word(text, key)
             else:
-                numbers.setdefault(key, []).append(_numbers(text, key))
+                numbers[key] = _numbers(text, key)
         except NotANumber as reason:
             problems.add(table.source, _row(table, number), None, f"# {comment}", str(reason))
-        first = first or comment
     if len(problems) > before or not (numbers or words):
-        return Errors()
-    value = {key: found[0][0] for key, found in numbers.items()}
-    sizes = {key: value[key] for key in _SIZES if key in value}
+        return Errors(Reading(), run)
+    if "runs" not in words and any(key in numbers for key in _RUN):
+        run = RunErrors(_few(numbers), np.ones(1), cast("Origin", words.get("run_source", "stated")))
+    sizes = {key: numbers[key][0] for key in _SIZES if key in numbers}
     if not any(sizes.values()):
         expected = f"an error of a reading above 0 with it: # errors.{listing(_SIZES)}"
         problems.add(table.source, _row(table, table.comments.index(first)), None, f"# {first}", expected)
-        return Errors()
-    dof, reading_dof = (value.get(key) for key in _DEGREES)
-    if not any(key.startswith("run_") for key in (*numbers, *words)):
-        reading_dof = reading_dof or dof
-    return Errors(
-        StatedErrors(**sizes).in_si(Labels(vibration_scale=vibration.scale)),
-        dof,
-        cast("Source", words.get("source", "stated")),
-        reading_dof,
-        _run_errors(numbers, words, vibration.scale),
-        value.get("run_share", 0.0),
-    )
+        return Errors(Reading(), run)
+    reading = StatedErrors(**sizes).in_si(Labels(vibration_scale=scale))
+    dof = next((numbers[key][0] for key in _DEGREES if key in numbers), np.inf)
+    return Errors(Reading(reading, cast("ErrorSource", words.get("source", "stated")), dof=dof), run)
+
+
+def _runs(text: str, scale: float) -> RunErrors:
+    """Errors between runs from the JSON that `error_comments` writes."""
+    try:
+        value = json.loads(text)
+        columns = np.array([value[f"{part}_percent"] for part in _PARTS], dtype=np.float64) / 100
+        probability = np.array(value["probability"], dtype=np.float64)
+        single = np.array([value["level"], value["evenly"]], dtype=np.float64)
+        sound = columns.shape == (len(_PARTS), len(probability)) and value["source"] in get_args(Origin)
+        everything = np.concatenate((columns.ravel(), probability, single))
+        if not (sound and (everything >= 0).all() and np.isfinite(everything).all() and probability.any()):
+            raise ValueError
+    except (ValueError, TypeError, KeyError):
+        keys = [*(f"{part}_percent" for part in _PARTS), "probability"]
+        raise NotANumber(
+            "JSON with source, level, evenly and equally many numbers of 0 or more in each of "
+            + listing(keys, "and")
+        ) from None
+    probability /= probability.sum()
+    return RunErrors(columns.T, probability, value["source"], float(single[0]) / scale, float(single[1]))
+
+
+def _few(numbers: Mapping[str, list[float]]) -> FloatArray:
+    """Sizes (1, 4) from few numbers in percent."""
+    row, weights = (np.array(numbers.get(key, [0.0])) / 100 for key in _RUN)
+    own, common = (row[0], np.hypot(*row[1:])) if len(row) == 3 else (row[0] / np.sqrt(2),) * 2
+    return np.array([[own, common, np.sqrt(np.sum(weights**2)), 0.0]])
 
 
 def _numbers(text: str, key: str) -> list[float]:
@@ -155,28 +173,6 @@ def _word(text: str, key: str) -> str:
     if text not in known:
         raise NotANumber(f"one of {listing(map(repr, known))}{did_you_mean(text, known)}")
     return text
-
-
-def _run_errors(
-    numbers: Mapping[str, list[list[float]]], words: Mapping[str, str], scale: float
-) -> RunErrors:
-    sizes = np.zeros((3, 3))
-    for k, key in enumerate(_RUN):
-        if key in numbers:
-            row = numbers[key][0]
-            sizes[k, -len(row) :] = np.array(row) / (scale if key == "run_floor" else 100.0)
-    cases = np.array(numbers.get("run_case", []))
-    if not (cases.any() and cases[:, 0].any() and cases[:, 1:].any()):
-        cases = np.ones((1, 4))
-    interval = numbers.get("run_interval")
-    return RunErrors(
-        sizes,
-        cast("Origin", words.get("run_source", "stated" if sizes.any() else "none")),
-        None if interval is None else (interval[0][0] / scale, interval[0][1] / scale),
-        cases[:, 0] / cases[:, 0].sum(),
-        cases[:, 1:],
-        words.get("run_merged") == "yes",
-    )
 
 
 def _row(table: Table, number: int) -> int | None:
@@ -202,30 +198,29 @@ def check_notes(notes: Sequence[str]) -> None:
 
 def error_comments(influence: Influence, labels: Labels) -> tuple[str, ...]:
     """Comment lines that `read_errors` reads; none where nothing is known."""
-    lines = [] if influence.covariance is None else [ERRORS_MEANING]
-    lines += [] if influence.baseline is None else [BASELINE_MEANING]
-    errors, run, scale = influence.errors, influence.run_errors, labels.vibration_scale
-    if errors is None:
-        return tuple(lines)
-    said: dict[str, ArrayLike | None] = {
-        "amplitude_percent": 100 * errors.amplitude,
-        "phase_deg": np.degrees(errors.phase),
-        "floor": errors.floor * scale,
-        "degrees_of_freedom": influence.dof,
-        "reading_degrees_of_freedom": influence.reading_dof,
-    }
-    words: dict[str, str] = {"source": influence.error_source} if influence.error_source != "unknown" else {}
-    cases = np.zeros((0, 4))
-    if run.origin != "none":
-        said |= dict(zip(_RUN, run.sizes * [[100.0], [100.0], [scale]], strict=True))
-        said["run_share"] = influence.own_between
-        said["run_interval"] = None if run.interval is None else np.multiply(run.interval, scale)
-        words |= {"run_source": run.origin, "run_merged": "yes" if run.merged else "no"}
-        cases = np.column_stack((run.probability, run.ratios))
-    lines += [f"errors.{key} = {_shown(value)}" for key, value in said.items() if np.any(value)]
-    lines += [f"errors.{key} = {word}" for key, word in words.items()]
-    return (*lines, *(f"errors.run_case = {_shown(case)}" for case in cases))
+    lines = [ERRORS_MEANING] if influence.known_errors else []
+    lines += [BASELINE_MEANING] if influence.has_baseline else []
+    reading, run, scale = influence.reading, influence.run_errors, labels.vibration_scale
+    if reading.errors is not None:
+        errors = reading.errors
+        sizes = 100 * errors.amplitude, float(np.degrees(errors.phase)), errors.floor * scale
+        lines += [f"errors.{key} = {value!r}" for key, value in zip(_SIZES, sizes, strict=True) if value]
+        lines += [f"errors.source = {reading.source}"] if reading.source != "unknown" else []
+        lines += [f"errors.{_DEGREES[0]} = {float(reading.dof)!r}"] if np.isfinite(reading.dof) else []
+    if reading.errors is not None and run.origin != "none":
+        likely = run.probability > 1e-4
+        percent = zip(_PARTS, 100 * run.sizes[likely].T, strict=True)
+        told = {
+            "source": run.origin,
+            "level": run.level * scale,
+            "evenly": run.evenly,
+            **{f"{part}_percent": _rounded(sizes) for part, sizes in percent},
+            "probability": _rounded(run.probability[likely]),
+        }
+        lines.append(f"errors.runs = {json.dumps(told)}")
+    return tuple(lines)
 
 
-def _shown(values: ArrayLike | None) -> str:
-    return " ".join(repr(float(value)) for value in np.ravel(np.asarray(values, dtype=float)))
+def _rounded(values: FloatArray) -> list[float]:
+    """To six figures."""
+    return [float(f"{value:.6g}") for value in values]

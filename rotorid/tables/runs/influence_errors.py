@@ -6,13 +6,11 @@ first of this row's coefficient with the second of the same sensor's and speed's
 plane. Rows of the plane `(baseline)` hold the vibration of the bare rotor that the coefficients were measured
 with, in the unit of the vibration, and its correlations with them.
 
-What sensors and speeds have in common stands in pairs of columns `common_run_1_re`, `common_run_1_im`, …, and
-`common_speed_1_re`, …: an error moves every coefficient by its column, as a complex share of the root mean
-square of the two standard deviations, times an independent complex number with parts of variance 1: one
-number for the column, or one for each speed. Without the rows of `(baseline)` a later run has errors of its
-own only; without the columns `common_…` sensors and speeds count as independent. Errors of a model's
-parameters (`Influence.parameters`) are kept in these covariances; what sensors and speeds have in common of
-them is not.
+What readings have in common stands in pairs of columns `common_1_re`, `common_1_im`, `common_2_re`, …: an
+error moves every coefficient by its column, as a complex share of the root mean square of the two standard
+deviations, times one real number of variance 1 for all rows. Without the rows of `(baseline)` a later run has
+errors of its own only; without the columns `common_…` readings count as independent. Older tables have
+`common_run_1_re`, … (times a complex number for all rows) and `common_speed_1_re`, … (one for each speed).
 """
 
 from __future__ import annotations
@@ -22,10 +20,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import marginal
-from balancing.data.conventions import Labels
+from balancing import Influence, Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.regression import stretch, unstretch
 from rotorid.tables.reader.columns import Column, Table
 from rotorid.tables.reader.decimal_numbers import SMALLEST
 from rotorid.tables.reader.grid import Grid, show
@@ -35,7 +32,7 @@ from rotorid.tables.reader.units import Unit, UnitError, UnitReader, ratio, spel
 PARTS = ("re", "im")
 BASELINE = "(baseline)"
 """In the column of the plane: the vibration without weights."""
-_COMMON = re.compile(r"common_(run|speed)_\d+_(re|im)")
+_COMMON = re.compile(r"common(_run|_speed)?_\d+_(re|im)")
 _NOTHING = 1e-14
 _ROUNDING = 1e-9
 _INDEFINITE = 1e-6
@@ -75,7 +72,7 @@ def _correlation(a: str, b: str, plane: object) -> str:
 def read_covariance(
     table: Table, places: IndexArray, planes: Sequence[str], labels: Labels, problems: Problems
 ) -> tuple[FloatArray, ComplexArray] | None:
-    """Covariance in SI and phase lead, what is common of it; None without such columns or with problems.
+    """Covariance in SI and phase lead, and what is common besides; None without columns or with problems.
 
     Parameters
     ----------
@@ -92,7 +89,7 @@ def read_covariance(
 
     Returns
     -------
-    (S, C, 2P, 2P), and as `Influence.common`, (2, M, S, C, P).
+    Covariance without what is common, (S, C, 2P, 2P), and columns of this, (M, S, C, P).
     """
     if "std_re" not in table:
         return None
@@ -122,25 +119,29 @@ def read_covariance(
     common = _read_common(table, places, sign) * np.sqrt(np.mean(std.reshape(S, C, P, 2) ** 2, axis=-1))
     std = std * np.tile([1.0, float(sign)], P)
     covariance = (R + np.swapaxes(R, -1, -2)) / 2 * std[..., None] * std[..., None, :]
-    own, scale = covariance - marginal(common), np.where(std > 0, np.abs(std), 1.0)
+    F = stretch(common[..., None])[..., 0]
+    own, scale = covariance - np.einsum("mscp,mscq->scpq", F, F), np.where(std != 0, np.abs(std), 1.0)
     for s, c in np.ndindex(S, C):
         if np.linalg.eigvalsh(own[s, c] / np.outer(scale[s, c], scale[s, c]))[0] < -_INDEFINITE:
             stem = next(name for name in table.fields if name.startswith("common_"))
             expected = "no more in common than the standard deviations and correlations of this row say"
             table.complain(int(places[s, c, 0]), stem, expected)
             return None
-    return covariance, common
+    return own, common
 
 
 def _read_common(table: Table, places: IndexArray, sign: int) -> ComplexArray:
-    """Shares that errors have in common, (2, M, S, C, P); an im without a re counts, too."""
-    names = sorted({name[:-3] for name in table.fields if name.startswith("common_")})
-    out = np.zeros((2, len(names), *places.shape), dtype=complex)
-    for m, name in enumerate(names):
+    """Shares that errors have in common, (M, S, C, P); an im without a re counts, too."""
+    out = [np.zeros((0, *places.shape), dtype=complex)]
+    for name in sorted({name[:-3] for name in table.fields if name.startswith("common_")}):
+        column = np.zeros((1, *places.shape), dtype=complex)
         for part, unit in zip(PARTS, (1, 1j * sign), strict=True):
             if f"{name}_{part}" in table:
-                out[int(name.startswith("common_speed")), m] += unit * table.numbers(f"{name}_{part}")[places]
-    return out
+                column += unit * table.numbers(f"{name}_{part}")[places]
+        if name.startswith("common_speed"):
+            column = np.eye(len(places))[:, :, None, None] * column
+        out += [column] if re.match(r"common_\d", name) else [column, 1j * column]
+    return np.concatenate(out)
 
 
 def _check_correlations(
@@ -180,7 +181,7 @@ def error_values(influence: Influence, labels: Labels, rows: Sequence[str]) -> M
 
     Rows: the planes, after `BASELINE` where that is written.
     """
-    if influence.covariance is None:
+    if not influence.known_errors:
         return {}
     S, C = influence.W.shape[:2]
     n, first = len(rows), 1 + len(influence.planes) - len(rows)
@@ -189,7 +190,7 @@ def error_values(influence: Influence, labels: Labels, rows: Sequence[str]) -> M
     )
     above = f"{labels.vibration_unit}_" if labels.vibration_unit else ""
     flip = np.tile([1.0, float(labels.phase_sign)], n)
-    covariance = influence.covariance[..., 2 * first :, 2 * first :] * np.outer(flip, flip)
+    covariance = influence.channels()[..., 2 * first :, 2 * first :] * np.outer(flip, flip)
     std = np.sqrt(np.maximum(np.einsum("scii->sci", covariance), 0.0))
     std = np.where(std * np.repeat(scale, 2) < SMALLEST, 0.0, std)
     safe = np.where(std > 0, std, 1.0)
@@ -203,27 +204,19 @@ def error_values(influence: Influence, labels: Labels, rows: Sequence[str]) -> M
     for q, plane in enumerate(rows):
         for a, b in np.ndindex(2, 2):
             out[_correlation(PARTS[a], PARTS[b], plane)] = blocks[..., a, q, b].ravel()
-    if influence.common is None:
-        return out
     size = np.sqrt(np.mean(each**2, axis=-1))
-    share = np.where(size > 0, influence.common[..., first:] / np.where(size > 0, size, 1.0), 0.0)
-    run = _fewest(share[0].reshape(-1, S * C * n)).reshape(-1, S, C, n)
-    speeds = [_fewest(share[1, :, s].reshape(-1, C * n)).reshape(-1, C, n) for s in range(S)]
-    speed = np.zeros((max(map(len, speeds)), S, C, n), dtype=complex)
-    for s, columns in enumerate(speeds):
-        speed[: len(columns), s] = columns
-    for kind, found in (("run", run), ("speed", speed)):
-        for m, column in enumerate(found, 1):
-            out[f"common_{kind}_{m}_re"] = _written(column.real).ravel()
-            out[f"common_{kind}_{m}_im"] = _written(labels.phase_sign * column.imag).ravel()
+    share = np.where(size > 0, influence.columns()[..., first:] / np.where(size > 0, size, 1.0), 0.0)
+    for m, column in enumerate(_fewest(share.reshape(-1, S * C * n)), 1):
+        out[f"common_{m}_re"] = _written(column.real)
+        out[f"common_{m}_im"] = _written(labels.phase_sign * column.imag)
     return out
 
 
 def _fewest(columns: ComplexArray) -> ComplexArray:
-    """As few columns (M, n) as make the same covariance."""
-    s, right = np.linalg.svd(columns, full_matrices=False)[1:]
+    """As few columns (M, n) as make the same covariance, times real numbers."""
+    s, right = np.linalg.svd(stretch(columns[..., None])[..., 0], full_matrices=False)[1:]
     kept = s > _NOTHING * s.max(initial=0.0)
-    return np.asarray(s[kept, None] * right[kept])
+    return unstretch(s[kept, None] * right[kept])
 
 
 def _written(values: FloatArray) -> FloatArray:

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from balancing.coefficients.influence import Influence
-from balancing.data.conventions import Labels
-from balancing.data.trials import Trials
+from balancing import Gaussian, Influence, Labels, Trials
 from fem import label
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
@@ -189,21 +187,14 @@ def load_influence(
         angles=angles or as_angles(said.get("angles", "with rotation")),
     )
     values = written.vibration_from(size, angle)
-    theta, covariance, common = _whole(values[places], known, planes, weight.scale)
+    theta, own, common = _whole(values[places], known, planes, weight.scale)
     influence = Influence(
         speeds=np.array(speeds),
         sensors=sensors,
         planes=tuple(name for name in planes if name != BASELINE),
         W=theta[..., 1:],
-        baseline=theta[..., 0] if BASELINE in planes else None,
-        covariance=covariance,
-        common=common,
-        dof=errors.dof,
-        errors=errors.reading,
-        error_source=errors.source,
-        reading_dof=errors.reading_dof,
-        run_errors=errors.run,
-        own_between=errors.between,
+        baseline=theta[..., 0],
+        errors=Gaussian(own, common, errors.reading, errors.run),
         labels=labels,
     )
     return Stored(influence, said)
@@ -211,19 +202,18 @@ def load_influence(
 
 def _whole(
     values: ComplexArray, known: tuple[FloatArray, ComplexArray] | None, planes: Sequence[str], scale: float
-) -> tuple[ComplexArray, FloatArray | None, ComplexArray | None]:
-    """(Y₀, W), covariance and common columns of rows with a baseline or without, and then zero there."""
+) -> tuple[ComplexArray, FloatArray, ComplexArray]:
+    """(Y₀, W), covariance and common columns; without rows of a baseline NaN and 0 there."""
     to = np.array([1 / scale if name == BASELINE else 1.0 for name in planes])
     first = 0 if BASELINE in planes else 1
     n = len(planes) + first
-    theta = np.zeros((*values.shape[:2], n), dtype=complex)
+    theta = np.full((*values.shape[:2], n), np.nan, dtype=complex)
     theta[..., first:] = values * to
-    if known is None:
-        return theta, None, None
     covariance = np.zeros((*values.shape[:2], 2 * n, 2 * n))
-    covariance[..., 2 * first :, 2 * first :] = known[0] * np.outer(np.repeat(to, 2), np.repeat(to, 2))
-    common = np.zeros((*known[1].shape[:-1], n), dtype=complex)
-    common[..., first:] = known[1] * to
+    common = np.zeros((0 if known is None else len(known[1]), *theta.shape), dtype=complex)
+    if known is not None:
+        covariance[..., 2 * first :, 2 * first :] = known[0] * np.outer(np.repeat(to, 2), np.repeat(to, 2))
+        common[..., first:] = known[1] * to
     return theta, covariance, common
 
 
@@ -251,7 +241,7 @@ def influence_frame(coefficients: Coefficients, labels: Labels | None = None) ->
         [str(name) for name in coefficients.planes],
     )
     own = coefficients if isinstance(coefficients, Influence) else None
-    if own is not None and own.baseline is not None and BASELINE not in rows:
+    if own is not None and own.has_baseline and BASELINE not in rows:
         values, rows = np.concatenate((own.baseline[..., None], values), axis=-1), [BASELINE, *rows]
     S, C, n = values.shape
     above = f"{labels.vibration_unit}_" if labels.vibration_unit else ""

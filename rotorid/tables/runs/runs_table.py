@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from balancing.data.reading_errors import turned
-from balancing.data.trials import Trials
+from balancing import Trials
 from rotorid.base.arrays import FloatArray
+from rotorid.base.complex_numbers import turned
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, make_table
 from rotorid.tables.reader.problems import Problems

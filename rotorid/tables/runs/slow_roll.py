@@ -19,8 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.conventions import Labels
-from balancing.data.trials import ReadingErrors, Trials
+from balancing import Labels, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing

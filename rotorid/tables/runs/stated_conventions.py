@@ -4,27 +4,37 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import isfinite, radians
-from typing import cast
+from typing import cast, get_args
 
 import numpy as np
 
-from balancing.data.conventions import ANGLES as ANGLES
-from balancing.data.conventions import PHASES as PHASES
-from balancing.data.conventions import Angles as Angles
-from balancing.data.conventions import Labels
-from balancing.data.conventions import Phase as Phase
-from balancing.data.trials import ReadingErrors, RunScatter
+from balancing import Labels, Placement, ReadingErrors, RunScatter, Trials
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.base.words import Angles as Angles
+from rotorid.base.words import Phase as Phase
+from rotorid.base.words import Rotation as Rotation
+from rotorid.base.words import View as View
 from rotorid.tables.reader.settings_keys import Said
 
-ROTATIONS = ("clockwise", "counter-clockwise")
+PHASES: tuple[Phase, ...] = get_args(Phase)
+ANGLES: tuple[Angles, ...] = get_args(Angles)
+ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
 STATED_ANGLES = (*ANGLES, *ROTATIONS)
 """What a job may say; clockwise and counter-clockwise need its `rotation`, seen from the same end."""
-VIEWS = ("drive end", "free end")
+VIEWS: tuple[View, ...] = get_args(View)
 DEFAULT_TOLERANCE = 0.5
 LARGEST_TOLERANCE = 20.0
-ERROR_KEYS = ("amplitude_percent", "phase_deg", "floor", "run_percent", "run_floor")
+ERROR_KEYS = (
+    "amplitude_percent",
+    "phase_deg",
+    "floor",
+    "run_percent",
+    "run_floor",
+    "placement_deg",
+    "placement_percent",
+    "drift_percent",
+)
 FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
 
 
@@ -79,6 +89,10 @@ class StatedErrors:
         In the amplitude's own unit, in every direction.
     run_percent, run_floor
         The same for what changes from run to run; None: nobody says.
+    placement_deg, placement_percent
+        Of the angle and the mass of a mounted weight.
+    drift_percent
+        Of the readings, from the first run to the last.
 
     Raises
     ------
@@ -91,12 +105,15 @@ class StatedErrors:
     floor: float = 0.0
     run_percent: float | None = None
     run_floor: float | None = None
+    placement_deg: float = 0.0
+    placement_percent: float = 0.0
+    drift_percent: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ERROR_KEYS:
             value = getattr(self, name) or 0.0
             if not (isfinite(value) and value >= 0):
-                raise ValueError(f"{name} of a reading must be finite and not negative, not {value!r}")
+                raise ValueError(f"{name} must be finite and not negative, not {value!r}")
 
     def in_si(self, labels: Labels) -> ReadingErrors | None:
         """Of a reading: relative, in rad, and in the unit of the readings inside; None: nobody says."""
@@ -110,6 +127,16 @@ class StatedErrors:
         if self.run_percent is None and self.run_floor is None:
             return None
         return RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / labels.vibration_scale)
+
+    def stated_in(self, trials: Trials) -> Trials:
+        """The runs with these errors."""
+        return replace(
+            trials,
+            errors=self.in_si(trials.labels),
+            run_errors=self.between_runs(trials.labels),
+            placement=Placement(self.placement_percent / 100.0, radians(self.placement_deg)),
+            drift=self.drift_percent / 100.0,
+        )
 
 
 def check_angles(word: str) -> None:
@@ -135,7 +162,7 @@ def resolve_angles(stated: str, rotation: str | None) -> Angles:
     """
     check_angles(stated)
     if stated in ANGLES:
-        return cast("Angles", stated)
+        return stated
     if rotation is None:
         raise ValueError(
             f"angles that count {stated} need the direction of rotation seen from the same end: state "

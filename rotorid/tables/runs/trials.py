@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from balancing.data.conventions import Labels
-from balancing.data.trials import ReadingErrors, Trials, off_axis
+from balancing import Labels, ReadingErrors, Trials
+from rotorid.base.complex_numbers import off_axis
 from rotorid.tables.reader.columns import Source
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.runs_table import read_runs
@@ -75,12 +75,13 @@ def make_trials(
     mounted = None if weights is None else read_weights(weights, names, conventions, problems)
     if read is None or (mounted is None and weights is not None) or len(problems):
         return None
-    between, labels = None, read.labels
+    labels = read.labels
     if isinstance(errors, StatedErrors):
-        between = errors.between_runs(labels)
-        errors = errors.in_si(labels)
+        read = errors.stated_in(read)
+    elif errors is not None:
+        read = replace(read, errors=errors)
     planes, placed = read.planes, read.weights
     if mounted is not None:
         planes, placed = mounted.planes, mounted.weights
         labels = replace(labels, weight_unit=mounted.unit.name, weight_scale=mounted.unit.scale)
-    return replace(read, planes=planes, weights=placed, labels=labels, errors=errors, run_errors=between)
+    return replace(read, planes=planes, weights=placed, labels=labels)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing.data.conventions import Labels, Phase
-from balancing.data.reading_errors import turned
-from balancing.data.trials import Trials
+from balancing import Labels, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.complex_numbers import turned
 from rotorid.base.result import Column as Told
+from rotorid.base.words import Phase
 from rotorid.harmonic.modal.run_up import SweepVectors as SweepVectors
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing.data.conventions import Labels, Phase
+from balancing import Labels
 from rotorid.base import result
 from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.result import Column
 from rotorid.base.rpm import RPM
 from rotorid.base.text import listing
+from rotorid.base.words import Phase
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import InputError, Problems, TableWarning
 from rotorid.tables.reader.units import VIBRATION

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from rotorid.base.arrays import AnyArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

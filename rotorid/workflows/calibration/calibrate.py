@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotorid.base.answer import Answer
 from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import command, log_rotor, phase, provenance
+from rotorid.commands.outcome import Found, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Names, Nodes, Speeds, nodes, rising_speeds
-from rotorid.workflows.result_provenance import Found
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.coefficients.coefficients_from_model import DERIVATIVES
 from rotorid.base.text import counted
 from rotorid.calibration import MeasuredFrequencies, RunReadings
-from rotorid.workflows.calibration.model_places import model_places
+from rotorid.commands.model_places import model_places
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -82,7 +81,7 @@ def run_readings(
         tuple(places.nodes[plane] for plane in trials.planes),
         np.array([1.0 if places.radii is None else places.radii[plane] for plane in trials.planes]),
         tuple(places.sensors[sensor] for sensor in trials.sensors),
-        DERIVATIVES[places.quantity],
+        places.derivatives,
         job.key_phasor,
         tuple(unbalance),
         bow,

@@ -192,12 +192,11 @@ def _read(found: FoundJob) -> JobRows | str:
 def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> JobRows:
     """Rows of a job with its coefficients, and what `correct` proposes where that was mounted."""
     from balancing import estimate_influence
-    from balancing.coefficients.baseline import starting_point
+    from rotorid.commands.after_check import pieces_mounted
+    from rotorid.commands.coefficients import proposed
     from rotorid.tables.fleet.job_records import job_rows, kind_of
     from rotorid.tables.fleet.job_search import job_id
     from rotorid.tables.reader.input_file import sha256
-    from rotorid.workflows.check_pieces import pieces_mounted
-    from rotorid.workflows.coefficients import proposed
 
     influence, trials, check, labels = job.influence, job.trials, job.check, job.trials.labels
     before = mounted = None
@@ -207,9 +206,9 @@ def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) 
     except ValueError as error:
         undetermined = str(error)
     if influence is not None and check is not None:
-        before, runs = influence.baseline, None if job.influence is None else trials
+        runs = None if job.influence is None else trials
         try:
-            before = starting_point(influence, runs).readings
+            before = (influence if runs is None else influence.rebased(runs)).baseline
             if not job.check_mounted:
                 correction = proposed(job, influence, runs)
                 pieces = pieces_mounted(job, correction, influence, runs)
@@ -217,7 +216,7 @@ def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) 
         except ValueError as error:
             refused = f"no corrections are proposed: {error}"
     told = [str(one.message).encode(errors="replace").decode() for one in caught]  # of any names of files
-    said = [*(trials if influence is None else influence).warnings, *told]
+    said = [*(trials.warnings if influence is None else influence.remarks.warnings), *told]
     said += [labels.assumed_in_words(), refused]
     files = [sha256(file) for file in job.files]
     quantity, weight_kind = kind_of(labels)

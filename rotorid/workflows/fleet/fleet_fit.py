@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.arrays import FloatArray
-    from rotorid.workflows.fleet.type_records import KnownType
+    from rotorid.commands.type_records import KnownType
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,9 @@ class TypeFound(Delivered):
 
     def figure(self) -> Figure:
         """Coefficients of all machines over their mean, each plane and sensor for itself."""
-        from rotorid.workflows.fleet.type_picture import type_picture
+        from balancing.plots import type_figure
 
-        return type_picture(self.known.kind)
+        return type_figure(self.known.kind)
 
 
 def _odd_words(one: Mapping[str, Any]) -> str:
@@ -139,14 +139,13 @@ def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
 
     ValueError for a fleet or a type that are not there; UndeterminedError with fewer than three machines.
     """
-    from balancing.coefficients.machine_type import why_odd
+    from rotorid.commands.type_records import known_type
     from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
-    from rotorid.workflows.fleet.type_records import known_type
 
     store = FleetStore(Path(fleet))
     known = known_type(store, options.machine_type)
     return TypeFound(
         known=known,
-        reasons=tuple(why_odd(known.kind, odd, trials_of(store, odd.job)) for odd, _ in known.kind.odd),
+        reasons=tuple(known.kind.why_odd(odd, trials_of(store, odd.job)) for odd, _ in known.kind.odd),
         provenance=provenance(store.files("jobs", "coefficients"), options),
     )

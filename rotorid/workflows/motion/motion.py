@@ -407,8 +407,8 @@ def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     """Read "7=20um@90" as x + iy in m, by node."""
     import numpy as np
 
+    from rotorid.commands.option_quantities import quantity
     from rotorid.tables.reader import units
-    from rotorid.workflows.option_quantities import quantity
 
     def read(_: str, value: str) -> complex:
         size, _, angle = value.partition("@")

@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from balancing import Correction, Trials, UndeterminedError, correct, estimate_influence
-from balancing.data.trials import RunScatter
-from balancing.solvers.error_propagation import region_radius
+from balancing import Correction, RunScatter, Trials, UndeterminedError, correct, estimate_influence
 from fem import InfluenceCoefficients, Rotor, influence
 from fem.parameters import with_parameters
 from rotorid.base.arrays import ComplexArray
-from rotorid.regression import stretch
 from rotorid.tables.study_file import MachineStudy
 
 TRIAL = 0.5
@@ -121,7 +118,4 @@ def _trials(study: MachineStudy, readings: list[ComplexArray], weights: list[Com
 
 def _holds(found: Correction, D: ComplexArray) -> bool | None:
     """Whether the joint 95 % region of the weights holds D; None where there is none."""
-    if found.covariance is None:
-        return None
-    d = stretch(found.weights - D)
-    return bool(d @ np.linalg.solve(found.covariance, d) < region_radius(found.dof, d.size) ** 2)
+    return found.region().holds(D) if found.region_known else None

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from rotorid.commands.input_checks import file_of
-from rotorid.commands.outcome import command, phase, provenance
+from rotorid.commands.outcome import Found, command, phase, provenance
 from rotorid.commands.quantities import Band, band, one_of
 from rotorid.workflows.identify import amplitude_errors
-from rotorid.workflows.result_provenance import Found
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

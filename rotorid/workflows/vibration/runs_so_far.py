@@ -14,7 +14,7 @@ from rotorid.base.text import figures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing.data.trials import Trials
+    from balancing import Trials
     from rotorid.base.arrays import FloatArray
     from rotorid.tables.reader.columns import Source, Table
     from rotorid.tables.reader.grid import Grid
@@ -89,7 +89,7 @@ class RunsSoFar:
         """The largest change that a run makes, in words; None before there are readings of both."""
         from scipy.special import chdtri
 
-        from balancing.coefficients.trial_effects import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
+        from balancing import clear_change
 
         if self.baseline is None:
             return None
@@ -98,12 +98,7 @@ class RunsSoFar:
             return None
         channel, (start, change, errors) = max(found, key=lambda one: abs(one[1][1]))
         seen = any(made[2] ** 2 > float(chdtri(2, 0.05 / len(found))) for _, made in found)
-        large = any(
-            not start
-            or abs(abs(start + change) / abs(start) - 1) >= ENGINEERS_AMPLITUDE
-            or abs(_angle((start + change) / start)) >= ENGINEERS_PHASE
-            for _, (start, change, _) in found
-        )
+        large = any(clear_change(start, start + change) for _, (start, change, _) in found)
         level = LEVELS[seen * (1 + large)]
         labels = channel.trials.labels
         where = f"{channel.sensor} at {labels.speed_words(float(channel.trials.speeds[0]))}"
@@ -131,7 +126,7 @@ class RunsSoFar:
         ValueError
             Where nothing is read there yet.
         """
-        from balancing.plots.readings_polar import readings
+        from balancing.plots import draw_readings
         from rotorid.base.plot_style import on_figure
 
         found = [one for one in self.channels if (one.speed, one.sensor) == (speed, sensor)]
@@ -139,7 +134,7 @@ class RunsSoFar:
             raise ValueError(f"nothing is read yet of {sensor!r} at {speed}")
         trials, covariance = found[0].trials, found[0].covariance
         first = self.baseline if self.baseline in trials.runs else None
-        return on_figure(lambda ax: readings(trials, covariance, first, ax), 5, 4.6, projection="polar")
+        return on_figure(lambda ax: draw_readings(trials, covariance, first, ax), 5, 4.6, projection="polar")
 
 
 def runs_so_far(job: Path) -> RunsSoFar:
@@ -209,7 +204,7 @@ def _channels(
     grid: Grid, table: Table, conventions: Conventions, said: Said, slow: Source | Mapping[str, Said] | None
 ) -> Iterator[Channel]:
     """Each sensor at each speed that can be read by itself."""
-    from balancing.data.reading_errors import error_model, mean_covariance
+    from balancing import reading_of
     from rotorid.tables.reader.problems import Problems
     from rotorid.tables.runs.slow_roll import make_slow_roll, subtract_slow_roll
     from rotorid.tables.runs.trials import make_trials
@@ -226,8 +221,8 @@ def _channels(
     for rows in _rows_by_channel(table, conventions.speed_tolerance_percent):
         trials = read(replace(grid, rows=tuple(grid.rows[i] for i in rows)))
         if trials is not None:
-            model = error_model(trials if whole is None else whole)  # repeats of all channels count
-            yield Channel(table.shown("speed", rows[0]), trials, mean_covariance(trials, model))
+            reading = reading_of(trials if whole is None else whole)  # repeats of all channels count
+            yield Channel(table.shown("speed", rows[0]), trials, reading.covariance(trials))
 
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[int]]:
@@ -242,7 +237,3 @@ def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[in
             near = next((v for v, _ in found if same_speed(v, speed[i], tolerance_percent)), float(speed[i]))
             found.setdefault((near, sensor[i]), []).append(i)
     return [found[key] for key in sorted(found, key=lambda key: key[0])]
-
-
-def _angle(z: complex) -> float:
-    return math.atan2(z.imag, z.real)

@@ -12,7 +12,7 @@ from rotorid.commands.quantities import Names, Speeds, names, one_of, speeds
 from rotorid.workflows.vibration.vectors_result import Picture, VectorsOfRecords
 
 if TYPE_CHECKING:
-    from balancing.data.conventions import Phase
+    from rotorid.base.words import Phase
     from rotorid.waveforms.record import Edge
 
 EDGES = ("leading", "trailing", "rising", "falling", "centre")

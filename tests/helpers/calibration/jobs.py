@@ -6,7 +6,7 @@ import dense_rotor
 import numpy as np
 
 import fem
-from balancing.data.trials import Trials
+from balancing import Trials
 from rotorid.calibration import RunReadings
 
 

@@ -11,7 +11,7 @@ from helpers.calibration.jobs import Runs, machine
 from repetitions import FULL
 
 import fem
-from balancing.data.trials import ReadingErrors
+from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import MeasuredFrequencies, Unknown, calibrate
 from rotorid.regression import nonlinear, search

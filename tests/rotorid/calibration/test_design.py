@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.calibration.jobs import Runs, machine
 
-from balancing.data.trials import ReadingErrors, RunScatter
+from balancing import ReadingErrors, RunScatter
 from fem.parameters import parameter_value, with_parameters
 from rotorid.calibration import Unknown
 from rotorid.workflows.calibration.calibration_design import design

@@ -9,9 +9,7 @@ from helpers.calibration.jobs import Runs, bent, machine
 from scipy.linalg import eigh
 
 import fem
-from balancing.coefficients.run_error_estimate import given
-from balancing.coefficients.run_errors import runs_of
-from balancing.data.trials import ReadingErrors, RunScatter
+from balancing import ReadingErrors, RunScatter, usual_run_errors
 from fem.parameters import with_parameters
 
 ERRORS = ReadingErrors(0.02, 0.03)
@@ -69,18 +67,17 @@ def test_derivatives_are_differences_of_the_dense_rotor():
         assert abs(own - expected).max() < 1e-6 * abs(expected).max(), path
 
 
-def joint_covariance(data, W, sizes):
-    """Of all rows (S, x, C, real and imaginary), by loops over what each error does to each reading.
-
-    `sizes` (3, 3) of p, w, f by the kinds own, at a speed, of the run: what a run's errors go along.
-    """
+def joint_covariance(data, W, run):
+    """Of all rows (S, x, C, real and imaginary), by loops over what each error does to each reading."""
+    own, common, loads, further = run.typical
     trials, P = data.trials, len(data.nodes)
     Y = trials.mean
     R, S, C = Y.shape
     e, n = trials.errors, trials.repeats
-    effect = np.einsum("scp,rp->rsc", W[..., :P], trials.weights)
+    loaded = np.einsum("scp,rp->rsc", W[..., :P], trials.weights)
     unit = np.moveaxis(W[..., :P], -1, 0)
     unit = unit / np.sqrt((abs(unit) ** 2).mean(axis=(1, 2)) * P)[:, None, None]
+    unit = unit * np.sqrt(np.mean(abs(Y) ** 2))
     columns = []  # what an independent error of size 1 changes, (R, S, C)
 
     def add(change):
@@ -92,16 +89,14 @@ def joint_covariance(data, W, sizes):
         columns.append(here * Y * e.amplitude / np.sqrt(n[r, s, c]))
         columns.append(here * 1j * Y * e.phase / np.sqrt(n[r, s, c]))
         add(here * e.floor / np.sqrt(n[r, s, c]))
-        p, w, f = sizes[:, 0]
-        for part in (p * Y, w * effect, f * np.ones(Y.shape)):
-            add(here * part)
+        alike = np.mean(abs(Y[r, s]) ** 2)
+        size = run.evenly * alike + (1 - run.evenly) * abs(Y[r, s, c]) ** 2
+        add(here * own * np.sqrt(size))
     for r in range(R):
-        for speeds, kind in (*(([s], 1) for s in range(S)), (list(range(S)), 2)):
-            here = np.zeros((R, S, C))
-            here[r, speeds] = 1.0
-            p, w, f = sizes[:, kind]
-            for part in (p * Y, w * effect, *(f * np.ones((R, 1, 1)) * one for one in unit)):
-                add(here * part)
+        here = np.zeros((R, 1, 1))
+        here[r] = 1.0
+        for part in (common * Y, loads * loaded, *(further * one for one in unit)):
+            add(here * part)
     take = np.eye(R) if data.modelled else np.hstack((-np.ones((R - 1, 1)), np.eye(R - 1)))
     rows = np.einsum("xr,krsc->ksxc", take, np.array(columns)).reshape(len(columns), -1)
     real = np.stack((rows.real, rows.imag), axis=-1).reshape(len(columns), -1)
@@ -123,9 +118,7 @@ def noisy(runs, **trials):
 @pytest.mark.parametrize("scatter", [None, RunScatter(0.05, 2e-6)])
 def test_whitening_is_that_of_one_joint_covariance(free, scatter):
     data, W = noisy(Runs(free=free), run_errors=scatter)
-    runs = runs_of(data.trials.mean, data.trials.weights, W[..., :2])
-    sizes = given([], runs, *scatter, "stated").sizes if scatter else np.zeros((3, 3))
-    C = joint_covariance(data, W, sizes)
+    C = joint_covariance(data, W, usual_run_errors(data.trials))
     rows = data.rows(W)
     raw = rows.raw(W).ravel()
     x = np.stack((raw.real, raw.imag), axis=-1).ravel()

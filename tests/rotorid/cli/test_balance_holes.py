@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from balancing import correct, estimate_influence
-from balancing.mounting.mount import mount
+from balancing import correct, estimate_influence, mount
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 
@@ -19,14 +18,12 @@ def vector(rows):
     return sum(r["mass"] * np.exp(1j * np.deg2rad(r["angle_deg"])) for r in rows)
 
 
-@pytest.mark.parametrize(("method", "gain"), [("least-squares", 2.0), ("minmax", 2.2), ("weighted", 1.05)])
-def test_all_planes_together_are_better_than_one_by_one(cli, method, gain):
-    found = cli("balance", HOLES, "--split", "--best", "--method", method, "--json")
+@pytest.mark.parametrize("method", ["least-squares", "minmax", "weighted"])
+def test_pieces_stand_in_their_holes(cli, method):
+    found = cli("balance", HOLES, "--split", "--method", method, "--json")
     assert found.code == 0, found.err
     m = found.json["mounting"]
-    assert m["proven"] is True
-    assert m["gap"] < 1e-8
-    assert m["plane_by_plane"] > gain
+    assert m["rms_after"] < 0.2 * found.json["rms_before"]
     for plane in m["planes"]:
         own = [r for r in m["holes"] if r["plane"] == plane["plane"]]
         assert all(r["mass"] in (pytest.approx(150), pytest.approx(300)) for r in own)
@@ -39,15 +36,10 @@ def test_prediction_of_what_is_mounted():
     job = read_job(HOLES)
     influence = estimate_influence(job.trials)
     found = correct(influence)
-    m = mount(found, influence, None, job.holes, within=1.0)
+    m = mount(found, influence, None, job.holes)
     np.testing.assert_allclose(m.after, found.before + influence.W @ m.weights, rtol=1e-12)
     assert m.after_covariance.shape == (*m.after.shape, 2, 2)
     assert np.linalg.norm(m.after) >= np.linalg.norm(found.after)
-
-
-def test_best_without_split_is_refused(cli):
-    outcome = cli("balance", HOLES, "--best")
-    assert (outcome.code, "only with --split" in outcome.err) == (2, True)
 
 
 def job_with(tmp_path, text):
@@ -106,10 +98,12 @@ def test_pieces_on_top_of_what_a_check_run_had(cli, tmp_path):
         own = [r for r in first["holes"] if r["plane"] == plane]
         z = vector(own)
         total[p] = z * 1e-6
+        keys.append(f"[planes.{plane}]\nholes = 12\navailable_g_mm = [10]\nper_hole = 2\n")
+        if not own:
+            continue
         rows.append(f"check,{plane},{abs(z):.9g},{np.degrees(np.angle(z)) % 360:.9g}")
         taken = ", ".join(f'"{r["hole"]}" = {r["mass"]:.9g}' for r in own)
-        hole = "holes = 12\navailable_g_mm = [10]\nper_hole = 2\n"
-        keys.append(f"[planes.{plane}]\n{hole}taken = {{ {taken} }}\n")
+        keys.append(f"taken = {{ {taken} }}\n")
     after = influence.baseline + influence.W @ total
     check = ["run,speed_rpm,sensor,amplitude_um_pp,phase_deg"]
     for s, speed in enumerate(influence.speeds * 30 / np.pi):
@@ -134,25 +128,6 @@ def test_pieces_on_top_of_what_a_check_run_had(cli, tmp_path):
     outcome = cli("balance", path, "--refine", "--split")
     assert outcome.code == 2
     assert "not named" in outcome.err
-
-
-def test_pieces_against_each_other_are_said(cli, tmp_path):
-    """Without a stock the least vibration may take many pieces that make little."""
-    for name in ("runs.csv", "weights.csv"):
-        (tmp_path / name).write_bytes((TURBO / name).read_bytes())
-    plane = "holes = 5\navailable_g_mm = [150, 350, 600]\nper_hole = 2\n"
-    text = 'runs = "runs.csv"\nweights = "weights.csv"\n'
-    text += "".join(f"[planes.{name}]\n{plane}" for name in ("left", "middle", "right"))
-    (tmp_path / "job.toml").write_text(text)
-    outcome = cli("balance", tmp_path / "job.toml", "--split", "--best", "--json")
-    assert outcome.code == 0, outcome.err
-    mounting = outcome.json["mounting"]
-    for plane in mounting["planes"]:
-        total = sum(row["mass"] for row in mounting["holes"] if row["plane"] == plane["plane"])
-        said = any(f"plane {plane['plane']}: pieces of" in words for words in mounting["warnings"])
-        assert said == (total > 3 * plane["mass"])
-    assert mounting["warnings"]
-    assert cli("balance", HOLES, "--split", "--json").json["mounting"]["warnings"] == []
 
 
 def test_the_table_says_where_to_take_material_away(cli, tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.workflows.option_quantities import vectors
+from rotorid.commands.option_quantities import vectors
 
 
 @pytest.fixture
@@ -24,7 +24,6 @@ def test_holes_pieces_and_what_is_taken(run, tmp_path):
     document = run(*args, "--json").json
     assert document["method"] == "holes"
     assert document["unit"] == "g"
-    assert document["proven"] is True
     assert "9" not in [row["hole"] for row in document["holes"]]
     for row in document["holes"]:
         assert row["angle_deg"] == pytest.approx(15 * (int(row["hole"]) - 1))
@@ -34,7 +33,7 @@ def test_holes_pieces_and_what_is_taken(run, tmp_path):
     assert document["relative_error"] == pytest.approx(abs(error) / 35, rel=1e-9)
     outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.csv")
     assert outcome.code == 0, outcome.err
-    assert document["words"] == ["1 × 20 g in hole 7 (at 90°)", "1 × 20 g in hole 11 (at 150°)"]
+    assert document["words"] == ["20 g in holes 7 (90°), 11 (150°)"]
     assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
     table = pd.read_csv(tmp_path / "t.csv", encoding="utf-8-sig")
     assert list(table["mass_g"]) == [row["mass"] for row in document["holes"]]
@@ -133,8 +132,8 @@ def test_combining_trimming_and_rounding(run):
         ("35g@120 --two 20g,30g --pieces 3g", "--pieces means something only with --holes"),
         ("35g@120 --grind --step 3g", "--step means something only with --holes"),
         ("35g@120 --holes 0,90,30", "in the order of their angles"),
-        ("35g@120 --holes 0,90,90", "listed twice"),
-        ("35g@120 --holes 0,90,360", "a full turn or more apart"),
+        ("35g@120 --holes 0,90,90", "list each hole once"),
+        ("35g@120 --holes 0,90,360", "within one turn"),
         ("35g@120 --holes 0", "number of equally spaced holes, 1 to 1000"),
         ("35g@120 --holes 4 --first-hole 500", "--first-hole"),
         ("35g@120 --holes 4 --pieces 0g", "expected a value above 0"),

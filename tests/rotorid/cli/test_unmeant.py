@@ -19,9 +19,9 @@ def balance(cli, name, *options):
         (
             "weak_trial",
             "the weight in plane 'I' is 458 g ± ",
-            "repeat the trial run of plane 'I' with at least 2",
+            "repeat the trial run of plane 'I' with at least ",
         ),
-        ("tiny_trial", "the weight in plane 'P2' is 6.738 g ± ", "of plane 'P2' with at least 3."),
+        ("tiny_trial", "the weight in plane 'P2' is 6.738 g ± ", "of plane 'P2' with at least "),
         ("one_digit", "the readings have one digit (steps of 0.10 µm pp", "that shows more digits"),
         ("alike_planes", "planes 'P1' and 'P2' act alike", "plane 'P2' alone (--planes P2; "),
     ],
@@ -50,34 +50,30 @@ def test_intervals_of_the_size_of_the_answer(cli, name):
     assert not [w for w in found["warnings"] if "rise" in w or "alike" in w or "optimistic" in w]
 
 
-def test_planes_that_act_alike_with_stated_errors_are_refused_with_what_to_do(cli):
+def test_planes_that_act_alike_with_stated_errors_are_not_mounted_either(cli):
     ran = balance(cli, "alike_planes", *STATED)
-    assert ran.code == 2
-    lines = ran.err.splitlines()
-    assert "planes 'P1' and 'P2' act alike at every sensor and speed" in lines[0]
-    assert lines[1].startswith(
-        "Instead: plane 'P2' alone (--planes P2; 1.778 g) would leave rms 13.5 µm pp, at most"
-    )
-    assert lines[2].startswith("Or: --ridge 0.3 would leave rms 13.3 µm pp, at most")
-    assert lines[3].startswith("Or: add a sensor or a speed")
+    assert ran.code == 0
+    lines = ran.out.splitlines()
+    assert lines[0].startswith("Do not mount these weights: planes 'P1' and 'P2' act alike")
+    assert "Instead: plane 'P2' alone (--planes P2; 1.778 g) would leave rms 13.5 µm pp" in ran.out
 
 
 @each_of(
-    "name, runs, differ",
+    "name, run",
     [
-        ("contradiction", "'base' and 'base again'", "50 %"),
-        ("forgotten_weight", "'base' and 'trial 2'", "97 %"),
+        ("contradiction", "base"),
+        ("forgotten_weight", "trial 2"),
     ],
 )
-def test_runs_that_disagree_are_named_before_what_follows(cli, name, runs, differ):
+def test_runs_that_disagree_are_named_before_what_follows(cli, name, run):
     for options in ((), STATED):
         ran = balance(cli, name, *options)
         assert ran.code == 2
         cause, follows, *rest = ran.err.splitlines()
-        assert f"runs {runs} have the same weights mounted but differ by" in cause
-        assert (differ in cause) == (not options)
-        assert cause.endswith("is a row missing in the weights table?")
-        assert follows.startswith("so the trial weight in plane 'P1'")
+        assert cause.startswith("rotorid: the runs disagree by ")
+        assert f"most of all in run '{run}'" in cause
+        assert cause.endswith("or a row is missing in the weights table")
+        assert follows.startswith("the trial weight in plane 'P1'")
         assert follows.endswith("mend the table, or measure these runs again until they agree")
         assert not rest
 

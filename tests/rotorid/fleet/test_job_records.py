@@ -101,7 +101,7 @@ def test_the_variance_is_that_of_the_coefficients(fans):
     influence = estimate_influence(read_job(FLEET / "fan-132" / "132-05" / "job.toml").trials)
     found = of(fans, "coefficients", "132-05")
     row = found[(found["sensor"] == "B") & (found["plane"] == "NDE")].iloc[1]
-    own = influence.covariance[1, 1, 4:, 4:]
+    own = influence.channels()[1, 1, 4:, 4:]
     assert row[["var_re", "cov_re_im", "var_im"]].tolist() == pytest.approx([own[0, 0], own[0, 1], own[1, 1]])
 
 

@@ -7,13 +7,13 @@ import pandas as pd
 import pytest
 
 from balancing import UndeterminedError
+from rotorid.commands.balance import BalanceOptions
+from rotorid.commands.type_coefficients import type_coefficients
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.workflows import balance
-from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
-from rotorid.workflows.fleet.type_coefficients import type_coefficients
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")
@@ -141,10 +141,10 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
     )
     assert (first.earlier, other.earlier) == (3, 0)
     assert (
-        np.trace(first.influence.covariance, axis1=2, axis2=3).sum()
-        < 0.3 * np.trace(other.influence.covariance, axis1=2, axis2=3).sum()
+        np.trace(first.influence.channels()[..., 2:, 2:], axis1=2, axis2=3).sum()
+        < 0.3 * np.trace(other.influence.channels()[..., 2:, 2:], axis1=2, axis2=3).sum()
     )
-    assert "balanced twice" not in " ".join(first.influence.warnings)
+    assert "balanced twice" not in " ".join(first.influence.remarks.warnings)
     W = machines[2].W * 1e-6 / 2 / 1e-3
     assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from rotorid.report import conventions_explained
 
 

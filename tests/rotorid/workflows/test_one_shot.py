@@ -9,10 +9,10 @@ import pytest
 import fem
 from fem.parameters import with_parameters
 from rotorid import read_job, read_rotor
+from rotorid.commands.coefficients import choose
+from rotorid.commands.one_shot import counted_before
 from rotorid.samples import sample_data
 from rotorid.workflows import BalanceOptions, balance
-from rotorid.workflows.calibration.one_shot import counted_before
-from rotorid.workflows.coefficients import choose
 
 FOLDER = sample_data() / "calibration"
 
@@ -77,7 +77,7 @@ def test_runs_that_made_the_calibration_do_not_count_twice(tmp_path):
     alone = choose(other, "computed")[0]
     k = combined.planes.index("impeller 1")
     own = np.s_[..., 2 + 2 * k, 2 + 2 * k]
-    assert (combined.covariance[own] < alone.covariance[own]).all()
+    assert (combined.channels()[own] < alone.channels()[own]).all()
 
 
 def test_a_later_trial_in_all_planes_at_once_leaves_the_model_alone(tmp_path):

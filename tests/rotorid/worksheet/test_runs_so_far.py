@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
-from balancing.data.reading_errors import error_model, mean_covariance
+from balancing import reading_of
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, read_job
 from rotorid.workflows.vibration.runs_so_far import runs_so_far
@@ -22,7 +22,7 @@ def copy(tmp_path, sample="turbo_job"):
 def test_a_finished_job_has_the_readings_and_regions_of_its_trials(sample):
     job = sample_data() / sample / "job.toml"
     found, trials = runs_so_far(job), read_job(job).trials
-    covariance = mean_covariance(trials, error_model(trials))
+    covariance = reading_of(trials).covariance(trials)
     assert {found.baseline, *found.trials} == {*trials.runs}
     assert len(found.channels) == trials.mean[0].size
     for one in found.channels:

@@ -90,7 +90,7 @@ def test_a_body_of_any_form_is_refused_with_one_sentence(shared, body, monkeypat
 def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_path):
     import numpy as np
 
-    from balancing.data.reading_errors import error_model, mean_covariance
+    from balancing import reading_of
     from rotorid.workflows import balance
     from rotorid.workflows.vibration.runs_so_far import runs_so_far
 
@@ -109,7 +109,7 @@ def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_pa
         "[slow_roll.A]\namplitude = 8\nphase_deg = 0\n[slow_roll.B]\namplitude = 2\nphase_deg = 9\n"
     )
     trials = balance(job).job.trials
-    covariance = mean_covariance(trials, error_model(trials))
+    covariance = reading_of(trials).covariance(trials)
     for channel in runs_so_far(job).channels:
         at = trials.sensors.index(channel.sensor)
         np.testing.assert_allclose(channel.trials.mean[:, 0, 0], trials.mean[:, 0, at], rtol=1e-12)

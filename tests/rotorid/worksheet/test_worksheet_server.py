@@ -185,7 +185,7 @@ def test_what_there_is_to_look_at_and_to_print(shared):
         status, text = served.ask(f"/convention/{name}")
         assert (status, text.count("<svg")) == (200, 2)
     assert "2 × 150" in served.ask("/sheet")[1]
-    assert "hole 10" in served.ask("/whole")[1]
+    assert "150.0 in hole 7" in served.ask("/whole")[1]
 
 
 def test_a_trial_weight_with_and_without_the_coefficients(shared):

@@ -7,8 +7,8 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import correct, estimate_influence
+from rotorid.commands.option_quantities import limited
 from rotorid.tables import read_job
-from rotorid.workflows.option_quantities import limited
 
 HEAD = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 AGAINST = 'angles = "against rotation"\n'
@@ -137,9 +137,8 @@ def test_a_largest_weight_of_the_command_line_holds_for_the_holes(job):
     assert read.holes["1"].max_weight == 6e-3
     assert limited(read, "8g", []).holes["1"].max_weight == 8e-3
     assert limited(read, None, ["2"]).holes["1"].max_weight == 6e-3
-    steps = job("holes = 4\nstep_g = 5")
-    with pytest.raises(ValueError, match=r"--max-mass '2g': plane '1': nothing can be mounted"):
-        limited(steps, "2g", [])
+    with pytest.raises(ValueError, match=r"--max-mass '0g'"):
+        limited(read, "0g", [])
 
 
 BAD = [
@@ -176,7 +175,6 @@ BAD = [
     ("holes = 4\navailable_g = 5\nstock = 0", "stock", "0", "at least one weight"),
     ("holes = 4\nstock = 3", "stock", "3", "the weights that are available too"),
     ("radius_mm = 9\ntrial_radius_mm = 0", "trial_radius_mm", "0", "a number above 0"),
-    ("holes = 4\nstep_g = 5\nmax_mass_g = 2", "holes", "4", "nothing can be mounted: the smallest step"),
 ]
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-from balancing import correct, estimate_influence
-from balancing.correction.check_run import compare_check
+from balancing import compare_check, correct, estimate_influence
 from fem import Sensor
 from rotorid.tables import read_job, read_rotor, read_trials, write_influence
 

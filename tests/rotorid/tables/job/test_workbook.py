@@ -170,7 +170,7 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
 
 
 def test_limits_of_the_command_line_come_back(folder, tmp_path):
-    from rotorid.workflows.option_quantities import largest_amplitudes, largest_weights, limited
+    from rotorid.commands.option_quantities import largest_amplitudes, largest_weights, limited
 
     path = write_job(folder, PARTS["limits"])
     for max_mass, limit in (("2.2g", ["0.3mil_pp"]), ("1=0.07oz,2=3", ["A=7.7", "B=0.012"])):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from balancing import correct, estimate_influence
+from balancing import Gaussian, correct, estimate_influence
 from rotorid.tables import (
     InputError,
     TableWarning,
@@ -181,7 +181,9 @@ def test_other_comments_mean_nothing(tmp_path, lag):
 
 def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
     influence = estimate_influence(read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv"))
-    frame = influence_frame(replace(influence, covariance=None, baseline=None))
+    nothing = np.full(influence.baseline.shape, np.nan)
+    plain = replace(influence, baseline=nothing, errors=Gaussian.none(*influence.W.shape))
+    frame = influence_frame(plain)
     frame = frame.rename(columns={"influence_um_pp_per_g": "influence_um_pp_per_kg_m"})
     write_table(tmp_path / "si.csv", frame)
     read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "si.csv")
@@ -198,4 +200,4 @@ def test_a_weights_table_without_rows_and_stored_coefficients(tmp_path, lag):
     read = job_from_files([tmp_path / "now.csv", tmp_path / "none.csv"], influence=tmp_path / "influence.csv")
     c = correct(read.influence, read.trials)
     np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
-    assert c.mounted is None
+    assert not c.mounted.weights.any()

@@ -16,9 +16,7 @@ from tables_data import write_csv
 from whirl_rotors import machine
 
 import fem
-from balancing import correct, estimate_influence
-from balancing.coefficients.coefficients_from_model import model_influence
-from balancing.correction.check_run import compare_check
+from balancing import compare_check, correct, estimate_influence, model_influence
 from rotorid.tables import read_job, write_rotor
 
 SPEEDS_RPM = (1500, 4200)

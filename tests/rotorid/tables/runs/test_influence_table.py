@@ -39,8 +39,8 @@ def test_meaning(stored):
     np.testing.assert_allclose(influence.W, np.array([[[2j, 1], [-0.5, -4j]]]) * 0.5e-6 / 1e-3, rtol=1e-15)
     labels = influence.labels
     assert (labels.vibration_unit, labels.weight_unit, labels.phase) == ("um_pp", "g", "lead")
-    assert influence.baseline is None
-    assert influence.covariance is None
+    assert not influence.has_baseline
+    assert not influence.known_errors
 
 
 def test_phase_convention_of_the_table_wins_over_that_of_the_job(stored, tmp_path):

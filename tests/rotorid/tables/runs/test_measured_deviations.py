@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-from balancing import estimate_influence
-from balancing.data.reading_errors import error_model
-from balancing.data.trials import ReadingErrors
+from balancing import ReadingErrors, estimate_influence, reading_of
 from rotorid.tables import read_job, read_trials
 
 JOB = 'phase = "lag"\nangles = "with rotation"\nruns = "runs.csv"\nweights = "weights.csv"\n'
@@ -68,11 +66,11 @@ def test_a_deviation_is_along_and_across_its_reading(read, phase):
 
 
 def test_nothing_is_assumed_then(read):
-    assert error_model(read()).source == "measured"
-    assert error_model(read(RUNS)).source == "assumed"
+    assert reading_of(read()).source == "measured"
+    assert reading_of(read(RUNS)).source == "assumed"
     assert read(RUNS).covariance is None
-    assert estimate_influence(read()).error_source == "measured"
-    assert error_model(read(errors=ReadingErrors(0.01))).source == "stated"
+    assert estimate_influence(read()).reading.source == "measured"
+    assert reading_of(read(errors=ReadingErrors(0.01))).source == "stated"
 
 
 def test_another_unit_of_the_same_kind(read):

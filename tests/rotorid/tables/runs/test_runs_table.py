@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-from balancing import UndeterminedError, estimate_influence
-from balancing.data.trials import ReadingErrors
+from balancing import ReadingErrors, UndeterminedError, estimate_influence
 from rotorid.tables import StatedErrors, read_trials
 
 
@@ -71,7 +70,7 @@ def test_wrong_arguments(read):
         read(angles="clockwise")
     with pytest.raises(ValueError, match="speed_tolerance_percent"):
         read(speed_tolerance_percent=math.nan)
-    with pytest.raises(ValueError, match="phase_deg of a reading"):
+    with pytest.raises(ValueError, match="phase_deg must be finite"):
         StatedErrors(phase_deg=-1)
 
 

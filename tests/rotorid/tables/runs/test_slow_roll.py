@@ -7,7 +7,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, Trials, correct, estimate_influence
-from balancing.data.reading_errors import reading_covariance
+from balancing.errors import reading_covariance
 from rotorid.tables import read_job
 from rotorid.tables.runs.slow_roll import SlowRoll, subtract_slow_roll
 

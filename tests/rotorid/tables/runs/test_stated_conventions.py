@@ -9,7 +9,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import Labels, correct, estimate_influence
-from balancing.data.conventions import opposite
+from balancing.conventions import opposite
 from rotorid.tables import job_from_files, read_influence, read_job, write_influence
 from rotorid.tables.runs.stated_conventions import STATED_ANGLES, check_angles, resolve_angles
 
@@ -51,6 +51,13 @@ def test_clockwise_is_with_or_against_the_rotation(job, text, sign):
     assert mounted == pytest.approx(2.5e-3 * np.exp(1j * np.radians(sign * 50)), rel=1e-12)
     mass, angle = read.trials.labels.weight(mounted)
     assert (float(mass), float(angle)) == pytest.approx((2.5, 50), rel=1e-12)
+
+
+def test_errors_of_weights_and_drift(job):
+    errors = "{ placement_deg = 3, placement_percent = 2, drift_percent = 1, run_percent = 4 }"
+    trials = job(f"errors = {errors}\n").trials
+    assert trials.placement == pytest.approx((0.02, np.radians(3)))
+    assert (trials.drift, trials.run_errors, trials.errors) == (0.01, (0.04, 0.0), None)
 
 
 def test_the_output_says_what_the_input_said(job):

@@ -8,7 +8,7 @@ import pytest
 from cases import each_of
 from waveform_files import RATE, drawn, write
 
-from balancing.data.conventions import Labels
+from balancing import Labels
 from rotorid.tables.reader.input_file import each_file_once, sha256
 from rotorid.tables.reader.problems import InputError
 from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms

@@ -1,0 +1,459 @@
+"""Weights within limits: second-order cone programs, and what to do where no weights are within them.
+
+With weights D = D₀ + T y (stretched), every limit is a disc: |r₀ᵢ + Wᵢ T y| ≤ Lᵢ for the amplitude of a
+reading, |D₀ₚ + Tₚ y| ≤ Mₚ for a weight; in min–max wᵢ |r₀ᵢ + Wᵢ T y| ≤ t, t the smallest. A sector in which
+a weight must stand is two half planes. T makes what is minimised a length: |y| for `nearest`, and for min–max
+the columns of all scaled rows orthogonal; so the solver's tolerances mean the same in any unit. The program
+starts from the few discs that D₀ is farthest out of and adds those that its solution violates, hence the
+dual value of the last program is a lower bound for all. Weights are within every limit exactly: limits are
+made tighter by 3e-9 of themselves, more where many digits cancel, and what that costs is in the gap.
+Where a plane may stand in several sectors, branch and bound chooses among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from balancing.trials import Arc, Limits
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
+from rotorid.base.text import listing
+from rotorid.regression import solution, stretch, unstretch
+
+Sectors = tuple[Arc, ...] | None
+"""Convex arcs (width ≤ π) where a weight may stand; None: anywhere."""
+Words = Callable[[float], str]
+"""Write an amplitude or a weight, with its unit."""
+PLAIN: Words = "{:.4g}".format
+
+TOLERANCE = 1e-9
+TIGHTER = (0.3, 3.0, 30.0, 300.0, 3000.0)
+"""By how many tolerances limits are tightened, one after the other until all are kept."""
+AT_LIMIT = 1e-5
+"""A limit is reached where less than this share of it is left."""
+PRICED = 1e-5
+"""A limit takes part in a conflict if its share in the price of all is above this."""
+FIRST, MORE = 5, 3
+"""Discs a plane that a program starts from, and that are added to it."""
+TURN, TINY = 2 * np.pi, 1e-300
+
+
+class InfeasibleError(ValueError):
+    """Limits that no weights meet."""
+
+
+class Bounds(NamedTuple):
+    """W (N, P), Y (N,); largest amplitudes (N,), weights (P,), infinite for none; each plane's sectors."""
+
+    W: ComplexArray
+    Y: ComplexArray
+    residual: FloatArray
+    max_weight: FloatArray
+    sectors: tuple[Sectors, ...]
+
+    @property
+    def used(self) -> BoolArray:
+        """Planes that may carry a weight."""
+        return np.array([m > 0 and s != () for m, s in zip(self.max_weight, self.sectors, strict=True)])
+
+    def part(self, planes: BoolArray) -> Bounds:
+        """The same for some planes alone."""
+        sectors = tuple(s for s, one in zip(self.sectors, planes, strict=True) if one)
+        return self._replace(W=self.W[:, planes], max_weight=self.max_weight[planes], sectors=sectors)
+
+    def stacked(self) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+        """E (N + P, P), e (N + P,) and limits: amplitudes and weights are |e + E D|."""
+        P = len(self.max_weight)
+        E = np.concatenate((self.W, np.eye(P, dtype=complex)))
+        return E, np.append(self.Y, np.zeros(P)), np.append(self.residual, self.max_weight)
+
+
+class Optimum(NamedTuple):
+    """Weights (P,), what was minimised, its relative distance from a lower bound; prices of limits (N + P,).
+
+    The objective falls, at first, by the price times ε where the limit of a reading, or of a plane's weight,
+    grows by the share ε; for min–max also each reading's share in the maximum. Of any unit.
+    """
+
+    weights: ComplexArray
+    objective: float
+    gap: float
+    prices: FloatArray
+
+
+class _Goal(NamedTuple):
+    """D₀ (P,), T (2P, 2P), wᵢ of min–max (N + P,) or zeros; the objective of weights, and of a dual value."""
+
+    start: ComplexArray
+    transform: FloatArray
+    shares: FloatArray
+    objective: Callable[[ComplexArray], float]
+    bound: Callable[[float], float]
+
+
+def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds:
+    """Limits of a job for its equations, none where there are none."""
+    N, P = W.shape
+    if limits is None:
+        return Bounds(W, Y, np.full(N, np.inf), np.full(P, np.inf), (None,) * P)
+    if limits.residual.size != N or len(limits.max_weight) != P:
+        raise ValueError(
+            f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "
+            f"there are {N} and {P}"
+        )
+    sectors = tuple(allowed_sectors(arcs) for arcs in limits.forbidden)
+    return Bounds(W, Y, limits.residual.reshape(N), limits.max_weight, sectors)
+
+
+def allowed_sectors(forbidden: Sequence[Arc]) -> Sectors:
+    """Convex sectors that together are what forbidden arcs leave of the circle.
+
+    Parameters
+    ----------
+    forbidden
+        Arcs (start, width), rad, 0 < width ≤ 2π; they may overlap and pass 0. Arcs that touch leave nothing
+        between them.
+
+    Returns
+    -------
+    Arcs of width ≤ π, starts in [0, 2π); empty where the whole circle is forbidden, None where nothing is.
+
+    Examples
+    --------
+    >>> allowed_sectors([(0.0, np.pi)])
+    ((3.141592653589793, 3.141592653589793),)
+    >>> allowed_sectors([(0.0, 4.0), (3.0, 4.0)])
+    ()
+    """
+    if not forbidden:
+        return None
+    edges = sorted({edge % TURN for start, width in forbidden for edge in (start, start + width)})
+    sectors: list[Arc] = []
+    for first, last in zip(edges, [*edges[1:], edges[0] + TURN], strict=True):
+        middle = (first + last) / 2
+        if last - first < 1e-9 or any((middle - start) % TURN < width for start, width in forbidden):
+            continue
+        if last - first > np.pi:
+            sectors += [(first, np.pi), ((last - np.pi) % TURN, np.pi)]
+        else:
+            sectors.append((first, last - first))
+    return tuple(sectors)
+
+
+def project(weight: complex, sector: Arc | None) -> complex:
+    """Nearest complex number of a sector (start, width ≤ π) from the origin; `weight` itself for None."""
+    if sector is None or weight == 0:
+        return weight
+    start, width = sector
+    if (np.angle(weight) - start) % TURN <= width:
+        return weight
+    rays = np.exp(1j * np.array([start, start + width]))
+    along = np.maximum((rays.conj() * weight).real, 0.0)
+    return complex((along * rays)[along.argmax()])
+
+
+def stands_in(weight: complex, sectors: Sectors) -> bool:
+    """Whether a weight is zero or stands in one of the sectors (None: anywhere)."""
+    if weight == 0 or sectors is None:
+        return True
+    return any(abs(project(weight, sector) - weight) <= 1e-9 * abs(weight) for sector in sectors)
+
+
+def within(bounds: Bounds, weights: ComplexArray) -> bool:
+    """Whether weights are within every limit."""
+    return bool(
+        (np.abs(weights) <= bounds.max_weight).all()
+        and (np.abs(bounds.Y + bounds.W @ weights) <= bounds.residual).all()
+        and all(map(stands_in, weights.tolist(), bounds.sectors))
+    )
+
+
+def nearest(
+    bounds: Bounds, target: ComplexArray, root: AnyArray, floor: float = 0.0, tolerance: float = TOLERANCE
+) -> Optimum:
+    """Weights within limits that minimise √(floor² + |root (x − target)|²), x stretched.
+
+    Parameters
+    ----------
+    bounds
+        Of planes that may all carry a weight.
+    target
+        The best weights without limits, (P,).
+    root
+        Regular, (2P, 2P), in the stretched weights.
+    floor
+        What stays without limits.
+    tolerance
+        Of the solver, relative.
+
+    Raises
+    ------
+    InfeasibleError
+        Where no weights are within the limits.
+    """
+
+    def objective(weights: ComplexArray) -> float:
+        return float(np.hypot(floor, np.linalg.norm(root @ stretch(weights - target))))
+
+    def bound(value: float) -> float:
+        return float(np.sqrt(floor**2 + 2 * max(value, 0.0)))
+
+    goal = _Goal(
+        target, np.asarray(np.linalg.inv(root)), np.zeros(bounds.W.shape[0] + len(target)), objective, bound
+    )
+    return _best(bounds, goal, None, tolerance)
+
+
+def smallest_maximum(
+    bounds: Bounds, shares: FloatArray, first: BoolArray | None = None, tolerance: float = TOLERANCE
+) -> Optimum:
+    """Weights within limits that minimise max wᵢ |Yᵢ + Wᵢ D|, and wₚ |Dₚ| where that counts, too.
+
+    Parameters
+    ----------
+    bounds
+        Of planes that may all carry a weight.
+    shares
+        w ≥ 0 of the readings and of the weights, (N + P,).
+    first
+        Those of them to start from; default the largest ones that least squares leaves.
+    tolerance
+        Of the solver, relative.
+
+    Raises
+    ------
+    InfeasibleError
+        Where no weights are within the limits.
+    """
+    E, e, limit = bounds.stacked()
+    on, limited, none = shares > 0, np.isfinite(limit), np.zeros(E.shape[1], dtype=complex)
+
+    def objective(weights: ComplexArray) -> float:
+        return float((shares * np.abs(e + E @ weights)).max())
+
+    rows = shares[on, None] * E[on]
+    start = _shortened(solution(rows, -shares[on] * e[on]), bounds.max_weight)
+    if objective(start) >= objective(none):
+        start = none
+    left, unit = e + E @ start, objective(start)
+    out = np.abs(left) > limit
+    if unit <= 1e-12 * objective(none) or not len(none):
+        if within(bounds, start):  # nothing is left to minimise
+            return Optimum(start, unit, 0.0, (shares * np.abs(left) >= unit).astype(float))
+        if not len(none):
+            raise InfeasibleError("no plane may carry a weight")
+        unit = float(np.abs(rows @ solution(E[out], -left[out])).max()) if out.any() else 0.0
+    unit = unit or float(np.abs(rows).max()) or 1.0
+    size = np.maximum(np.maximum(limit, np.abs(left)), TINY)[limited]
+    scaled = np.concatenate((rows / unit, E[limited] / size[:, None]))
+    values, vectors = np.linalg.eigh(scaled.conj().T @ scaled)
+    transform = stretch(vectors * np.sqrt(len(scaled) / np.maximum(values, 1e-12 * values[-1])))
+    goal = _Goal(start, transform, shares / unit, objective, lambda value: unit * value)
+    return _best(bounds, goal, first, tolerance)
+
+
+def _best(bounds: Bounds, goal: _Goal, first: BoolArray | None, tolerance: float) -> Optimum:
+    """Branch and bound: a plane whose weight stands at a forbidden angle is tried in each of its sectors."""
+
+    def branch(chosen: tuple[Arc | None, ...], best: Optimum | None) -> Optimum | None:
+        try:
+            optimum = _convex(bounds, chosen, goal, first, tolerance)
+        except InfeasibleError:
+            return best
+        if best is not None and optimum.objective * (1 - optimum.gap) >= best.objective:
+            return best
+        pairs = enumerate(zip(optimum.weights.tolist(), bounds.sectors, strict=True))
+        plane = next((p for p, pair in pairs if not stands_in(*pair)), None)
+        if plane is None:
+            return optimum
+        for sector in bounds.sectors[plane] or ():
+            best = branch((*chosen[:plane], sector, *chosen[plane + 1 :]), best)
+        return best
+
+    best = branch((None,) * len(goal.start), None)
+    if best is None:
+        raise InfeasibleError("no weights are within the limits")
+    if best.gap > 1e-3:
+        raise ValueError(
+            "the solver did not come near the best weights: leave out a plane that acts like another, "
+            "or relax the limits"
+        )
+    return best
+
+
+def _convex(
+    bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, first: BoolArray | None, tolerance: float
+) -> Optimum:
+    """The best weights with at most one sector for each plane."""
+    E, e, limit = bounds.stacked()
+    start, T, shares = goal.start, goal.transform, goal.shares
+    P, left = len(start), e + E @ start
+    rising = np.flatnonzero(shares > 0)
+    index = np.concatenate((rising, np.flatnonzero(np.isfinite(limit))))
+    rises = np.arange(len(index)) < len(rising)
+    # discs |known + rows y| ≤ head, or t where it rises, each divided by its size
+    size = np.where(rises, 1 / np.maximum(shares, TINY)[index], np.maximum(limit, np.abs(left))[index])
+    size = np.maximum(size, TINY)
+    head, known = np.where(rises, 0.0, limit[index]) / size, left[index] / size
+    rows = (stretch(E) @ T).reshape(-1, 2, 2 * P)[index] / size[:, None, None]
+    sides, right = _sides(chosen, start, T)
+    excess, scale = np.where(rises, 0.0, np.abs(known) - head), 1.0
+    if not len(rising):  # the way to go is about as long as the way to the farthest disc or side
+        reach = np.linalg.norm(rows, axis=(1, 2))
+        steps = excess / np.maximum(reach, 1e-9 * reach.max(initial=0.0))
+        scale = float(np.concatenate((steps, -right)).max(initial=0.0))
+        if not scale > 0:
+            return Optimum(start, goal.objective(start), 0.0, np.zeros(len(e)))
+        rows, sides, T = scale * rows, scale * sides, scale * T
+    active = (excess > 0) if first is None else first[index]
+    if first is None:
+        active[np.argsort(-np.abs(known[rises]))[: FIRST * P]] = True
+    for tighter in TIGHTER:
+        inner = head * (1 - tighter * tolerance)
+        while True:
+            discs = rows[active], known[active], inner[active], rises[active]
+            y, t, prices, value = _program(*discs, sides, right, tolerance)
+            out = np.abs(known + unstretch((rows @ y).ravel())) - inner - rises * t * (1 + tolerance)
+            more = np.flatnonzero(~active & (out > 0))
+            if not len(more):
+                break
+            active[more[np.argsort(-out[more])[: MORE * P]]] = True
+        pairs = zip((start + unstretch(T @ y)).tolist(), chosen, strict=True)
+        weights = _shortened(np.array([project(*pair) for pair in pairs]), bounds.max_weight)
+        if (np.abs(e + E @ weights) <= limit).all():
+            break
+    else:
+        raise InfeasibleError("the limits can be met only to within rounding")
+    prices = prices * np.where(rises, t, head)[active]
+    spent = tighter * tolerance * float(prices[~rises[active]].sum())
+    lower, objective = goal.bound(scale**2 * (value - spent)), goal.objective(weights)
+    least = 1e3 * tolerance * goal.objective(np.zeros_like(start))
+    gap = max(objective - lower, 0.0) / max(objective, least, TINY)
+    return Optimum(weights, objective, gap, np.bincount(index[active], prices, len(e)).astype(float))
+
+
+def _shortened(weights: ComplexArray, most: FloatArray) -> ComplexArray:
+    """Weights of at most some size."""
+    size = np.maximum(np.abs(weights), TINY)
+    return np.asarray(weights * np.where(size > most, most * (1 - 1e-15) / size, 1.0))
+
+
+def _sides(
+    chosen: tuple[Arc | None, ...], start: ComplexArray, T: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rows, of length 1, with right + rows y ≥ 0: left of a sector's start and right of its end."""
+    arcs = [(p, sector) for p, sector in enumerate(chosen) if sector is not None]
+    inward = np.zeros((len(arcs), 2, len(start)), dtype=complex)
+    for k, (p, (first, width)) in enumerate(arcs):
+        inward[k, :, p] = -1j * np.exp(-1j * first), 1j * np.exp(-1j * (first + width))
+    normals = inward.reshape(-1, len(start))
+    rows = stretch(normals)[::2] @ T
+    length = np.linalg.norm(rows, axis=1)
+    return rows / length[:, None], (normals @ start).real / length
+
+
+def _program(
+    rows: FloatArray,
+    known: ComplexArray,
+    head: FloatArray,
+    rises: BoolArray,
+    sides: FloatArray,
+    right: FloatArray,
+    tolerance: float,
+) -> tuple[FloatArray, float, FloatArray, float]:
+    """Minimise t, or |y|²/2 where nothing rises: y, t, dual values of the heads, and the dual objective."""
+    import clarabel
+    from scipy.sparse import csc_matrix
+
+    m, _, n = rows.shape
+    s, width = len(right), n + int(rises.any())
+    A, q = np.zeros((s + 3 * m, width)), np.zeros(width)
+    A[:s, :n] = -sides
+    A[s:].reshape(m, 3, width)[:, 1:, :n] = -rows
+    A[s::3, n:], q[n:] = -1.0 * rises[:, None], 1.0
+    curvature = csc_matrix(np.eye(n) if width == n else (width, width), dtype=float)
+    b = np.concatenate((right, np.stack((head, known.real, known.imag), axis=1).ravel()))
+    cones = [clarabel.NonnegativeConeT(s)] * bool(s) + [clarabel.SecondOrderConeT(3)] * m
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.presolve_enable, settings.max_threads = False, False, 1
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+    solved = clarabel.DefaultSolver(curvature, q, csc_matrix(A), b, cones, settings).solve()
+    if "PrimalInfeasible" in str(solved.status):
+        raise InfeasibleError("no weights are within the limits")
+    x = np.append(solved.x, 0.0)
+    return x[:n], float(x[n]), np.array(solved.z)[s::3], float(solved.obj_val_dual)
+
+
+def explain(
+    bounds: Bounds,
+    planes: Sequence[str],
+    readings: Sequence[str],
+    amplitude: Words = PLAIN,
+    weight: Words = PLAIN,
+) -> str:
+    """Say which limits conflict, and what would be possible.
+
+    Parameters
+    ----------
+    bounds
+        Limits that no weights meet, some of them of amplitudes.
+    planes, readings
+        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm".
+    amplitude, weight
+        Write a number with its unit.
+    """
+    L, M, used = bounds.residual, bounds.max_weight, bounds.used
+    rounding = "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
+    if not L.all():
+        return rounding
+    relaxed = _relaxed(bounds)
+    factor, best = relaxed.objective, np.abs(bounds.Y + bounds.W[:, used] @ relaxed.weights)
+    if factor < 1 - PRICED:
+        return rounding
+
+    def matters(plane: int) -> bool:
+        """Whether the factor would be smaller if the plane need not be empty, or at any angle."""
+        free = np.arange(len(M)) == plane
+        sectors = tuple(None if p == plane else s for p, s in enumerate(bounds.sectors))
+        wider = bounds._replace(max_weight=np.where(free & (M == 0), np.inf, M), sectors=sectors)
+        return _relaxed(wider).objective < factor * (1 - PRICED)
+
+    order = np.argsort(-relaxed.prices)
+    priced = order[relaxed.prices[order] > PRICED * relaxed.prices.sum()]
+    heavy, high = np.flatnonzero(used)[priced[priced >= len(L)] - len(L)], priced[priced < len(L)]
+    conditions = [f"at most {weight(M[p])} in plane {planes[p]!r}" for p in heavy]
+    for p, sectors in enumerate(bounds.sectors):
+        if (M[p] == 0 or sectors is not None) and matters(p):
+            what = "the forbidden angles of plane {}" if M[p] else "plane {} left empty"
+            conditions.append(what.format(repr(planes[p])))
+    stays = [f"{readings[i]} (limit {amplitude(L[i])}) stays at {amplitude(best[i])}" for i in high[:3]]
+    text = (
+        f"the limits cannot be met: {'with ' if conditions else 'whatever the weights'}"
+        f"{listing(conditions, 'and')}, {listing(stays, 'and')} at best; "
+        f"relaxing all amplitude limits {_up(factor)} times works"
+    )
+    part = bounds.part(used)
+    try:
+        optimum = smallest_maximum(
+            part._replace(max_weight=np.full(used.sum(), np.inf)),
+            np.append(np.zeros(len(L)), 1 / part.max_weight),
+        )
+    except ValueError:  # more weight does not help
+        return text
+    return text + (f", or all weight limits {_up(optimum.objective)} times" if optimum.objective else "")
+
+
+def _relaxed(bounds: Bounds) -> Optimum:
+    """The least factor of all limits of amplitudes with which the others can be kept, of the planes used."""
+    part = bounds.part(bounds.used)
+    free = part._replace(residual=part.residual + np.inf)
+    return smallest_maximum(free, np.append(1 / part.residual, np.zeros(len(part.max_weight))))
+
+
+def _up(factor: float) -> str:
+    """Three digits, rounded up so that the factor leaves room for the weights."""
+    factor *= 1 + 1e-4
+    digits = 10.0 ** (2 - int(np.floor(np.log10(factor))))
+    return f"{np.ceil(factor * digits) / digits:.6g}"

@@ -1,0 +1,321 @@
+"""Phase and angle conventions of a job, with its units: signs of lead and lag, in and out.
+
+Inside, every vibration is a complex amplitude with positive phase = lead, every weight is complex with
+its angle counted with the rotation. Only a `Labels` object, made where files are read, knows how the
+people of the job write them. The signs are derived in docs/conventions.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.complex_numbers import polar as polar
+from rotorid.base.unit_words import SPEEDS, vibration_unit_words, weight_unit_words
+from rotorid.base.words import Angles as Angles
+from rotorid.base.words import Phase as Phase
+from rotorid.base.words import Rotation as Rotation
+from rotorid.base.words import View as View
+
+PHASES = ("lead", "lag")
+ANGLES = ("with rotation", "against rotation")
+Angle = TypeVar("Angle", float, FloatArray)
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Units and conventions of a job.
+
+    Attributes
+    ----------
+    vibration_unit, vibration_scale
+        Name of the unit ("um_pp"; "" if the readings had none) and shown = inside × scale.
+    weight_unit, weight_scale
+        Name ("g", "g_mm") and shown = inside × scale.
+    phase
+        Whether a positive phase leads or lags.
+    angles
+        Whether angles on the rotor count with or against the rotation.
+    speed_unit
+        In which the readings give the speed: "rpm", "rad_s" or "Hz".
+    rotation
+        How the rotor turns, seen from the end of `view`; None where the job does not say.
+    view
+        The end from which `rotation` is seen and discs are drawn; None where the job does not say.
+    clock
+        Whether the job calls its angles clockwise or counter-clockwise instead of with or against the
+        rotation.
+    assumed
+        Which of "phase" and "angles" nobody states, although they matter.
+
+    Raises
+    ------
+    ValueError
+        If `phase`, `angles`, `rotation` or `view` is none of its words, and where `clock` is set or `view` is
+        given without `rotation`.
+    """
+
+    vibration_unit: str = "m"
+    vibration_scale: float = 1.0
+    weight_unit: str = "kg"
+    weight_scale: float = 1.0
+    phase: Phase = "lead"
+    angles: Angles = "with rotation"
+    speed_unit: str = "rpm"
+    rotation: Rotation | None = None
+    view: View | None = None
+    clock: bool = False
+    assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.phase not in PHASES:
+            raise ValueError(f"phase must be 'lead' or 'lag', not {self.phase!r}")
+        if self.angles not in ANGLES:
+            raise ValueError(f"angles must be 'with rotation' or 'against rotation', not {self.angles!r}")
+        check_turning(self.rotation, self.view, clock=self.clock)
+
+    def vibration_from(self, amplitude: ArrayLike, phase: ArrayLike) -> ComplexArray:
+        """Vibrations from amplitudes (SI) and phases (rad) as the job counts them; turns back `vibration`.
+
+        A reading s(t) = A cos(ω t + φ) has the lead φ and is A e^{iφ}. A job that writes the lag −φ writes
+        its conjugate.
+        """
+        value = polar(amplitude, phase)
+        return value if self.phase_sign > 0 else np.conj(value)
+
+    def weight_from(self, size: ArrayLike, angle: ArrayLike) -> ComplexArray:
+        """Weights from sizes (SI) and angles (rad) as the job counts them; turns back `weight`.
+
+        A weight m at α with the rotation is m e^{iα}. A job that counts against the rotation writes −α.
+        """
+        value = polar(size, angle)
+        return value if self.angle_sign > 0 else np.conj(value)
+
+    def vibration(self, amplitude: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Amplitude in the job's unit and phase in degrees, 0 ≤ phase < 360, as the job counts it."""
+        return _polar(amplitude, self.vibration_scale, self.phase_sign)
+
+    def weight(self, weight: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Weight in the job's unit and angle in degrees, 0 ≤ angle < 360, as the job counts it."""
+        return _polar(weight, self.weight_scale, self.angle_sign)
+
+    def with_rotation(self, angle: Angle) -> Angle:
+        """Angles counted as the job does, counted with the rotation; the same turns them back. Any unit."""
+        return self.angle_sign * angle + 0.0
+
+    def leading(self, phase: float) -> float:
+        """A phase as the job writes it as a lead; the same turns it back. Any unit."""
+        return self.phase_sign * phase
+
+    def arc_from(self, first: float, last: float, *, opposite: bool = False) -> tuple[float, float]:
+        """First angle and width, rad with the rotation, of the degrees from → to as the job writes them.
+
+        Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material
+        is removed a job says where nothing can be taken away; the weight that would have to be added instead
+        stands `opposite`, and so does the arc of the correction.
+        """
+        start = (first if self.angle_sign > 0 else -last) + (180.0 if opposite else 0.0)
+        return math.radians(start % 360.0), math.radians((last - first) % 360.0)
+
+    def arc(self, start: float, width: float, *, opposite: bool = False) -> list[float]:
+        """From and to, degrees as the job writes them, of an arc in rad: turns back `arc_from`."""
+        ends = np.degrees([start, start + width])[:: self.angle_sign] * self.angle_sign
+        return [float(round(end, 9)) for end in np.mod(ends + (180.0 if opposite else 0.0), 360.0)]
+
+    @property
+    def vibration_in(self) -> str:
+        """The unit of the readings as people write it: "µm pp"; "" if they have none."""
+        return vibration_unit_words(self.vibration_unit)
+
+    @property
+    def weight_in(self) -> str:
+        """The unit of the weights as people write it: "g·mm"."""
+        return weight_unit_words(self.weight_unit)
+
+    @property
+    def speed_in(self) -> str:
+        """The unit of the speeds as people write it: "rad/s"."""
+        return SPEEDS[self.speed_unit][0]
+
+    def speed_words(self, speed: float) -> str:
+        """A speed, given in rad/s, in the unit of the readings: "1220 rpm"."""
+        return f"{self.speed_number(speed)} {self.speed_in}"
+
+    def speed_number(self, speed: float) -> str:
+        """The same without the unit."""
+        return f"{speed * SPEEDS[self.speed_unit][1]:.6g}"
+
+    def amplitude_words(self, size: float) -> str:
+        """An amplitude, given in SI."""
+        return f"{size * self.vibration_scale:.4g} {self.vibration_in}".rstrip()
+
+    def weight_words(self, size: float) -> str:
+        """The size of a weight, given in SI."""
+        return f"{size * self.weight_scale:.4g} {self.weight_in}".rstrip()
+
+    def weight_entry(self, weight: complex) -> dict[str, float]:
+        """A weight as JSON has it: `mass` in the job's unit and `angle_deg`, without the last digits."""
+        size, angle = self.weight(weight)
+        return {"mass": float(f"{size:.12g}"), "angle_deg": float(f"{angle:.12g}")}
+
+    def weight_at(self, weight: complex) -> str:
+        """A weight as text, such as "35 g at 120.0°"."""
+        size, angle = self.weight(weight)
+        return f"{size:.5g} {self.weight_in} at {angle:.1f}°"
+
+    def directions(self, angles: FloatArray) -> list[float]:
+        """Angles in rad with the rotation in degrees as the job counts them, without the last digits."""
+        return [float(f"{angle:.12g}") for angle in self.weight(np.exp(1j * angles))[1]]
+
+    def vibration_covariance(self, covariance: FloatArray) -> FloatArray:
+        """Covariance (…, 2, 2) of amplitude·cos(phase) and amplitude·sin(phase) as the job writes them."""
+        return _mirror(covariance, self.vibration_scale, self.phase_sign)
+
+    def weight_covariance(self, covariance: FloatArray) -> FloatArray:
+        """Covariance (…, 2, 2) of mass·cos(angle) and mass·sin(angle) as the job writes them."""
+        return _mirror(covariance, self.weight_scale, self.angle_sign)
+
+    @property
+    def phase_sign(self) -> int:
+        """+1 for lead, −1 for lag."""
+        return 1 if self.phase == "lead" else -1
+
+    @property
+    def angle_sign(self) -> int:
+        """+1 with the rotation, −1 against it."""
+        return 1 if self.angles == "with rotation" else -1
+
+    @property
+    def unbalances(self) -> bool:
+        """Whether weights are unbalances, mass × radius, and not masses."""
+        return "_" in self.weight_unit
+
+    @property
+    def angle_words(self) -> str:
+        """How angles count, in the word of the job: "with rotation", or "clockwise" seen from `view`."""
+        if not self.clock or self.rotation is None:
+            return self.angles
+        return self.rotation if self.angle_sign > 0 else opposite(self.rotation)
+
+    @property
+    def side(self) -> str:
+        """How angles count: "with" or "against" the rotation."""
+        return self.angles.partition(" ")[0]
+
+    @property
+    def counted_alike(self) -> bool:
+        """Whether the angle of a weight adds to the phase of its vibration.
+
+        Inside it does (W e^{iα} leads by α more); turning both round, phases and angles, changes nothing.
+        """
+        return self.phase_sign == self.angle_sign
+
+    @property
+    def angles_on_paper(self) -> int:
+        """+1 where angles as the job counts them grow counter-clockwise in a picture, −1 clockwise."""
+        return self.angle_sign * self.drawn_sign
+
+    @property
+    def phases_on_paper(self) -> int:
+        """+1 where phases as the job writes them grow counter-clockwise in a picture: leads do."""
+        return self.phase_sign
+
+    @property
+    def drawn_sign(self) -> int:
+        """+1 where the rotor drawn from the stated end turns counter-clockwise (or nothing is stated)."""
+        return -1 if self.rotation == "clockwise" else 1
+
+    def drawn(self, angle: ArrayLike) -> FloatArray:
+        """Angles with the rotation as angles on the paper, both in rad, there counter-clockwise."""
+        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=float))
+
+    def otherwise(self, names: Collection[str]) -> Labels:
+        """The labels with "phase", "angles" or both turned round."""
+        phase: Phase = "lag" if self.phase == "lead" else "lead"
+        angles: Angles = "against rotation" if self.angle_sign > 0 else "with rotation"
+        return replace(
+            self,
+            phase=phase if "phase" in names else self.phase,
+            angles=angles if "angles" in names else self.angles,
+        )
+
+    def assumed_in_words(self) -> str:
+        """One sentence about what is assumed; empty where nothing is."""
+        words = {"phase": self.phase, "angles": self.angle_words}
+        taken = [words[name] for name in self.assumed]
+        if not taken:
+            return ""
+        asked = {"phase": "whether phases lead or lag", "angles": "how angles count"}
+        said = " and ".join(asked[name] for name in self.assumed)
+        return (
+            f"Neither the job nor the command line says {said}; {' and '.join(taken)} "
+            f"{'is' if len(taken) == 1 else 'are'} assumed."
+        )
+
+    def turning_in_words(self) -> str:
+        """One clause for captions: how angles count and how the rotor turns."""
+        if self.clock:
+            end = "" if self.view is None else f" seen from the {self.view}"
+            return f"angles from the mark {self.angle_words}{end}, the rotor turns {self.rotation}"
+        words = f"angles from the mark {self.side} the rotation"
+        if self.rotation is not None:
+            words += f", which is {self.rotation}"
+            words += "" if self.view is None else f" seen from the {self.view}"
+        return words
+
+    def conventions(self) -> dict[str, Any]:
+        """The conventions in the words of the job file; rotation and view only where they are stated."""
+        words: dict[str, Any] = {
+            "phase": self.phase,
+            "angles": self.angle_words,
+            "vibration_unit": self.vibration_unit,
+            "weight_unit": self.weight_unit,
+            "assumed": list(self.assumed),
+        }
+        if self.rotation is not None:
+            words["rotation"] = self.rotation
+        if self.view is not None:
+            words["view"] = self.view
+        return words
+
+
+def opposite(rotation: Rotation) -> Rotation:
+    """The direction of the same rotation seen from the other end."""
+    return "counter-clockwise" if rotation == "clockwise" else "clockwise"
+
+
+def check_turning(rotation: str | None, view: str | None, *, clock: bool) -> None:
+    """Refuse a rotation that is none, and what cannot be understood without one.
+
+    Raises
+    ------
+    ValueError
+        Saying what is missing.
+    """
+    if rotation not in (None, "clockwise", "counter-clockwise"):
+        raise ValueError(f"rotation must be 'clockwise' or 'counter-clockwise', not {rotation!r}")
+    if view not in (None, "drive end", "free end"):
+        raise ValueError(f"view must be 'drive end' or 'free end', not {view!r}")
+    if rotation is None and (clock or view is not None):
+        what = "angles that count clockwise or counter-clockwise" if clock else f"a view from the {view}"
+        raise ValueError(
+            f"{what} cannot be understood without the direction of rotation seen from the same end: "
+            "state rotation as clockwise or counter-clockwise"
+        )
+
+
+def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, FloatArray]:
+    z = np.asarray(value, dtype=complex)
+    angle = np.mod(sign * np.degrees(np.angle(z)), 360.0)
+    return np.abs(z) * scale, np.where(angle >= 360.0, 0.0, angle)
+
+
+def _mirror(covariance: FloatArray, scale: float, sign: int) -> FloatArray:
+    flip = np.diag([1.0, float(sign)])
+    return np.asarray(scale**2 * (flip @ covariance @ flip))

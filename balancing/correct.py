@@ -1,0 +1,228 @@
+"""Correction weights: D minimises |Y₀ + W D| over all sensors and speeds ([S] (28)–(40), Den Hartog).
+
+Errors take one way. Every draw of (Y₀, W) is solved for its weights, which gives the region of the weights;
+and with the weights D as mounted it leaves Y₀ + W D, to which a further run adds its errors, which gives what
+a check run will read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.conditioning import UndeterminedError, check_planes, conditioning, unresolved
+from balancing.correction import Correction
+from balancing.decision import Case, decide, remedies
+from balancing.influence import Influence, Whitening, match_speeds
+from balancing.methods import NoErrorsError, Solution, solve
+from balancing.planes import plane_indices, rows_of
+from balancing.regions import LEVEL, real_parts
+from balancing.tables import reading_names
+from balancing.trials import Limits, Trials
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.regression import stretch
+
+EMPTY = 1e-7
+"""Effect of a weight, relative to the vibration, below which it is none."""
+DRAWS = 400
+
+
+def correct(  # noqa: PLR0913
+    influence: Influence,
+    baseline: Trials | ArrayLike | None = None,
+    planes: Sequence[str] | None = None,
+    speeds: ArrayLike | None = None,
+    *,
+    refuse: bool = True,
+    method: str | None = None,
+    limits: Limits | None = None,
+    row_weights: ArrayLike | None = None,
+    strength: float | None = None,
+    remove: Sequence[str] = (),
+) -> Correction:
+    """Correction weights over all chosen sensors and speeds.
+
+    Parameters
+    ----------
+    influence
+        Coefficients, from `estimate_influence` or stored.
+    baseline
+        Vibration to correct, where it is not that of the trial runs: new runs (what is mounted in them is
+        taken into account), or complex amplitudes of the bare rotor (S, C).
+    planes
+        Names of the planes to use; default all. The others stay empty.
+    speeds
+        rad/s, to use; default all.
+    refuse
+        Whether to refuse planes that the measured coefficients tell apart only by their errors; else that is
+        a warning. Planes that act alike exactly are always refused.
+    method
+        "weighted": each reading counts by the inverse of its error, that of the coefficients included; the
+        default where errors are known, without ridge. "least-squares"; "minmax": the smallest largest
+        amplitude.
+    limits
+        Largest weights and amplitudes and forbidden angles, for all speeds, sensors and planes of the
+        influence coefficients.
+    row_weights
+        How much each reading counts, (S, C); default all alike. One of weight 0 counts only for its limit.
+    strength
+        Ridge: planes that act alike get small weights instead of a refusal; relative (0.01 …).
+    remove
+        Planes where material is taken away instead of added.
+
+    Returns
+    -------
+    Correction
+        With its draws, where errors are known.
+
+    Raises
+    ------
+    UndeterminedError
+        Where the readings do not tell the planes apart; says which act alike, and what to do instead. Errors
+        that are assumed refuse nothing (`Correction.decision` says what they mean): only a condition number
+        above 1000 does, which no instrument supports.
+    ValueError
+        For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
+    """
+    today = influence if baseline is None else influence.rebased(baseline)
+    if not today.has_baseline:
+        raise ValueError(
+            "these influence coefficients are stored ones without a vibration to correct: "
+            "give the readings of a baseline run"
+        )
+    chosen = plane_indices(today, planes)
+    used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
+    part = today.part(used, None, chosen)
+    W, Y = part.W.reshape(-1, len(chosen)), part.baseline.ravel()
+    if not Y.any():
+        raise ValueError(
+            "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
+        )
+    rows = rows_of(row_weights, today.W.shape[:2], used)
+    counts = np.ones(len(Y), dtype=bool) if rows is None else rows > 0
+    kept = None if limits is None else limits.pick(used, chosen)
+    if kept is not None and not kept.any:
+        kept = None
+    case = Case(part, today, rows, kept)
+    unclear = "" if strength is not None else _unclear(case, counts, refuse=refuse)
+    fitted, method = fit_part(part, method, rows, kept, strength)
+    D = fitted.weights
+    if kept is not None:
+        D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
+    draws, after_covariance, check_rms = _drawn(part, fitted, D)
+    result = Correction(
+        influence=part,
+        weights=D,
+        draws=draws,
+        after_covariance=after_covariance,
+        check_rms=check_rms,
+        mounted=today.mounted,
+        conditioning=conditioning(W[counts], part.planes),
+        fitted=fitted,
+        method=method if strength is None else "ridge",
+        row_weights=rows,
+        limits=kept,
+        remove=tuple(name for name in part.planes if name in remove),
+    )
+    return replace(result, decision=decide(result, case, (unclear,) if unclear else (), limits))
+
+
+def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
+    """Refuse planes that the coefficients tell apart only by their errors, or say so."""
+    part, P = case.part, len(case.names)
+    check_planes(case.W[counts], part.planes)
+    known, every = (
+        V[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts] for V in (part.known_channels(), part.channels())
+    )
+    words = ""
+    if part.trials is not None or part.known_errors:
+        words = unresolved(case.W[counts], part.planes, known)
+    if words and refuse:
+        rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in part.remarks.contradictions]
+        first = part.remarks.contradictions
+        so = f"so {words}" if first else words
+        raise UndeterminedError("\n".join((*first, so, *remedies(case), *rest)))
+    if not words and every.any():
+        words = unresolved(case.W[counts], part.planes, every)
+    return words
+
+
+def fit_part(
+    part: Influence,
+    method: str | None = None,
+    rows: FloatArray | None = None,
+    limits: Limits | None = None,
+    strength: float | None = None,
+) -> tuple[Solution, str]:
+    """Weights, and the method that they follow from; least squares where errors are assumed or hardly any."""
+    errors, N = part.known_errors, part.baseline.size
+    asked = method or ("weighted" if errors and strength is None else "least-squares")
+
+    def by(name: str) -> Solution:
+        P = len(part.planes)
+        return solve(
+            part.W.reshape(N, P),
+            part.baseline.ravel(),
+            name,
+            channels=part.channels().reshape(N, 2 * P + 2, 2 * P + 2) if errors else None,
+            columns=part.columns().reshape(-1, N, P + 1) if errors else None,
+            row_weights=rows,
+            limits=limits,
+            strength=strength,
+            names=part.planes,
+            readings=reading_names(part.labels, part.sensors, part.speeds),
+            amplitude=part.labels.amplitude_words,
+            weight=part.labels.weight_words,
+            explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
+        )
+
+    try:
+        return by(asked), asked
+    except (UndeterminedError, NoErrorsError) as error:
+        refused = isinstance(error, UndeterminedError) and part.reading.source != "assumed"
+        if method is not None or refused:
+            raise
+        return by("least-squares"), "least-squares"
+
+
+def _explained(part: Influence, D: ComplexArray) -> bool:
+    """Whether what is left of Y₀ + W D, free of other weights, is within what 95 % of the draws leave."""
+    S, C, P = part.W.shape
+    noise = part.errors.noise.changed(np.concatenate(([1.0], D))[None])
+    whitening = Whitening(noise, part.errors.sizes)
+    basis = np.linalg.qr(whitening.white(stretch(part.W.reshape(S * C, 1, P)).reshape(S, C, 2, 2 * P)))[0]
+
+    def left(errors: ComplexArray) -> FloatArray:
+        white = whitening.white(np.moveaxis(real_parts(errors), 0, -1))
+        return np.asarray(np.sum(white**2, axis=0) - np.sum((basis.T @ white) ** 2, axis=0))
+
+    drawn = np.concatenate([left(block) for block in part.noise_draws(noise, DRAWS)])
+    return bool(left((part.baseline + part.W @ D)[None, ..., None])[0] <= np.quantile(drawn, LEVEL))
+
+
+def _drawn(part: Influence, fitted: Solution, D: ComplexArray) -> tuple[ComplexArray, FloatArray, float]:
+    """Weights of every draw (n, P), covariance (S, C, 2, 2) of a check run, and the rms that 95 % stay below.
+
+    Where errors are unknown there are no draws; the others are NaN.
+    """
+    S, C, P = part.W.shape
+    after = part.baseline + part.W @ D
+    weights, sizes = [], []
+    squares = np.zeros((S, C, 2, 2))
+    further = part.further(after, D, DRAWS)
+    for (Y, W), more in zip(part.draws(DRAWS), further, strict=False):
+        n = len(Y)
+        weights.append(fitted.resolve(W.reshape(n, S * C, P), Y.reshape(n, S * C)))
+        read = Y + W @ D + more
+        sizes.append(np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2))))
+        error = real_parts((read - after)[..., None])
+        squares += np.einsum("nsci,nscj->scij", error, error)
+    if not sizes:
+        return np.zeros((0, P), dtype=complex), np.full((S, C, 2, 2), np.nan), float("nan")
+    solved = np.concatenate([np.zeros((0, P), dtype=complex), *weights])
+    bound = float(np.quantile(np.concatenate(sizes), LEVEL))
+    return solved[np.isfinite(solved).all(axis=1)], squares / DRAWS, bound

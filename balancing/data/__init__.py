@@ -1,1 +1,0 @@
-"""What a job says: runs and weights, units and conventions, errors, limits."""

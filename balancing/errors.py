@@ -1,0 +1,548 @@
+"""Errors of a reading and of a run: stated, from repeated and spare runs, or assumed; one standard deviation.
+
+A reading. Y errs by `amplitude`·|Y| along itself, `phase`·|Y| across, and `floor` in both directions.
+
+1. Stated errors hold, unless repeated readings scatter more than they explain (χ², 99 %): then all are
+   multiplied by the ratio. An amplitude or phase error that is not stated is that of the repeats. Deviations
+   that an instrument measured (`Trials.covariance`) count as stated ones and add to them.
+2. Without them repeated readings give the errors. An estimate with ν degrees of freedom is drawn, too:
+   variances are those of the repeats times ν/χ²(ν).
+3. Without repeats spare runs give them, together with what each sensor has of its own from run to run.
+4. Otherwise 2 % and 2° are assumed.
+
+The mean of n readings has 1/n of the variance; the digits in which readings are written do not average out.
+
+A run. Whatever was mounted, temperature and what is not linear change a whole run, however often it is read,
+
+    e = s₁ |Y| z + (s₂ Y + s₃ W T) z' + s₄ Σ cₚ uₚ,
+
+with z for each reading, z' for the run (another one for W T) and u for each plane: complex normal, variance
+1 in either direction. T is what is mounted; c are the columns of W, of equal effect, all together as large
+as the readings (root mean square). What is common goes with the readings where the machine changes, and
+with what weights do of them where these are not mounted, or do not act, alike: on a real rig most of it
+does.
+
+Their sizes s follow from what spare runs leave, free of all coefficients (restricted likelihood; Patterson
+and Thompson 1971), log L = −log det V − eᴴ V⁻¹ e, on a grid of the own size, the size in common and its
+split. The corrected reading, free of the weights, tells of s₁ alone: what is common leaves other weights
+there. V is that of the fitted readings; with those that were read, what a run errs by would explain itself.
+The grid keeps what data leave open; every draw draws its sizes first. At most `MOST` readings of a run take
+part: they tell three sizes as well. |Y| in the own part is between that of the reading and the root mean
+square of all sensors at its speed, whichever fits best (`EVENLY`): on a real rig small readings err as much
+as large ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.conditioning import chance
+from balancing.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import gain
+
+Source = Literal[
+    "stated", "repeats", "stated, enlarged by repeats", "measured", "residuals", "assumed", "unknown"
+]
+Origin = Literal["stated", "estimated", "assumed", "none"]
+ASSUMED = ReadingErrors(amplitude=0.02, phase=float(np.deg2rad(2.0)))
+"""Of a reading, where nothing says more."""
+ASSUMED_RUN = 0.02
+"""Of each of the three parts, where nothing says more."""
+CONTRADICTION = 0.99
+"""Level of the tests by which repeated readings and spare runs overrule stated errors."""
+ROUNDING = 1e-12
+"""Relative differences below this are rounding of the arithmetic, not errors of readings."""
+SIZES = np.concatenate(([0.0], np.geomspace(1e-3, 0.5, 6)))
+"""Of each sensor's own, and of what readings have in common, before they are known roughly."""
+SPLITS = np.array([(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0), (0.5, 0, 0.5), (0, 0.5, 0.5)])
+"""Of what readings have in common, in the variance: of the reading, of what weights do, further unbalance."""
+EVENLY = (0.5, 1.0)
+"""How much of the own part is alike at all sensors."""
+OWN_SHARES = np.array([0.0, 0.1, 0.4, 1.0])
+"""Of stated errors, in the variance; only spare runs show that nothing is common."""
+EXPLAINED = 0.05
+"""Level of the tests whether errors of some size explain what runs leave."""
+REFINED = 2
+"""Times that the grid is drawn closer around what data do not exclude."""
+NOTICEABLE = 0.1
+"""Relative errors between runs that deserve a question."""
+NEGLIGIBLE = 1e-4
+"""Probability of sizes that are left out."""
+MOST = 64
+"""Readings of a run by which sizes are estimated."""
+
+
+class Reading(NamedTuple):
+    """Errors of a single reading.
+
+    Attributes
+    ----------
+    errors
+        None: unknown, or zero. Where they are measured, their root mean square: each reading has its own.
+    source
+        Where they come from, in words.
+    warnings
+        Sentences.
+    dof
+        Degrees of freedom of an estimate, infinite for errors that are taken as they are.
+    """
+
+    errors: ReadingErrors | None = None
+    source: Source = "unknown"
+    warnings: tuple[str, ...] = ()
+    dof: float = np.inf
+
+    def scales(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """How many times larger the errors may be, (count,)."""
+        draws = rng.chisquare(min(self.dof, 1e9), count)
+        return np.sqrt(self.dof / draws) if np.isfinite(self.dof) else np.ones(count)
+
+    def covariance(self, trials: Trials, *, digits: bool = True) -> FloatArray:
+        """Covariance of real and imaginary part of the means of repeated readings, (R, S, C, 2, 2)."""
+        mean, count = trials.mean, trials.repeats[..., None, None]
+        out = np.zeros((*mean.shape, 2, 2))
+        if self.errors is not None and self.source not in ("measured", "residuals"):
+            out = reading_covariance(mean, self.errors) / count
+        if trials.covariance is not None:
+            out = out + np.moveaxis(np.nansum(trials.covariance, axis=2), (0, 1), (-2, -1)) / count**2
+        if trials.steps is not None and digits:
+            amplitude, phase = np.nanmean(trials.steps, axis=1) / np.sqrt(12.0)
+            out = out + turned(mean, amplitude**2, (phase * np.abs(mean)) ** 2)
+        return out
+
+
+def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray:
+    """Covariance (…, 2, 2) of real and imaginary part of single complex readings (…)."""
+    z = np.asarray(readings, dtype=complex)
+    size, floor = np.abs(z), errors.floor**2
+    return turned(z, (errors.amplitude * size) ** 2 + floor, (errors.phase * size) ** 2 + floor)
+
+
+def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
+    """Covariances (…, 2, 2) from variances along z and across."""
+    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
+    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
+    parts = ((radial, along), (tangential, across))
+    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
+
+
+def mean_variance(covariance: FloatArray) -> FloatArray:
+    """Mean variance of both directions, (…), of covariances (…, 2, 2)."""
+    return np.asarray(np.trace(covariance, axis1=-2, axis2=-1) / 2)
+
+
+def hermitian(covariance: FloatArray) -> ComplexArray:
+    """S[p, q] = E[dz_p conj(dz_q)] / 2 from covariances (N, 2P, 2P); half: the variance in one direction."""
+    N, n, _ = covariance.shape
+    C = covariance.reshape(N, n // 2, 2, n // 2, 2)
+    real = C[:, :, 0, :, 0] + C[:, :, 1, :, 1]
+    return np.asarray((real + 1j * (C[:, :, 1, :, 0] - C[:, :, 0, :, 1])) / 2)
+
+
+def reading_of(trials: Trials) -> Reading:
+    """Errors of a reading of these runs: stated, measured, from repeats, or assumed.
+
+    Parameters
+    ----------
+    trials
+        The runs.
+    """
+    stated, scatter = trials.errors, _scatter(trials)
+    ratio, dof = _against_repeats(trials)
+    known = stated is not None or trials.covariance is not None
+    if not known:
+        return _from_repeats(scatter)
+    if stated is None:
+        if ratio == 1.0:
+            variance = np.nanmean(np.asarray(trials.covariance)[[0, 1], [0, 1]])
+            return Reading(ReadingErrors(floor=float(np.sqrt(variance))), "measured")
+        words = f"repeated readings scatter {ratio:.2g} times as much as the measured standard deviations: "
+        found = _from_repeats(scatter)
+        return found._replace(warnings=(words + "their scatter was added", *found.warnings))
+    errors, warnings, degrees = stated, [], np.inf
+    if ratio > 1.0:
+        errors = ReadingErrors(stated.amplitude * ratio, stated.phase * ratio, stated.floor * ratio)
+        degrees = dof
+        warnings.append(
+            f"repeated readings scatter {ratio:.2g} times as much as the stated errors: "
+            "the errors were enlarged accordingly"
+        )
+    if scatter is not None and stated.floor == 0:
+        # an error that was left out is not zero if the repeats show it
+        for kind, size in (("amplitude", scatter[0]), ("phase", scatter[1])):
+            if getattr(stated, kind) == 0 and size > ROUNDING:
+                errors, degrees = replace(errors, **{kind: size}), min(scatter[2], degrees)
+                shown = f"{100 * size:.2g} %" if kind == "amplitude" else f"{np.degrees(size):.2g}°"
+                warnings.append(
+                    f"no {kind} error is stated; repeated readings scatter by {shown}, which is used"
+                )
+    source: Source = "stated" if degrees == np.inf else "stated, enlarged by repeats"
+    return Reading(errors, source, tuple(warnings), degrees)
+
+
+def _from_repeats(scatter: tuple[float, float, int] | None) -> Reading:
+    if scatter is None:
+        return Reading(ASSUMED, "assumed")
+    radial, tangential, dof = scatter
+    if max(radial, tangential) < ROUNDING:
+        words = "all repeated readings are equal to the last digit: they say nothing about the errors"
+        return Reading(ASSUMED, "assumed", (words,))
+    warnings: tuple[str, ...] = ()
+    if min(radial, tangential) < ROUNDING:  # read in whole degrees, say
+        equal, other = ("amplitudes", "phases") if radial < ROUNDING else ("phases", "amplitudes")
+        warnings = (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
+        radial = tangential = max(radial, tangential)
+    return Reading(ReadingErrors(amplitude=radial, phase=tangential), "repeats", warnings, dof)
+
+
+def _scatter(trials: Trials) -> tuple[float, float, int] | None:
+    """Pooled relative radial and tangential standard deviation and their degrees of freedom."""
+    mean, count = trials.mean, trials.repeats
+    used = (count > 1) & (mean != 0)
+    dof = int(np.sum(count[used] - 1))
+    if dof == 0:
+        return None
+    relative = trials.readings[:, used] / mean[used] - 1
+    squares = (np.nansum(part**2) for part in (relative.real, relative.imag))
+    radial, tangential = (float(np.sqrt(square / dof)) for square in squares)
+    return radial, tangential, dof
+
+
+def _against_repeats(trials: Trials) -> tuple[float, int]:
+    """How many times more repeats scatter than stated and measured errors explain; degrees of freedom."""
+    from scipy.special import chdtri
+
+    many = trials.repeats > 1
+    mean, count = trials.mean[many], trials.repeats[many]
+    of_means = Reading(trials.errors, "stated").covariance(trials, digits=False)[many]
+    covariance = of_means * count[:, None, None]
+    values, axes = np.linalg.eigh(covariance)
+    deviation = trials.readings[:, many] - mean
+    parts = np.stack((deviation.real, deviation.imag), axis=-1)
+    along = np.nansum(np.einsum("gij,kgi->kgj", axes, parts) ** 2, axis=0)
+    known = values > 1e-9 * values.max(axis=-1, initial=0.0, keepdims=True)
+    chi_square = float(np.sum(along[known] / values[known]))
+    dof = int(np.sum((count[:, None] - 1) * known))
+    if dof == 0 or chi_square <= float(chdtri(dof, 1 - CONTRADICTION)):
+        return 1.0, dof
+    return float(np.sqrt(chi_square / dof)), dof
+
+
+@dataclass(frozen=True, eq=False)
+class RunErrors:
+    """What changes from run to run: points of a grid, and how likely each is.
+
+    Attributes
+    ----------
+    sizes
+        Of each sensor's own; common to the run, of the readings and of what mounted weights do of them; by
+        further unbalance: relative to the readings, (G, 4).
+    probability
+        (G,), sum 1.
+    origin
+        Where they come from.
+    level
+        Root mean square reading that the size of further unbalance refers to, SI; 0: that of the runs.
+    evenly
+        How much of each sensor's own part is alike at all sensors at a speed, 0 … 1; the rest is in
+        proportion to each reading.
+    """
+
+    sizes: FloatArray
+    probability: FloatArray
+    origin: Origin
+    level: float = 0.0
+    evenly: float = 0.5
+
+    def draw(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Sizes of so many draws, (count, 4)."""
+        return self.sizes[rng.choice(len(self.sizes), count, p=self.probability)]
+
+    @property
+    def typical(self) -> FloatArray:
+        """One set of sizes (4,): variances averaged by their precision, so that large ones do not decide."""
+        total = np.sum(self.sizes**2, axis=1)
+        if not total.all():
+            return np.asarray(np.sqrt(self.probability @ self.sizes**2))
+        precision = self.probability / total
+        return np.asarray(np.sqrt(precision @ self.sizes**2 / precision.sum()))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the whole size."""
+        total = np.sqrt(np.sum(self.sizes**2, axis=1))
+        order = np.argsort(total)
+        low, high = np.interp((0.025, 0.975), np.cumsum(self.probability[order]), total[order])
+        return float(low), float(high)
+
+
+def fixed(sizes: Sequence[float], origin: Origin) -> RunErrors:
+    """Errors of one size of each part."""
+    return RunErrors(np.array([sizes], dtype=np.float64), np.ones(1), origin)
+
+
+NO_RUN_ERRORS = fixed((0.0, 0.0, 0.0, 0.0), "none")
+
+
+def rms(readings: ComplexArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.abs(readings) ** 2)))
+
+
+def unbalances(W: ComplexArray, size: float) -> ComplexArray:
+    """What unbalances do, one in each plane, of equal effect and together of mean square size², (S, C, P)."""
+    mean = np.sqrt(np.mean(np.abs(W) ** 2, axis=(0, 1)) * W.shape[-1])
+    return np.asarray(W * (size / np.where(mean > 0, mean, np.inf)))
+
+
+def own_variance(readings: ComplexArray, evenly: float) -> FloatArray:
+    """Variance of readings (R, S, C) by their own part of size 1; `evenly` of it alike at all sensors."""
+    square = np.abs(readings) ** 2
+    return np.asarray(evenly * square.mean(axis=-1, keepdims=True) + (1 - evenly) * square)
+
+
+def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
+    """Errors of the runs by placement and drift, (M, R, S, C), each times a real number of variance 1.
+
+    A weight that stays in its plane from one run to the next has one error in both.
+    """
+    R = len(trials.runs)
+    out = []
+    for p in range(len(trials.planes)):
+        weights = trials.weights[:, p]
+        starts = np.flatnonzero((weights != 0) & (weights != np.concatenate(([0], weights[:-1]))))
+        for start in starts:
+            same = np.cumprod(weights[start:] == weights[start]).astype(bool)
+            there = np.zeros(R, dtype=complex)
+            there[start:][same] = weights[start]
+            effect = there[:, None, None] * W[..., p]
+            out += [size * effect for size in (trials.placement.mass, 1j * trials.placement.angle) if size]
+    if trials.drift:
+        course = trials.drift * np.linspace(0.0, 1.0, R)[:, None, None] * trials.mean
+        out += [course, 1j * course]
+    return np.array(out).reshape(len(out), *trials.mean.shape)
+
+
+class Block(NamedTuple):
+    """A combination of runs that holds no coefficient: residuals (n,), and variances of either direction.
+
+    `parts` (5, n, n): by the parts at size 1, the first alike at all sensors and in proportion;
+    `known` (n, n): by all that is known.
+    """
+
+    e: ComplexArray
+    parts: ComplexArray
+    known: ComplexArray
+
+    def at(self, sizes: FloatArray, evenly: float) -> tuple[FloatArray, FloatArray]:
+        """Log det V and eᴴ V⁻¹ e / 2 at sizes (G, 4)."""
+        own, *common = sizes.T**2
+        squares = np.array([evenly * own, (1 - evenly) * own, *common])
+        V = np.tensordot(squares.T, self.parts, axes=1) + self.known
+        n = len(self.e)
+        least = 1e-9 * np.trace(V, axis1=1, axis2=2).real + 1e-12 * np.trace(self.parts[0]).real
+        V += (least / n)[:, None, None] * np.eye(n)
+        L = np.linalg.cholesky(V)
+        white = np.linalg.solve(L, np.broadcast_to(self.e[:, None], (len(V), n, 1)))
+        log = 2 * np.log(np.einsum("gii->gi", L).real).sum(axis=1)
+        return log, np.sum(np.abs(white) ** 2, axis=(1, 2)) / 2
+
+
+class Blocks(NamedTuple):
+    """Of spare runs, and of the corrected reading (at most one)."""
+
+    spare: tuple[Block, ...]
+    corrected: tuple[Block, ...]
+
+
+def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Blocks:
+    """What runs tell of their errors.
+
+    Parameters
+    ----------
+    trials
+        R runs.
+    theta
+        (Y₀, W₁, …), (S, C, P + 1).
+    covariance
+        Of the readings, by their errors alone, (R, S, C, 2, 2).
+    """
+    A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
+    (R, n), (S, C) = A.shape, theta.shape[:2]
+    at = np.linspace(0, S * C - 1, min(S * C, MOST)).round().astype(np.int64)
+    Y, W = trials.mean.reshape(R, -1)[:, at], theta[..., 1:]
+    c = unbalances(W, rms(trials.mean)).reshape(S * C, -1)[at].T
+    variance = mean_variance(covariance).reshape(R, -1)[:, at]
+    others = job_columns(trials, W).reshape(-1, R, S * C)[..., at]
+    # as the coefficients say: what each run errs by would explain itself
+    whole = np.einsum("rp,scp->rsc", A, theta)
+    each = (whole, own_variance(whole, 1.0), own_variance(whole, 0.0), whole - theta[..., 0])
+    fitted, even, own, effect = (part.reshape(R, -1)[:, at] for part in each)
+
+    def block(m: ComplexArray, free: ComplexArray) -> Block:
+        share = np.abs(m) ** 2
+        moved = m[:, None] * fitted
+        alone = [np.diag(share @ part) for part in (even, own)]
+        loads = m[:, None] * effect
+        parts = [*alone, moved.T @ moved.conj(), loads.T @ loads.conj(), share.sum() * c.T @ c.conj()]
+        along = np.einsum("r,mrn->mn", m, others)
+        known = np.diag(share @ variance) + along.T @ along.conj() / 2
+        keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
+        inside = keep @ np.array([*parts, known]) @ keep.conj().T
+        return Block(keep @ (m @ Y), inside[:5], inside[5])
+
+    # combinations whose errors are independent
+    basis, size = (
+        np.linalg.svd(A)[0][:, n:],
+        np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=1),
+    )
+    basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] * basis))[1]
+    # a rotor at rest repeats itself to the last digit
+    moving = [m for m in basis.T if np.max(np.abs(m) @ np.abs(fitted)) > ROUNDING * np.abs(fitted).max()]
+    spare = tuple(block(m.conj(), W.reshape(S * C, -1)[at, :0]) for m in moving)
+    if len(at) < n or not theta[..., 0].any():
+        return Blocks(spare, ())
+    flat = theta.reshape(-1, n)
+    m = np.concatenate(([1.0], -gain(flat[:, 1:]) @ flat[:, 0])) @ gain(A)
+    row = block(m, flat[at, 1:])
+    # what is common to a run leaves other weights, not a rest
+    return Blocks(spare, (row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]),))
+
+
+def run_errors(trials: Trials, theta: ComplexArray, covariance: FloatArray, reading: Reading) -> RunErrors:
+    """Stated, estimated by spare runs, none beside stated errors of a reading, or assumed.
+
+    Parameters
+    ----------
+    trials, theta, covariance
+        As `blocks`.
+    reading
+        Where these come from.
+    """
+    return _sized(blocks(trials, theta, covariance), trials, reading)
+
+
+def _sized(found: Blocks, trials: Trials, reading: Reading) -> RunErrors:
+    level = rms(trials.mean)
+    if trials.run_errors is not None:
+        relative, floor = trials.run_errors[0] ** 2, (trials.run_errors[1] / (level or 1.0)) ** 2
+        own = OWN_SHARES[: 4 if found.spare else 3, None]
+        sizes = np.sqrt(np.hstack((own * (relative + floor), (1 - own) * (relative, 0.0, floor))))
+        evenly = floor / ((relative + floor) or 1.0)
+        if not sizes.any() or not found.spare or tail(found.spare, sizes, evenly) > 1 - CONTRADICTION:
+            return RunErrors(sizes, _posterior(found, sizes, evenly), "stated", level, evenly)
+    if found.spare:
+        return _estimated(found, level)
+    if reading.source == "stated":
+        return NO_RUN_ERRORS
+    return replace(fixed((ASSUMED_RUN, ASSUMED_RUN, 0.0, ASSUMED_RUN), "assumed"), level=level)
+
+
+def usual_run_errors(trials: Trials) -> RunErrors:
+    """Errors between runs where no spare run tells of them.
+
+    Parameters
+    ----------
+    trials
+        The runs, whose statement counts; none beside stated errors of a reading, else they are assumed.
+    """
+    return _sized(Blocks((), ()), trials, reading_of(trials))
+
+
+def _estimated(found: Blocks, level: float) -> RunErrors:
+    """The grid, drawn closer around what data do not exclude; own parts as they fit best."""
+    own = common = SIZES
+    each = (*found.spare, *found.corrected)
+    seen, loaded = (sum(np.trace(block.parts[k]).real for block in found.spare) for k in (2, 3))
+    # runs without weights tell nothing of what goes with the weights
+    splits = SPLITS if loaded > 0.03 * seen else SPLITS[SPLITS[:, 1] == 0]
+    log = [
+        -np.sum([block.at(_grid(own, common, splits), evenly) for block in each], axis=(0, 1))
+        for evenly in EVENLY
+    ]
+    evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
+    for _ in range(REFINED):
+        chance = _posterior(found, _grid(own, common, splits), evenly).reshape(len(own), len(common), -1)
+        own, common = (
+            _finer(values, chance.sum(axis=axes), count)
+            for values, axes, count in ((own, (1, 2), 5), (common, (0, 2), 6))
+        )
+    sizes = _grid(own, common, splits)
+    return RunErrors(sizes, _posterior(found, sizes, evenly), "estimated", level, evenly)
+
+
+def _grid(own: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray:
+    """All combinations of own sizes, sizes in common and splits, (G, 4)."""
+    a, b, split = np.meshgrid(own, common, range(len(splits)), indexing="ij")
+    return np.column_stack((a.ravel(), b.reshape(-1, 1) * np.sqrt(splits[split.ravel()])))
+
+
+def _finer(values: FloatArray, probability: FloatArray, count: int) -> FloatArray:
+    """So many values between those that are not excluded."""
+    seen = np.flatnonzero(probability > NEGLIGIBLE)
+    low, high = max(seen[0] - 1, 0), min(seen[-1] + 1, len(values) - 1)
+    if values[low] > 0:
+        return np.geomspace(values[low], values[high], count)
+    return np.concatenate(([0.0], np.geomspace(values[1], values[high], count - 1)))
+
+
+def tail(used: Sequence[Block], sizes: FloatArray, evenly: float) -> float:
+    """Probability that errors of one of these sizes leave more than was read, at the likeliest of them."""
+    n = sum(len(block.e) for block in used)
+    log, q = np.sum([block.at(sizes, evenly) for block in used], axis=0)
+    likely = q[-log - q > np.max(-log - q) - 3.0]
+    return chance(2 * likely.min(), 2 * n)
+
+
+def _posterior(found: Blocks, sizes: FloatArray, evenly: float) -> FloatArray:
+    """Probability of every point; the corrected reading takes part unless unbalance elsewhere shows in it."""
+    weight = np.zeros(len(sizes))
+    for block in found.spare:
+        weight -= np.sum(block.at(sizes, evenly), axis=0)
+    for block in found.corrected:
+        if len(block.e) and tail([block], sizes[weight > weight.max() - 3.0], evenly) > EXPLAINED:
+            weight -= np.sum(block.at(sizes, evenly), axis=0)
+    probability = np.exp(weight - weight.max())
+    return np.asarray(probability / probability.sum())
+
+
+def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str, ...]:
+    """Whether spare runs disagree by more than was stated, or than any rotor should."""
+    R, n = A.shape
+    if run.origin != "estimated":
+        return ()
+    Y = trials.mean.reshape(R, -1)
+    levels = np.mean(np.abs(Y) ** 2, axis=1)
+    left = np.mean(np.abs(Y - A @ (gain(A) @ Y)) ** 2, axis=1) / np.maximum(levels, 0.1 * levels.max())
+    size = float(np.sqrt(left.sum() / 2 / (R - n)))
+    if trials.run_errors is None and size < NOTICEABLE:
+        return ()
+    stated = "" if trials.run_errors is None else ", more than stated"
+    return (
+        f"the runs disagree by {100 * size:.2g} % of the readings{stated}, most of all in run "
+        f"{trials.runs[int(np.argmax(left))]!r}: the rotor does not repeat itself or is not "
+        "linear, or a row is missing in the weights table",
+    )
+
+
+def unseen(trials: Trials, run: RunErrors) -> tuple[str, ...]:
+    """Notes about what no run measures."""
+    notes: tuple[str, ...] = ()
+    if run.origin in ("assumed", "none"):
+        taken = f"{100 * ASSUMED_RUN:g} % are assumed" if run.origin == "assumed" else "none are stated"
+        notes += (
+            f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more "
+            "baseline run at the end, or one more trial run, would measure them; repeated readings do not",
+        )
+    if not any(trials.placement) and run.origin in ("none", "stated"):
+        notes += (
+            "the weights are taken to be mounted exactly: 3° or 3 % amiss, if likely, should be stated as "
+            "placement_deg and placement_percent",
+        )
+    return notes

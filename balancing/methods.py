@@ -1,0 +1,510 @@
+"""Methods of correction: weights D that make Y + W D small, and how to solve again for redrawn data.
+
+Least squares, ridge: with rows weighted by w and columns scaled, (BᴴB + λ²) x = −Bᴴ w Y, λ relative to the
+largest singular value. Min–max and limits: `balancing.cones`.
+
+The weighted fit divides residuals by their errors, which depend on D through those of W: normal errors of
+covariance C stand in z = (Y, W₁, …, W_P), (Re, Im) pairs, of each reading. With B = [1, D₁, …] stretched,
+r = B z = Y + W D and Σ = B C Bᵀ the most likely true values at given D are ẑ = z − C Bᵀ Σ⁻¹ r; what is left,
+
+    Q(D) = Σ w² rᵀ Σ⁻¹ r,
+
+has half the gradient Σ w² Ŵᵀ Σ⁻¹ r, with Ŵ the W part of ẑ, stretched: a least-squares problem of residuals
+w L⁻¹ r and rows w L⁻¹ Ŵ, Σ = L Lᵀ. Its matrix M = Σ w² Ŵᵀ Σ⁻¹ Ŵ contains the squares of errors e that Ŵ has
+itself, of covariance K = C − C Bᵀ Σ⁻¹ B C; the honest information about D is A = M − Σ w² E[eᵀ Σ⁻¹ e], and
+one step from D, −A⁻¹ (gradient), solves the problem for redrawn data. Source: W. A. Fuller, *Measurement
+Error Models* (1987), chapters 2 and 3.
+
+Unbalance outside the planes leaves residuals that no error of a reading explains; large weights would excuse
+them by the errors of W. Where χ² is beyond what errors explain (95 %), every reading of Y therefore gets a
+further error, alike for all, such that χ² equals its degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.conditioning import UndeterminedError, check_planes, check_stack
+from balancing.cones import (
+    AT_LIMIT,
+    PLAIN,
+    TINY,
+    TOLERANCE,
+    Bounds,
+    InfeasibleError,
+    Optimum,
+    Words,
+    bounds_of,
+    explain,
+    nearest,
+    smallest_maximum,
+    within,
+)
+from balancing.trials import Limits
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.registry import Method, find
+from rotorid.base.text import capital
+from rotorid.regression import covariance_root, solution, solution_and_rank, stretch, unstretch
+
+Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
+Explained = Callable[[ComplexArray], bool]
+
+UNEXPLAINED = 0.95
+"""Level of the χ² test beyond which the residuals are larger than the errors explain."""
+FLOOR = 1e-4
+"""Every residual of the weighted fit gets a further error of this share of the rms error of all."""
+LEAST_INFORMATION = 0.2
+"""Share of M that is left to A in any direction."""
+SETTLED = 1e-6
+"""Share of 1 + Q by which the next step would lower Q, at a minimum."""
+DRAWN = 1e-6
+"""Tolerance of cone programs for redrawn data."""
+
+
+class NoErrorsError(ValueError):
+    """A weighted fit is asked for where no errors are known, or only rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Correction weights and the vibration they should leave.
+
+    Attributes
+    ----------
+    weights
+        Shape (P,), within every limit.
+    residual
+        Y + W D, shape (N,).
+    method
+        Its name.
+    objective
+        max wᵢ|rᵢ| of min–max, else sqrt(Σ wᵢ²|rᵢ|²).
+    active_weights, active_residuals
+        Planes (P,) at their largest weight; readings (N,) at their limit or, for min–max, at the maximum.
+    resolve
+        (W (B, N, P), Y (B, N)) → weights (B, P) of the same problem with redrawn data, NaN where it has no
+        solution; further errors of the size `model_error` are drawn in it. NaN for a ridge, whose scatter
+        would hide its bias.
+    gap
+        Largest relative distance of the objective from its optimum, over all readings; None for a closed form
+        or a search.
+    chi_square, dof
+        Of the weighted fit without limits: what its weights leave in units of the errors, with what readings
+        have in common, and its degrees of freedom.
+    model_error
+        Of the weighted fit: standard deviation, in the unit of Y, of what else stands in both parts of every
+        reading; 0 where errors explain what the weights leave.
+    """
+
+    weights: ComplexArray
+    residual: ComplexArray
+    method: str
+    objective: float
+    active_weights: BoolArray
+    active_residuals: BoolArray
+    resolve: Resolve
+    gap: float | None = None
+    chi_square: float | None = None
+    dof: int | None = None
+    model_error: float = 0.0
+
+    @property
+    def explained(self) -> bool:
+        """Whether errors alone may leave what the weights leave."""
+        return self.model_error == 0
+
+
+Fitted = Solution
+
+
+class Job(NamedTuple):
+    """Equations W (N, P), Y (N,), row weights w (N,), bounds and names of planes that may carry a weight.
+
+    `explained` asks whether errors alone may leave what weights leave; None: by χ².
+    """
+
+    method: str
+    W: ComplexArray
+    Y: ComplexArray
+    w: FloatArray
+    bounds: Bounds
+    planes: Sequence[str]
+    explained: Explained | None = None
+
+    def fitted(self, D: ComplexArray, resolve: Resolve, **more: Any) -> Fitted:  # noqa: ANN401
+        """The result."""
+        residual, limit, share = self.Y + self.W @ D, self.bounds.residual, 1 - AT_LIMIT
+        left = self.w * np.abs(residual)
+        objective = float(np.linalg.norm(left))
+        if self.method == "minmax":
+            objective = float(left.max())
+            limit = np.minimum(limit, objective / np.maximum(self.w, TINY))
+        active = np.abs(D) >= share * self.bounds.max_weight, np.abs(residual) >= share * limit
+        return Fitted(D, residual, self.method, objective, *active, resolve, **more)
+
+
+Solver = Callable[[Job, FloatArray, ComplexArray], Fitted]
+
+
+def method_words(name: str, *, weighted: bool) -> str:
+    """What a method of correction makes small; `weighted`: readings count differently."""
+    every: tuple[Method[Any], ...] = (*METHODS, RIDGE)
+    method = find(every, name, "method")
+    about = method.about.replace("amplitude", "weighted amplitude") if weighted else method.about
+    return f"{capital(method.title or method.name)}: {about}."
+
+
+def solve(  # noqa: PLR0913
+    W: ArrayLike,
+    Y: ArrayLike,
+    method: str = "least-squares",
+    *,
+    row_weights: ArrayLike | None = None,
+    limits: Limits | None = None,
+    strength: float | None = None,
+    channels: FloatArray | None = None,
+    columns: ComplexArray | None = None,
+    names: Sequence[str] | None = None,
+    readings: Sequence[str] | None = None,
+    amplitude: Words = PLAIN,
+    weight: Words = PLAIN,
+    explained: Explained | None = None,
+) -> Solution:
+    """Weights D that make Y + W D small, within limits, and how to solve the same problem for redrawn data.
+
+    Parameters
+    ----------
+    W, Y
+        Influence coefficients (N, P) and readings (N,), complex, stacked speed by speed.
+    method
+        One of `METHODS`: "least-squares" minimises sqrt(Σ wᵢ²|rᵢ|²), "minmax" max wᵢ|rᵢ|, "weighted" the sum
+        of squares of residuals in units of their errors.
+    row_weights
+        wᵢ ≥ 0, shape (N,); default 1. A reading of weight 0 counts only for its limit.
+    limits
+        Of weights, amplitudes (its `residual` (S, C) has N entries) and angles; default none.
+    strength
+        Of a ridge: least squares minimises Σ wᵢ² |rᵢ|² + (strength · σ₁)² Σ |sₚ Dₚ|², σ₁ the largest singular
+        value of the row-weighted W with columns scaled to length 1 by 1/sₚ. 0.01 hardly changes planes with a
+        condition number of 10; 0.1 is much. Weights are biased towards zero.
+    channels
+        Covariance of (Re Y, Im Y, Re W₁, …) of each reading, (N, 2P + 2, 2P + 2) or (S, C, …); None: unknown.
+    columns
+        What of it the readings have in common, as `balancing.Influence.columns`, (M, …, P + 1). The weighted
+        fit weighs readings by the rest, and its χ² allows for them.
+    names, readings
+        Of planes (P) and readings (N), for messages; default "1", "2", … and "reading 1", ….
+    amplitude, weight
+        Write an amplitude or a weight with its unit, for messages; default plain numbers.
+    explained
+        Of the weighted fit: whether errors alone may leave what weights (P,) leave; default: by χ² at typical
+        sizes of the errors.
+
+    Raises
+    ------
+    ValueError
+        For NaN, shapes that do not fit, an unknown method, a ridge with another method or limits, a weighted
+        fit without errors.
+    UndeterminedError
+        For planes (that may carry a weight) the readings do not tell apart.
+    InfeasibleError
+        For limits that cannot be met: which ones, and how far to relax them.
+
+    Notes
+    -----
+    Sources: [S] (33), (40) for the closed form, by SVD of the row-weighted, column-scaled W.
+
+    Examples
+    --------
+    >>> solution = solve([[1.0], [1.0]], [3.0, 5.0], method="minmax")
+    >>> print(f"{solution.weights[0].real:.6f} {solution.objective:.6f}")
+    -4.000000 1.000000
+    """
+    function = find(METHODS, method, "method").function
+    K, y, w = check_stack(W, Y, row_weights)
+    N, P = K.shape
+    planes = names or [str(p + 1) for p in range(P)]
+    if len(planes) != P or (readings and len(readings) != N):
+        raise ValueError(f"{P} planes and {N} readings need as many names")
+    bounds = bounds_of(K, y, limits)
+    n = 2 * P + 2
+    channels = np.broadcast_to(0.0, (N, n, n)) if channels is None else channels.reshape(N, n, n)
+    columns = np.zeros((0, N, P + 1)) + 0j if columns is None else columns.reshape(-1, N, P + 1)
+    job = Job(method, K, y, w, bounds, planes, explained)
+    if strength is not None:
+        if method != "least-squares" or limits is not None or not 0 < strength < np.inf:
+            raise ValueError(
+                f"a ridge has a strength above 0, such as 0.05 (got {strength!r}), and goes with least "
+                "squares without limits only"
+            )
+        return job.fitted(_normal(K, y, w, strength), lambda W, _: np.nan * W[:, 0])
+    used = bounds.used
+    try:
+        if used.all():
+            return function(job, channels, columns)
+        whole, index = np.eye(P)[used], np.flatnonzero(np.repeat(np.append(True, used), 2))
+        planes = [name for name, one in zip(planes, used, strict=True) if one]
+        asked = None if explained is None else lambda D: explained(D @ whole)
+        part = Job(method, K[:, used], y, w, bounds.part(used), planes, asked)
+        fitted = function(part, channels[:, index[:, None], index], columns[..., index[::2] // 2])
+    except InfeasibleError:
+        labels = readings or [f"reading {n + 1}" for n in range(N)]
+        raise InfeasibleError(explain(bounds, job.planes, labels, amplitude, weight)) from None
+    return replace(
+        fitted,
+        weights=fitted.weights @ whole,
+        active_weights=(bounds.max_weight == 0) | (fitted.active_weights @ whole > 0),
+        resolve=lambda W, Y: fitted.resolve(W[..., used], Y) @ whole,
+    )
+
+
+fit = solve
+
+
+def _closed_form(job: Job) -> ComplexArray:
+    """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
+    A = job.w[:, None] * job.W
+    weights, rank = solution_and_rank(A, -job.w * job.Y)
+    if rank < A.shape[1]:
+        check_planes(A[job.w > 0], job.planes)
+    return np.asarray(weights)
+
+
+def _fit_plain(job: Job, *_: Any) -> Fitted:  # noqa: ANN401
+    D, minmax, first = _closed_form(job), job.method == "minmax", None
+
+    def again(bounds: Bounds, target: ComplexArray, tolerance: float = DRAWN) -> Optimum:
+        if minmax or not len(target):
+            return smallest_maximum(bounds, np.append(job.w, np.zeros(len(target))), first, tolerance)
+        root = stretch(np.linalg.qr(job.w[:, None] * bounds.W)[1])
+        left = float(np.linalg.norm(job.w * (bounds.Y + bounds.W @ target)))
+        return nearest(bounds, target, root, left, tolerance)
+
+    def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
+        return _within_limits(job.bounds, W, Y, _normal(W, Y, job.w), again, always=minmax)
+
+    if not minmax and within(job.bounds, D):
+        return job.fitted(D, resolve)
+    optimum = again(job.bounds, D, TOLERANCE)
+    fitted = job.fitted(optimum.weights, resolve, gap=optimum.gap)
+    high = job.w * np.abs(fitted.residual) >= 0.8 * fitted.objective
+    first = np.append(high, fitted.active_weights)  # where redrawn data start from
+    return fitted
+
+
+def _normal(W: ComplexArray, Y: ComplexArray, w: FloatArray, strength: float = 0.0) -> ComplexArray:
+    """Least squares or ridge of W (…, N, P) and Y (…, N) by normal equations of scaled columns."""
+    A = w[:, None] * W
+    size = np.maximum(np.linalg.norm(A, axis=-2, keepdims=True), TINY)
+    A = A / size
+    adjoint = np.conj(np.swapaxes(A, -1, -2))
+    square = adjoint @ A
+    if strength:
+        square = square + strength**2 * np.linalg.norm(square, 2) * np.eye(len(square))
+    return np.asarray(-np.linalg.solve(square, adjoint @ (w * Y)[..., None])[..., 0] / size[..., 0, :])
+
+
+def _within_limits(
+    bounds: Bounds,
+    W: ComplexArray,
+    Y: ComplexArray,
+    drawn: ComplexArray,
+    again: Callable[[Bounds, ComplexArray], Optimum],
+    *,
+    always: bool = False,
+) -> ComplexArray:
+    """Weights (B, P) of redrawn data, solved again `always`, or where they are not within the limits."""
+    for b in range(len(W)):
+        part = bounds._replace(W=W[b], Y=Y[b])
+        if always or not within(part, drawn[b]):
+            try:
+                drawn[b] = again(part, drawn[b]).weights
+            except ValueError:
+                drawn[b] = np.nan
+    return drawn
+
+
+class _State(NamedTuple):
+    """At some D: w L⁻¹ Ŵ (2N, 2P), w L⁻¹ r (2N,), C Bᵀ L⁻ᵀ as A (N, 2P + 2, 2), L⁻¹ (N, 2, 2)."""
+
+    rows: FloatArray
+    r: FloatArray
+    A: FloatArray
+    white: FloatArray
+
+
+class _Errors(NamedTuple):
+    """Readings that count for the weighted fit: W (N, P), Y (N,), covariances C, row weights w (N,)."""
+
+    W: ComplexArray
+    Y: ComplexArray
+    C: FloatArray
+    w: FloatArray
+
+    def rows(self, white: FloatArray, W: ComplexArray) -> FloatArray:
+        """Stretched and whitened, of W (N, M, P): (2NM, 2P)."""
+        whitened = self.w[:, None, None, None] * (white[:, None] @ stretch(W[:, :, None]))
+        return whitened.reshape(-1, 2 * W.shape[-1])
+
+    def at(self, D: ComplexArray) -> _State:
+        """What the fit needs at some weights."""
+        B = stretch([[1.0, *D]])
+        CB = self.C @ B.T
+        S = B @ CB
+        S = S + 1e-14 * np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        white = np.linalg.inv(np.linalg.cholesky(S))
+        A = CB @ np.swapaxes(white, 1, 2)
+        r = white @ stretch(self.Y + self.W @ D).reshape(-1, 2, 1)
+        true = self.W - unstretch((A @ r)[..., 0])[:, 1:]
+        return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
+
+    def minimum(self, start: ComplexArray) -> ComplexArray:
+        """Where Q is smallest, from some weights."""
+        from scipy.optimize import least_squares
+
+        @lru_cache(1)
+        def at(d: bytes) -> _State:
+            return self.at(np.frombuffer(d, dtype=complex))
+
+        for method in ("lm", "trf"):  # the first is fast, the second does not lose its way
+            end = least_squares(
+                lambda d: at(d.tobytes()).r,
+                stretch(start),
+                lambda d: at(d.tobytes()).rows,
+                method=method,
+                x_scale="jac",
+                xtol=1e-12,
+                ftol=1e-15,
+                max_nfev=500,
+            )
+            if end.fun @ end.jac @ solution(end.jac, end.fun) <= SETTLED * (1 + 2 * end.cost):
+                return unstretch(end.x)
+        raise UndeterminedError(
+            "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
+            "bound; use larger trial weights, fewer planes or another method"
+        )
+
+    def chi_square(self, D: ComplexArray, common: FloatArray, *, measured: bool = False) -> float:
+        """χ² of r, least about D, with columns (N, 2P + 2, M) common to all readings; w does not count.
+
+        Weights move it as Ŵ does, or the `measured` W, which is the better test: 3 % instead of 7 % of jobs
+        are beyond its 95 % quantile.
+        """
+        even, (_, n, M) = self._replace(w=np.ones_like(self.w)), common.shape
+        at = even.at(D)
+        rows = even.rows(at.white, self.W[:, None]) if measured else at.rows
+        shared = (at.white @ stretch([[1.0, *D]]) @ common).reshape(len(at.r), M)
+        X = np.column_stack((rows, shared, at.r))
+        G = X.T @ X
+        G[n - 2 : -1, n - 2 : -1] += np.eye(M)
+        return float(G[-1, -1] - G[-1, :-1] @ solution(G[:-1, :-1], G[:-1, -1]))
+
+    def inverse(self, at: _State) -> FloatArray:
+        """A⁻¹ (2P, 2P)."""
+        from scipy.linalg import eigh
+
+        K = self.C - at.A @ np.swapaxes(at.A, 1, 2)
+        root = covariance_root(K, np.einsum("nii->ni", K))
+        noise = self.rows(at.white, unstretch(np.swapaxes(root, 1, 2))[..., 1:])
+        share, V = eigh(noise.T @ noise, at.rows.T @ at.rows)
+        return np.asarray((V / np.maximum(1 - share, LEAST_INFORMATION)) @ V.T)
+
+    def descend(self, bounds: Bounds, D: ComplexArray) -> tuple[float, ComplexArray]:
+        """Q and weights where steps end within limits: cone programs of the linearised problem."""
+        Q = np.inf
+        for _ in range(100):
+            at = self.at(D)
+            target = D - unstretch(solution(at.rows, at.r))
+            move = nearest(bounds, target, np.linalg.qr(at.rows)[1]).weights - D
+            for k in range(20 if np.isfinite(Q) else 1):  # the first step is taken whole, to the limits
+                end = D + 0.5**k * move
+                new = self.at(end).r
+                if new @ new < Q and within(bounds, end):
+                    break
+            else:
+                break
+            fall, Q, D = Q - new @ new, float(new @ new), end
+            if fall <= 1e-10 * (1 + Q):
+                break
+        return Q, D
+
+
+def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Fitted:
+    start, on, bounds = _closed_form(job), job.w > 0, job.bounds
+    if not len(start):
+        return _fit_plain(job)
+    from scipy.optimize import brentq
+    from scipy.special import chdtrc
+
+    common = np.moveaxis(np.ascontiguousarray(columns[:, on]).view(np.float64), 0, 2)
+    errors = _Errors(job.W[on], job.Y[on], channels[on] - common @ np.swapaxes(common, 1, 2), job.w[on])
+    B, D, dof = stretch([[1.0, *start]]), start, 2 * int(on.sum() - len(start))
+    variance = float(np.trace(B @ errors.C @ B.T, axis1=1, axis2=2).mean()) / 2
+    if not variance > 1e-12 * channels[:, 0, 0].mean():
+        raise NoErrorsError(
+            "the method weighted needs errors of the readings ([errors], --amplitude-error, --phase-error or "
+            "repeated readings)"
+        )
+
+    def wider(share: float) -> _Errors:
+        """With a further variance of both parts of Y."""
+        C = errors.C.copy()
+        C[:, [0, 1], [0, 1]] += (FLOOR**2 + share) * variance
+        return errors._replace(C=C)
+
+    @cache
+    def excess(share: float) -> float:
+        nonlocal D
+        D = wider(share).minimum(D)
+        return wider(share).chi_square(D, common) - dof
+
+    chi, share = dof + excess(0.0), 0.0
+    unexplained = chi > dof > 0
+    if unexplained and job.explained is not None:
+        unexplained = not job.explained(D)
+    elif unexplained:
+        unexplained = chdtrc(dof, wider(0.0).chi_square(D, common, measured=True)) < 1 - UNEXPLAINED
+    if unexplained:
+        D, high = start, chi / dof - 1
+        while excess(high) > 0:
+            high *= 2
+        share = brentq(excess, 0.0, high, xtol=1e-8 * high)
+        D = wider(share).minimum(D)
+    wide = wider(share)
+    if not within(bounds, D):
+        D = min((wide.descend(bounds, one) for one in (D, start, 0 * D)), key=lambda end: end[0])[1]
+    at = wide.at(D)
+    inverse, rng, model_error = wide.inverse(at), np.random.default_rng(1), float(np.sqrt(share * variance))
+    root = np.linalg.cholesky(np.linalg.inv(inverse)).T
+    weighing, moved = np.swapaxes(at.white, 1, 2) @ at.white, (at.A @ at.white)[:, 2:]
+    left = (errors.Y + errors.W @ D).view(np.float64).reshape(-1, 2, 1)
+    adjusted = errors.W - unstretch((moved @ left)[..., 0])
+
+    def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
+        further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
+        r = ((Y + further)[:, on] + W[:, on] @ D).view(np.float64).reshape(len(W), -1, 2, 1)
+        u = unstretch((weighing @ r)[..., 0])[..., 0]
+        gradient = np.einsum("n,np,bn->bp", wide.w**2, adjusted.conj(), u)
+        drawn = D - unstretch(gradient.view(np.float64) @ inverse)
+        again = partial(nearest, root=root, tolerance=DRAWN)
+        return _within_limits(bounds, W, Y, drawn, again)
+
+    return job.fitted(D, resolve, chi_square=chi, dof=dof, model_error=model_error)
+
+
+METHODS: tuple[Method[Solver], ...] = (
+    Method("weighted", "every reading counts by its error, that of the coefficients included", _fit_weighted),
+    Method(
+        "least-squares", "the sum of squared amplitudes is the smallest possible", _fit_plain, "least squares"
+    ),
+    Method("minmax", "the largest amplitude is the smallest possible", _fit_plain, "min–max"),
+)
+"""The first is the usual one where errors are known, the second where they are not."""
+RIDGE = Method("ridge", "small weights where planes act alike", None)
+"""Of least squares without limits, by its strength."""

@@ -1,0 +1,150 @@
+"""Pictures of a correction: weights, and vibration before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing.plots.polar import complete, draw_line, of_plane, polar_axes, turning, unit
+from balancing.regions import reach
+from balancing.tables import INVISIBLE
+from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_above, legend_below, new_figure, plain
+from rotorid.base.text import cut
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from balancing.check_run import CheckComparison
+    from balancing.correction import Correction
+    from balancing.mount import Mounted
+
+_NAMED, _SPEEDS = 40, 12
+"""Readings that have room for the names of their sensors; speeds that have."""
+
+
+def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
+    """A new figure with all pictures; on polar axes the weights, on others the amplitudes."""
+    if ax is None:
+        return correction_figure(c)
+    polar = ax.name == "polar"
+    if polar:
+        weights(c, ax)
+    else:
+        amplitudes(c, [ax])
+    legend_above(ax, height=-0.08 if polar else -0.3, title=turning(c.labels), title_fontsize=TEXT)
+    return ax
+
+
+def correction_figure(
+    c: Correction,
+    check: CheckComparison | None = None,
+    below: Callable[[Axes], object] | None = None,
+) -> Figure:
+    """A new figure: the weights, and all amplitudes before and after.
+
+    Parameters
+    ----------
+    c
+        The correction.
+    check
+        A check run: what was achieved (of several runs: in the last).
+    below
+        Draws something else than the amplitudes.
+    """
+    figure = new_figure(8.6)
+    grid = figure.add_gridspec(2, height_ratios=[5, 6])
+    polar, lower = weights(c, figure.add_subplot(grid[0], projection="polar")), figure.add_subfigure(grid[1])
+    if below is None:
+        amplitudes(c, axes := lower.subplots(2, sharex=True), check)
+    else:
+        below(axes := lower.add_subplot())
+    words = c.sentence() if check is None else check.headline
+    figure.suptitle(words.replace("; ", ";\n"), fontsize="medium", fontweight="bold")
+    legend_below(figure, [polar, *np.atleast_1d(axes)], title=turning(c.labels))
+    return figure
+
+
+def residual_figure(result: Correction, mounted: Mounted | None = None) -> Figure:
+    """A new figure of readings before and after (with pieces, where given), and what is left by itself."""
+    figure = new_figure(4.2, 5.8)
+    amplitudes(result, axes := figure.subplots(2, sharex=True), mounted=mounted)
+    legend_below(figure, axes)
+    return figure
+
+
+def weights(c: Correction, ax: Axes | None = None) -> Axes:
+    """Polar picture of the correction weights with 95 % regions, largest weights and forbidden arcs."""
+    labels, shown, limits = c.labels, c.labels.weight, c.limits
+    polar = polar_axes(ax, labels.angles_on_paper)
+    largest, turn = np.abs(c.weights).max(), np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+    styles: dict[str, tuple[str, float]] = {}
+    for p, (plane, place) in enumerate(zip(c.planes, c.places(c.planes, c.weights), strict=True)):
+        name = f"{cut(plane, 24)}: {labels.weight_at(c.weights[p])}"
+        name += f", or remove at {place:.1f}°" if plane in c.remove else ""
+        draw_line(polar, shown, [0, c.weights[p]], lw=2, label=name, **of_plane(p))
+        lines = []
+        if c.region_known:
+            lines.append((c.region([p]).edge(181), STYLES[p % 4], 1.2, "closed lines: 95 % regions"))
+        if limits is not None and np.isfinite(limits.max_weight[p]):
+            lines.append((limits.max_weight[p] * turn, "--", 0.9, "dashed circles: largest weights"))
+        for start, width in () if limits is None else limits.forbidden[p]:
+            arc = largest * np.exp(1j * np.linspace(start, start + width, 91))
+            lines.append((arc, "-", 5, "thick arcs: nothing can be mounted"))
+        for line, style, thick, words in lines:
+            draw_line(polar, shown, line, style, lw=thick, color=of_plane(p)["color"], alpha=0.6)
+            styles[words] = style, thick
+    for words, (style, thick) in styles.items():
+        polar.plot([], [], style, lw=thick, color=QUIET, label=words)
+    # a region far larger than the weights would hide them: it may leave the picture
+    most = 4 * largest * labels.weight_scale or 1.0
+    complete(polar, shown, c.weights, f"Weights on the bare rotor, {labels.weight_in}", most)
+    return polar
+
+
+def amplitudes(
+    c: Correction,
+    axes: Sequence[Axes],
+    check: CheckComparison | None = None,
+    mounted: Mounted | None = None,
+) -> None:
+    """Amplitudes before and after for every speed and sensor, with 95 % of a check run where known.
+
+    With a check run (of several: the last) those before, predicted with what was mounted, and achieved. On a
+    second one of the axes again, in the scale of what is left.
+    """
+    labels, result, read = c.labels, mounted or c, c if check is None else check
+    values, covariance = [c.before, result.after], result.after_covariance
+    if check is not None:
+        values = [check.before, check.predicted[-1], check.achieved[-1]]
+        covariance = check.covariance[-1]
+    before, after, *achieved = (np.abs(z).ravel() * labels.vibration_scale for z in values)
+    within = reach(np.nan_to_num(covariance)).ravel() * labels.vibration_scale
+    label = f"predicted{', with 95 % of a check run' if within.any() else ''}"
+    S, C = values[0].shape
+    places = np.arange(S * C) + np.repeat(np.arange(S), C) * 0.8
+    beside = places - 0.17 * len(achieved)  # dots and stars hide each other otherwise
+    for ax in axes:
+        ax.bar(places, before, color="0.86", edgecolor="0.5", label="before")
+        ax.vlines(beside, (after - within).clip(min=0.0), after + within, color="black")
+        ax.plot(beside, after, "o", color="black", ms=4.5, label=label)
+        for sizes in achieved:
+            ax.plot(places + 0.2, sizes, "*", color="black", ms=8, mec="white", label="achieved")
+        if check is None and c.limits is not None and np.isfinite(c.limits.residual).any():
+            limit = c.limits.residual.ravel() * labels.vibration_scale
+            ax.hlines(limit, places - 0.45, places + 0.45, color="black", lw=2.2, label="limit")
+        plain(ax)
+        ax.grid(visible=False, axis="x")
+        ax.set(ylim=(0, None), ylabel=f"vibration{unit(labels)}")
+    if len(axes) > 1:
+        left = max(np.max([after + within, *achieved]), INVISIBLE * before.max()) or 1.0
+        axes[1].set(ylim=(0, 1.08 * left), ylabel=f"what is left{unit(labels)}")
+    names = [cut(name, 24) for name in read.sensors] * S if S * C <= _NAMED else []
+    axes[-1].set_xticks(places[: len(names)], names, rotation=90, fontsize=TEXT, parse_math=False)
+    every = -(-S // _SPEEDS)
+    numbers = [labels.speed_number(speed) for speed in read.speeds[::every]]
+    upper = axes[0].secondary_xaxis("top")
+    upper.set_xticks(places.reshape(S, C).mean(axis=1)[::every], numbers, fontsize=TEXT)
+    upper.set_xlabel(f"speed, {labels.speed_in}", fontsize=TEXT)

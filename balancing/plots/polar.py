@@ -1,0 +1,161 @@
+"""Polar pictures: what they share, the readings of trial runs, and trial weights.
+
+In every polar picture of weights the rotor turns counter-clockwise, or as the job says it turns seen from the
+stated end; angles are written as the job counts them, so with "against rotation" (or lag phases) the numbers
+run clockwise and the picture stays the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.conventions import Labels
+from balancing.regions import region_edge
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.plot_style import COLORS, MARKERS, QUIET, TEXT, legend_above, legend_below, new_figure
+from rotorid.base.text import cut, figures
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
+
+    from balancing.trial_weight import TrialWeight
+    from balancing.trials import Trials
+
+Shown = Callable[[ArrayLike], tuple[FloatArray, FloatArray]]
+"""`Labels.weight` or `Labels.vibration`: size and angle in degrees as the job writes them."""
+
+
+def polar_axes(ax: Axes | None, sign: int) -> PolarAxes:
+    """The axes, or those of a new figure: angles grow counter-clockwise where `sign` is +1.
+
+    Raises
+    ------
+    ValueError
+        For axes that are not polar.
+    """
+    ax = ax or new_figure(5, 5).add_subplot(projection="polar")
+    if ax.name != "polar":
+        raise ValueError("vectors are drawn in polar axes: make them with projection='polar'")
+    polar = cast("PolarAxes", ax)
+    polar.set_theta_direction(1 if sign > 0 else -1)
+    polar.tick_params(labelsize=TEXT, pad=0)
+    return polar
+
+
+def draw_line(polar: PolarAxes, shown: Shown, vectors: ArrayLike, style: str = "", **look: Any) -> None:  # noqa: ANN401
+    """A line through the tips of vectors, with a mark at the last where the style has one."""
+    size, angle = shown(vectors)
+    polar.plot(np.unwrap(np.deg2rad(angle)), size, style, markevery=[-1], **look)
+
+
+def of_plane(p: int) -> dict[str, Any]:
+    """Colour and marker of a plane."""
+    return {"color": COLORS[p % len(COLORS)], "marker": MARKERS[p % len(MARKERS)]}
+
+
+def complete(polar: PolarAxes, shown: Shown, vectors: ArrayLike, title: str, most: float = np.inf) -> None:
+    """Radii from 0 (to `most` at most), their numbers away from the vectors, and a title."""
+    from matplotlib.ticker import MaxNLocator
+
+    polar.set_rlabel_position(float(shown(-np.sum(vectors))[1]))
+    polar.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
+    polar.set_rlim(0, min(polar.get_rmax(), most), auto=True)
+    polar.set_title(title, fontsize="medium", pad=10)
+
+
+def turning(labels: Labels) -> str:
+    """How angles count and how the rotor turns in the picture."""
+    return f"{labels.turning_in_words()} ({turn_sign(labels)})"
+
+
+def turn_sign(labels: Labels) -> str:
+    """An arrow that turns as the rotor does in the picture."""
+    return "↺" if labels.drawn_sign > 0 else "↻"
+
+
+def on_paper(labels: Labels, vectors: ArrayLike) -> ComplexArray:
+    """Vectors of the rotor as they stand in the picture."""
+    z = np.asarray(vectors, dtype=complex)
+    return z if labels.drawn_sign > 0 else z.conj()
+
+
+def unit(labels: Labels) -> str:
+    """Of the readings, behind the name of an axis."""
+    return f", {labels.vibration_in}" if labels.vibration_in else ""
+
+
+def draw_readings(
+    trials: Trials, covariance: FloatArray, first: str | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the readings of one sensor at one speed in polar axes.
+
+    Parameters
+    ----------
+    trials
+        Runs at one speed by one sensor.
+    covariance
+        Of their means, shape (R, 1, 1, 2, 2).
+    first
+        The baseline, from whose tip a dotted line goes to each other run; None: there is none yet.
+    ax
+        Polar axes; None: of a new figure.
+
+    Raises
+    ------
+    ValueError
+        For axes that are not polar.
+    """
+    labels, shown, values = trials.labels, trials.labels.vibration, trials.mean[:, 0, 0]
+    polar = polar_axes(ax, labels.phases_on_paper)
+    edges = region_edge(values, covariance[:, 0, 0], 121)
+    for r, (run, size, phase) in enumerate(zip(trials.runs, *shown(values), strict=True)):
+        name, look = f"{cut(run, 24)}: {figures(size)} at {phase:.0f}°", of_plane(r)
+        draw_line(polar, shown, [0, values[r]], lw=2, label=name, **look)
+        draw_line(polar, shown, edges[r], color=look["color"], lw=1)
+        if first is not None:
+            change = [values[trials.runs.index(first)], values[r]]
+            draw_line(polar, shown, change, ":", color=look["color"])
+    where = f"{trials.sensors[0]} at {labels.speed_words(float(trials.speeds[0]))}{unit(labels)}"
+    complete(polar, shown, values, f"{where}\nphase as {labels.phase}")
+    polar.plot([], [], color=QUIET, label="closed lines: 95 % of one reading")
+    legend_above(polar, 2, height=-0.08)
+    return polar
+
+
+def trial_figure(weights: Sequence[TrialWeight]) -> Figure:
+    """A new figure with every trial weight."""
+    figure = new_figure(4.8, 5.2)
+    polar = figure.add_subplot(projection="polar")
+    for k, weight in enumerate(weights):
+        draw_trial_weight(weight, polar, k)
+    legend_below(figure, [polar], title=turning(weights[0].labels))
+    return figure
+
+
+def draw_trial_weight(t: TrialWeight, ax: Axes | None = None, k: int = 0) -> Axes:
+    """The trial weight as arrow k, and an arc of the angles among which the best one is.
+
+    Raises
+    ------
+    ValueError
+        For a trial weight without an angle.
+    """
+    if t.angle is None:
+        raise ValueError(
+            "this trial weight has no angle to draw: give the phase of the initial reading and the lag"
+        )
+    labels, weight, look = t.labels, t.amount * np.exp(1j * t.angle), of_plane(k)
+    polar = polar_axes(ax, labels.angles_on_paper)
+    draw_line(polar, labels.weight, [0, weight], lw=2, label=f"{t.plane}: {labels.weight_at(weight)}", **look)
+    if t.angle_reach:
+        arc = weight * np.exp(1j * np.linspace(-t.angle_reach, t.angle_reach, 91))
+        name = f"the best angle is within ± {np.degrees(t.angle_reach):.0f}°"
+        draw_line(polar, labels.weight, arc, color=look["color"], lw=4, alpha=0.4, label=name)
+    complete(polar, labels.weight, weight, f"Trial weight, {labels.weight_in}")
+    return polar

@@ -1,1 +1,0 @@
-"""From coefficients and readings to correction weights: the methods, their certificates and errors."""

@@ -1,0 +1,204 @@
+"""What tables and texts of results are made of, in the job's own units and conventions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.conventions import Labels
+from balancing.errors import Reading, RunErrors
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.result import Column, rows
+from rotorid.base.rpm import RPM, rpm
+from rotorid.base.text import figures
+
+ROUNDING = 1e-12
+"""Predicted amplitudes below this share of the largest one before are rounding."""
+SMALL = 5e-4
+"""Share of a reading that is not worth a word."""
+INVISIBLE = 1e-9
+"""Those below this share are zero to a reader."""
+_LARGEST = 3
+
+
+def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:
+    """The values, or NaN where nothing is known."""
+    return np.full(shape, np.nan) if values is None else values
+
+
+def rms(values: ArrayLike) -> float:
+    """Root mean square of real or complex numbers."""
+    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
+
+
+def degrees(angle: float, places: int = 1) -> str:
+    """An angle as text, 0 ≤ angle < 360."""
+    return f"{round(angle, places) % 360:.{places}f}°"
+
+
+def three_figures(value: float) -> str:
+    """An amplitude as text."""
+    return figures(value, 3)
+
+
+def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> tuple[Column, ...]:
+    """plane, mass, unit and angle_deg of weights (P,), kg or kg·m."""
+    mass, angle = labels.weight(weights)
+    return (
+        Column("plane", planes, str),
+        Column("mass", mass, figures, labels.weight_in),
+        Column("unit", (labels.weight_unit,) * len(planes)),
+        Column("angle_deg", angle, degrees, "angle"),
+    )
+
+
+def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> list[dict[str, Any]]:
+    """The same as JSON rows."""
+    return rows(weight_columns(labels, planes, weights))
+
+
+def mounted_rows(labels: Labels, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
+    """JSON rows of the planes in which there is something."""
+    there = np.flatnonzero(weights).tolist()
+    return weight_rows(labels, [planes[p] for p in there], weights[there])
+
+
+def reading_columns(labels: Labels, speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
+    """speed_rpm and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
+    turns = np.repeat([rpm(speed) for speed in speeds], len(sensors))
+    return (
+        Column("speed_rpm", turns, lambda turn: labels.speed_number(turn / RPM), labels.speed_in),
+        Column("sensor", tuple(sensors) * len(speeds), str),
+    )
+
+
+def largest_readings(
+    labels: Labels,
+    speeds: FloatArray,
+    sensors: Sequence[str],
+    before: ComplexArray,
+    after: ComplexArray,
+    within: FloatArray | None = None,
+) -> str:
+    """The three largest readings (S, C) after in words, with those before: "probe 1 at 1220 rpm 3.36 → 0.05".
+
+    `within` is the radius of their 95 % region in the job's unit, NaN where it is not known; where nothing is
+    left, the three largest of these.
+    """
+    old, new = (labels.vibration(readings)[0] for readings in (before, after))
+    reach = known(within, old.shape)
+    size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
+    share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
+    words = []
+    for place in np.argsort(-share, axis=None, kind="stable")[:_LARGEST]:
+        s, c = divmod(int(place), len(sensors))
+        width = "" if np.isnan(reach[s, c]) else f" (± {figures(reach[s, c], 2)})"
+        left = f"{three_figures(old[s, c])} → {small(new[s, c], old.max())}{width}"
+        words.append(f"{sensors[c]} at {labels.speed_words(speeds[s])} {left}")
+    unit = f", {labels.vibration_in}" if labels.vibration_in else ""
+    return f"{unit}: {'; '.join(words)}."
+
+
+def small(value: float, scale: float) -> str:
+    """A predicted amplitude; rounding of an exact solution is zero to a reader."""
+    return "0" if value <= INVISIBLE * scale else three_figures(value)
+
+
+def covariance_column(labels: Labels, name: str, covariance: FloatArray | None, count: int) -> Column:
+    """Covariance (2, 2) of each of so many readings; None: not known."""
+    if covariance is None:
+        return Column(name, [None] * count)
+    return Column(name, labels.vibration_covariance(covariance).reshape(-1, 2, 2))
+
+
+def vector_columns(
+    labels: Labels, name: str, readings: ComplexArray, nothing: float | None = None
+) -> tuple[Column, Column]:
+    """NAME and NAME_phase_deg of readings of any shape, one row a reading.
+
+    Parameters
+    ----------
+    labels
+        Units and conventions.
+    name
+        Of the amplitude.
+    readings
+        Inside (SI, lead).
+    nothing
+        Amplitudes up to this one, in the job's unit, are rounding: 0, and their direction means nothing.
+    """
+    size, phase = (part.ravel() for part in labels.vibration(readings))
+    if nothing is not None:
+        phase = np.where(size > nothing, phase, np.nan)
+        size = np.where(size > nothing, size, 0.0)
+    return (
+        Column(name, size, three_figures),
+        Column(f"{name}_phase_deg", phase, lambda angle: degrees(angle, 0), "phase"),
+    )
+
+
+def reading_names(labels: Labels, sensors: Sequence[str], speeds: FloatArray) -> tuple[str, ...]:
+    """What to call each reading, speed by speed."""
+    return tuple(f"sensor {c!r} at {labels.speed_words(s)}" for s in speeds for c in sensors)
+
+
+_SOURCES = {
+    "stated": "as stated in the job",
+    "measured": "root mean square of those that the instrument measured",
+    "repeats": "from repeated readings",
+    "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
+    "residuals": "from the disagreement of the runs, with what changes between runs",
+    "assumed": "assumed: nothing states or measures them",
+    "unknown": "of stored or computed coefficients",
+}
+
+
+def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
+    """Errors of a reading and between runs in one or two sentences."""
+    e, parts = reading.errors, []
+    if e is not None:
+        parts = [f"{100 * e.amplitude:.3g} % of the amplitude"] if e.amplitude else []
+        parts += [f"{np.degrees(e.phase):.3g}°"] if e.phase else []
+        parts += [labels.amplitude_words(e.floor)] if e.floor else []
+    words = (
+        f"One standard deviation of a reading: {', '.join(parts) or 'not known'} ({_SOURCES[reading.source]})"
+    )
+    sizes = run.typical
+    if sizes.any():
+        what = (
+            "of each sensor alone",
+            "common to the run",
+            "of what the weights do",
+            "as further unbalance",
+        )
+        shown = [f"{100 * size:.2g} % {of}" for size, of in zip(sizes, what, strict=True) if size > SMALL]
+        words += f"; from run to run: {', '.join(shown)} ({run.origin})"
+    few = f" Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ""
+    return f"{words}.{few}"
+
+
+def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
+    """The same in numbers; amplitudes in the job's unit."""
+    e, scale = reading.errors, labels.vibration_scale
+    alone, common, effect, further = run.typical
+    whole = float(np.linalg.norm(run.typical))
+    level = run.level * scale
+    return {
+        "source": reading.source,
+        "amplitude_percent": None if e is None else 100 * e.amplitude,
+        "phase_deg": None if e is None else np.degrees(e.phase),
+        "floor": None if e is None else e.floor * scale,
+        "degrees_of_freedom": reading.dof,
+        "between_runs": {
+            "source": run.origin,
+            "percent": 100 * float(np.hypot(alone, common)),
+            "percent_of_effect": 100 * effect,
+            "floor": further * level,
+            "rms": whole * level,
+            "common_share": 1 - (alone / whole) ** 2 if whole else 0.0,
+            "interval95": [end * level for end in run.interval] if run.origin == "estimated" else None,
+        },
+    }

@@ -1,0 +1,167 @@
+"""What is left to do after a check run: nothing, a trim, or to take off what is mounted.
+
+Done is a rotor whose readings keep their limits with 95 %, or, without limits, one whose trim is within its
+own error: the 95 % region of the weights that it asks for, the check run counted, holds those that are
+mounted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from balancing.correction import Correction
+from balancing.influence import match_speeds
+from balancing.mount import Mounted
+from balancing.tables import rms, small, three_figures, weight_rows
+from balancing.trials import Trials
+from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.arrays import ComplexArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, text
+from rotorid.base.text import capital, figures, listing
+
+WORTH = 0.9
+"""Of the vibration in the check run: what a trim has to stay below."""
+
+
+@dataclass(frozen=True, eq=False)
+class LeftToDo(Answered):
+    """A decision after the last check run.
+
+    Attributes
+    ----------
+    word, why
+        What to do, and a clause.
+    correction
+        Total weights with the check run counted.
+    run, planes, there
+        The check run, planes, and what is mounted in it, (P,).
+    trim
+        What to add now, (P,); zero but for a trim.
+    pieces
+        The trim as pieces in holes; None: at any angle.
+    """
+
+    word: Literal["done", "trim", "take off what is mounted", "add nothing yet"]
+    why: str
+    correction: Correction
+    run: str
+    planes: tuple[str, ...]
+    there: ComplexArray
+    trim: ComplexArray
+    pieces: Mounted | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units."""
+        return plain(
+            {
+                "word": self.word,
+                "why": self.why,
+                "run": self.run,
+                "mounted": weight_rows(self.correction.labels, self.planes, self.there),
+                "add": self.correction.work_rows(self.planes, self.trim),
+                "holes": [] if self.pieces is None else self.pieces.to_dict()["holes"],
+            }
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """What to do; what is mounted, and the trim."""
+        c, scale, unit = (
+            self.correction,
+            self.correction.labels.weight_scale,
+            self.correction.labels.weight_in,
+        )
+        mounted = [c.labels.weight_at(w) if w else "nothing" for w in self.there]
+        trim = [
+            f"{'take away' if plane in c.remove else 'add'} {figures(abs(w) * scale)} {unit} at {at:.1f}°"
+            if w
+            else "nothing"
+            for plane, w, at in zip(self.planes, self.trim, c.places(self.planes, self.trim), strict=True)
+        ]
+        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
+        what = capital(self.word)
+        if self.word == "trim":
+            columns.append(Column("trim, beside that", trim, str))
+            pairs = zip(self.planes, trim, self.trim, strict=True)
+            each = [f"{words} in plane {plane!r}" for plane, words, w in pairs if w]
+            what += f": {listing(each, 'and') if self.pieces is None else self.pieces.in_holes()}"
+        return Answer(f"{what}; {self.why}.", text(columns, width=COLUMNS))
+
+
+def after_check_run(
+    correction: Correction,
+    check: Trials,
+    *,
+    explained: bool | None = None,
+    judged: str = "",
+    stop: str = "",
+    pieces: Mounted | None = None,
+) -> LeftToDo:
+    """Decide what is left to do after the last check run.
+
+    Parameters
+    ----------
+    correction
+        Total weights, the check run counted; what is mounted in it is `correction.mounted`.
+    check
+        The check runs.
+    explained
+        Whether the check run did what was predicted; None: not known.
+    judged
+        What limits say of it: "pass", "fail", "not decidable"; empty: there are none.
+    stop
+        Why nothing may be added before something else is done; empty: nothing speaks against it.
+    pieces
+        The trim as pieces beside what is mounted, where it is to be one of pieces.
+    """
+    c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
+    run, planes, there = c.mounted
+    pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
+    now, before = rms(check.mean[-1]), rms(c.before[pick])
+    after = c.after[pick] if pieces is None else pieces.after[pick]
+    bound = c.check_rms if pieces is None and c.errors_known else None
+    left = rms(after) if bound is None or judged == "fail" else bound
+    change = f"rms {three_figures(now * scale)} → {small(rms(after) * scale, now * scale)} {unit}".rstrip()
+    change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
+
+    def end(
+        word: Literal["done", "trim", "take off what is mounted", "add nothing yet"], why: str
+    ) -> LeftToDo:
+        trim = c.to_add if pieces is None else _in_planes(pieces, planes)
+        return LeftToDo(word, why, c, run, planes, there, trim if word == "trim" else 0 * trim, pieces)
+
+    if judged == "pass":
+        return end("done", "every limit is kept")
+    if now >= before and explained is not True and there.any():
+        why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
+        return end("take off what is mounted", f"{why}; {stop or 'check what was mounted, and where'}")
+    open_ = stop or c.contradictions or c.decision.word == "measure again"
+    if not open_ and judged != "fail" and explained is not False and _within_its_error(c):
+        return end("done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})")
+    if stop or not (c.sound or pieces is not None):
+        return end("add nothing yet", stop or c.decision.cause)
+    trim = c.to_add if pieces is None else _in_planes(pieces, planes)
+    if not trim.any() or left >= WORTH * now:
+        added = "a trim" if pieces is None else "pieces beside these"
+        still_open = judged == "fail" or explained is False
+        why = f"{added} would not make it clearly better ({change})"
+        return end("add nothing yet" if still_open else "done", why)
+    return end("trim", change)
+
+
+def _within_its_error(c: Correction) -> bool:
+    """Whether what is mounted may be the right weights."""
+    if not c.region_known:
+        return False
+    there = dict(zip(c.mounted.planes, c.mounted.weights, strict=True))
+    return c.region().holds(np.array([there.get(plane, 0.0) for plane in c.planes], dtype=complex))
+
+
+def _in_planes(pieces: Mounted, planes: tuple[str, ...]) -> ComplexArray:
+    """Weights of pieces, (P,), in these planes."""
+    chosen = dict(zip(pieces.correction.planes, pieces.weights, strict=True))
+    return np.array([chosen.get(plane, 0.0) for plane in planes], dtype=complex)

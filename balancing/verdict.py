@@ -1,0 +1,412 @@
+"""Verdict of a balance per plane and sensor: pass, fail, or not decidable with these readings.
+
+One complex number with errors, a residual unbalance or a reading, is compared with one limit: it passes where
+all of its 95 % region is within the limit, fails where none of it is; otherwise, and where the errors are
+unknown, the readings do not decide.
+
+Residual unbalance from a check run: with the coefficients W of the planes, the vibration Y that is left is
+that of the weights û with W û = Y in the least-squares sense, û = W⁺ Y; what would have to be added is −û.
+Predicted: what is mounted, M, less what the readings ask for, D; û = M − D. Draws of Y and W give those of û.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.conditioning import chance, check_planes
+from balancing.conventions import Labels
+from balancing.correct import fit_part
+from balancing.correction import Correction
+from balancing.influence import Influence, match_speeds
+from balancing.iso21940 import Tolerance
+from balancing.methods import solve
+from balancing.planes import plane_indices
+from balancing.regions import NORMAL_RADIUS, Region
+from balancing.tables import INVISIBLE
+from balancing.trials import Limits, Trials
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import RPM, rpm
+from rotorid.base.text import capital, counted
+from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Kind = Literal["plane", "bearing", "sensor"]
+Word = Literal["pass", "fail", "not decidable"]
+_GRAM_MM = 1e6
+POOR = 1e-3
+"""Probability of χ² below which unbalance in the planes does not explain the readings."""
+_SHOWN = 3
+_POINTS = 2880
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """One residual unbalance or reading against its limit.
+
+    Attributes
+    ----------
+    kind, name
+        "plane", "bearing" (a tolerance plane) or "sensor", and which.
+    speed
+        rad/s, of a reading; None for an unbalance.
+    value
+        Estimate: a weight of the job (plane), kg·m (bearing), a reading (sensor).
+    limit
+        In the same unit.
+    low, high
+        Least and largest size in the 95 % region; None where errors are unknown.
+    region
+        Points on the edge of the region; None as before.
+    """
+
+    kind: Kind
+    name: str
+    speed: float | None
+    value: complex
+    limit: float
+    low: float | None = None
+    high: float | None = None
+    region: ComplexArray | None = None
+
+    @property
+    def size(self) -> float:
+        """Of the estimate."""
+        return abs(self.value)
+
+    @property
+    def verdict(self) -> Word:
+        """Pass, fail or not decidable."""
+        if self.low is None or self.high is None:
+            return "not decidable"
+        if self.high <= self.limit:
+            return "pass"
+        return "fail" if self.low > self.limit else "not decidable"
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict(Answered):
+    """All judgements of a balance.
+
+    Attributes
+    ----------
+    rows
+        Planes, tolerance planes and sensors.
+    source
+        "check run NAME" or "prediction".
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    rows: tuple[Judgement, ...]
+    source: str
+    labels: Labels = field(default_factory=Labels)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def overall(self) -> Word:
+        """Fail if anything fails, pass if everything passes."""
+        words = {row.verdict for row in self.rows}
+        if "fail" in words:
+            return "fail"
+        return "pass" if words == {"pass"} else "not decidable"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units (tolerance planes in g_mm); what is unknown is None."""
+        return {
+            "source": self.source,
+            "verdict": self.overall,
+            "rows": rows(self._columns()),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per judgement: the keys of `to_dict`."""
+        return frame(self._columns())
+
+    @property
+    def answer(self) -> Answer:
+        """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
+        lines = [self._row_words(row) for row in rows(self._columns())]
+        same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
+        near = sorted(same, key=lambda k: round(self.rows[k].limit / (self.rows[k].size or 1e-30), 6))
+        shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
+        shown += [k for k in near if k not in shown][:_SHOWN]
+        others = [words for k, words in enumerate(lines) if k not in shown]
+        why = {
+            "pass": "kept",
+            "fail": "not kept",
+            "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; repeated "
+            "readings or stated errors would tell",
+        }[self.overall]
+        of = f"{len(same)} of {counted(len(lines), 'limit')}"
+        return Answer(
+            f"{capital(self.overall)} ({self.source}): {of} {why}.",
+            "\n".join(lines[k] for k in shown),
+            self.warnings,
+            tables=("\n".join(["The other limits:", *others]),) if others else (),
+            more="the other limits",
+        )
+
+    def _row_words(self, row: dict[str, Any]) -> str:
+        sensor = row["kind"] == "sensor"
+        unit = vibration_unit_words(row["unit"]) if sensor else weight_unit_words(row["unit"])
+        at = "" if row["speed_rpm"] is None else f" at {self.labels.speed_words(row['speed_rpm'] / RPM)}"
+        within = "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
+        size = row["size"] if row["size"] > INVISIBLE * row["limit"] else 0.0
+        value = f"{size:.4g} {unit}".rstrip()
+        name = f"{row['kind']} {row['name']}{at}"
+        return f"  {name}: {value} ({within}), limit {row['limit']:.4g}: {row['verdict']}"
+
+    def _columns(self) -> tuple[Column, ...]:
+        labels = self.labels
+        scales = {
+            "plane": (labels.weight_scale, labels.weight_unit),
+            "bearing": (_GRAM_MM, "g_mm"),
+            "sensor": (labels.vibration_scale, labels.vibration_unit),
+        }
+        scale = np.array([scales[row.kind][0] for row in self.rows])
+        values = [
+            (labels.vibration if row.kind == "sensor" else labels.weight)(row.value) for row in self.rows
+        ]
+        size, low, high, limit, speeds = (
+            np.array([getattr(row, name) for row in self.rows], dtype=float)
+            for name in ("size", "low", "high", "limit", "speed")
+        )
+        return (
+            Column("kind", [row.kind for row in self.rows]),
+            Column("name", [row.name for row in self.rows]),
+            Column("speed_rpm", [rpm(speed) for speed in speeds]),
+            Column("size", size * scale),
+            Column("angle_deg", [float(angle) if amount else np.nan for amount, angle in values]),
+            Column("low", low * scale),
+            Column("high", high * scale),
+            Column("limit", limit * scale),
+            Column("unit", [scales[row.kind][1] for row in self.rows]),
+            Column("verdict", [row.verdict for row in self.rows]),
+        )
+
+
+def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | None = None) -> Judgement:
+    """Judge one complex value.
+
+    Parameters
+    ----------
+    kind, name, speed
+        As of `Judgement`.
+    limit
+        In the unit of the value.
+    region
+        The value with its 95 % region; NaN covariance: errors unknown.
+
+    Raises
+    ------
+    ValueError
+        For a limit that is not a number ≥ 0.
+    """
+    if not (np.isfinite(limit) and limit >= 0):
+        raise ValueError(f"the limit of {kind} {name!r} must be a finite number ≥ 0, not {limit}")
+    value = complex(region.centre[0])
+    if np.isnan(region.covariance).any():
+        return Judgement(kind, name, speed, value, float(limit))
+    edge = region.edge(_POINTS)
+    size = np.abs(edge)
+    low = 0.0 if region.holds(np.zeros(1, dtype=complex)) else float(size.min())
+    return Judgement(kind, name, speed, value, float(limit), low, float(size.max()), edge)
+
+
+def judge_unbalance(
+    residual: ArrayLike,
+    draws: ComplexArray,
+    tolerance: Tolerance,
+    planes: Sequence[str],
+    *,
+    radii: Mapping[str, float] | None = None,
+) -> tuple[Judgement, ...]:
+    """Residual unbalance of each plane, and what they are together at the tolerance planes.
+
+    Parameters
+    ----------
+    residual
+        Of the planes, (P,), kg·m, or kg at the radii.
+    draws
+        The same redrawn, (n, P); n = 0: errors unknown.
+    tolerance
+        With the same names of planes (in any order).
+    planes
+        Names, length P.
+    radii
+        m, of each plane, where the residuals are masses; None: they are unbalances.
+
+    Raises
+    ------
+    ValueError
+        For planes that the tolerance does not name, and radii that are lacking or not positive.
+    """
+    if sorted(planes) != sorted(tolerance.planes):
+        raise ValueError(
+            f"the tolerance is for the planes {', '.join(map(repr, tolerance.planes)) or '(none)'}, "
+            f"the residual unbalance is in {', '.join(map(repr, planes))}: name the same planes in both"
+        )
+    radius = np.array([1.0 if radii is None else radii.get(p, 0.0) for p in planes])
+    if not (np.isfinite(radius) & (radius > 0)).all():
+        raise ValueError(f"the radius of plane {planes[int(np.argmin(radius))]!r} must be a number above 0")
+    order = [tolerance.planes.index(p) for p in planes]
+    u = np.asarray(residual, dtype=complex)
+
+    def one(kind: Kind, name: str, row: FloatArray, limit: float) -> Judgement:
+        return judge(kind, name, limit, Region.of((draws @ row)[:, None], np.atleast_1d(u @ row)))
+
+    each = zip(planes, np.eye(len(planes)), tolerance.limits[order] / radius, strict=True)
+    judged = [one("plane", name, row, limit) for name, row, limit in each]
+    if tolerance.transfer is not None and tolerance.bearing_limits is not None:
+        ends = zip(("A", "B"), tolerance.transfer[:, order] * radius, tolerance.bearing_limits, strict=True)
+        judged += [one("bearing", name, row, float(limit)) for name, row, limit in ends]
+    return tuple(judged)
+
+
+def verdict_of_prediction(
+    correction: Correction,
+    *,
+    tolerance: Tolerance | None = None,
+    radii: Mapping[str, float] | None = None,
+    mounted: ArrayLike | None = None,
+    after: ArrayLike | None = None,
+) -> Verdict:
+    """Judge what is expected before a check run: its limits, and a tolerance if there is one.
+
+    Parameters
+    ----------
+    correction
+        With its limits of readings.
+    tolerance, radii
+        As of `judge_unbalance`, for the planes of the correction.
+    mounted
+        Weights (P,) that are mounted in place of the proposed ones (pieces, rounding); None: those.
+    after
+        Predicted readings (S, C) with these mounted; None: the correction's.
+
+    Raises
+    ------
+    ValueError
+        Where nothing is given to judge by, and as `judge_unbalance`.
+    """
+    c = correction
+    D = c.weights if mounted is None else np.asarray(mounted, dtype=complex)
+    judged: list[Judgement] = []
+    if tolerance is not None:
+        judged += judge_unbalance(D - c.weights, D - c.draws, tolerance, c.planes, radii=radii)
+    if c.limits is not None:
+        readings = c.after if after is None else np.asarray(after, dtype=complex)
+        judged += _readings(c.influence, readings, c.after_covariance, c.limits.residual)
+    return _verdict(judged, "prediction", c.labels)
+
+
+def verdict_of_check(
+    influence: Influence,
+    check: Trials,
+    *,
+    run: int = -1,
+    tolerance: Tolerance | None = None,
+    radii: Mapping[str, float] | None = None,
+    limits: Limits | None = None,
+    planes: Sequence[str] | None = None,
+) -> Verdict:
+    """Judge one check run, everything mounted that shall stay.
+
+    Parameters
+    ----------
+    influence
+        Coefficients, at the speeds and for the sensors of the check run (there may be more).
+    check
+        Check runs; what was mounted in them does not matter here.
+    run
+        Which of them, by index; default the last.
+    tolerance, radii
+        As of `judge_unbalance`.
+    limits
+        Of readings, in the order of the coefficients' speeds and sensors.
+    planes
+        Use these planes only; None: those of the tolerance, or all.
+
+    Raises
+    ------
+    UndeterminedError
+        Where the readings do not tell the planes apart.
+    ValueError
+        Where nothing is given to judge by, for unknown planes, sensors or speeds, and as `judge_unbalance`.
+    """
+    at = match_speeds(check.speeds, influence.speeds)
+    unknown = [name for name in check.sensors if name not in influence.sensors]
+    if unknown:
+        raise ValueError(f"there are no coefficients of sensor {unknown[0]!r}, which the check run has")
+    sensors = [influence.sensors.index(name) for name in check.sensors]
+    name, only = check.runs[run], [range(len(check.runs))[run]]
+    bare = replace(
+        check,
+        runs=(name,),
+        readings=check.readings[:, only],
+        steps=None if check.steps is None else check.steps[:, :, only],
+        covariance=None if check.covariance is None else check.covariance[:, :, :, only],
+        planes=(),
+        weights=np.zeros((1, 0), dtype=complex),
+    )
+    left = influence.part(at, sensors).rebased(bare)
+    judged: list[Judgement] = []
+    warnings = left.remarks.warnings
+    if tolerance is not None:
+        part = left.part(range(len(at)), None, plane_indices(left, planes or tolerance.planes))
+        S, C, P = part.W.shape
+        check_planes(part.W.reshape(-1, P), part.planes)
+        fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
+        solved = [fitted.resolve(W.reshape(-1, S * C, P), Y.reshape(-1, S * C)) for Y, W in part.draws()]
+        draws = np.concatenate([np.zeros((0, P), dtype=complex), *solved])
+        judged += judge_unbalance(-fitted.weights, -draws, tolerance, part.planes, radii=radii)
+        by_errors, _ = fit_part(part)
+        if by_errors.dof and chance(by_errors.chi_square or 0.0, by_errors.dof) < POOR:
+            warnings += (
+                "unbalance in these planes does not explain the readings within their errors: some is "
+                "elsewhere, or the coefficients are wrong",
+            )
+    if limits is not None:
+        covariance = (
+            left.channels()[..., :2, :2]
+            if left.known_errors
+            else np.full((*left.baseline.shape, 2, 2), np.nan)
+        )
+        pick = np.ix_(at, sensors)
+        judged += _readings(left, left.baseline, covariance, limits.residual[pick])
+    return _verdict(judged, f"check run {name}", left.labels, warnings)
+
+
+def _readings(
+    of: Influence, readings: ComplexArray, covariance: FloatArray, limit: FloatArray
+) -> list[Judgement]:
+    return [
+        judge(
+            "sensor",
+            of.sensors[c],
+            limit[s, c],
+            Region(readings[[s], c], covariance[s, c], NORMAL_RADIUS),
+            float(of.speeds[s]),
+        )
+        for s, c in np.argwhere(np.isfinite(limit))
+    ]
+
+
+def _verdict(
+    rows: Sequence[Judgement], source: str, labels: Labels, warnings: tuple[str, ...] = ()
+) -> Verdict:
+    if not rows:
+        raise ValueError("there is nothing to judge by: give a tolerance, or limits of sensors")
+    return Verdict(tuple(rows), source, labels, warnings)

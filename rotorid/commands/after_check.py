@@ -1,0 +1,107 @@
+"""What follows a check run of `balance`: what was mounted in it, and what is left to do."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rotorid.commands.balance_solution import Solved, correct_job
+from rotorid.commands.coefficients import choose
+
+if TYPE_CHECKING:
+    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
+    from rotorid.commands.balance_options import BalanceOptions
+    from rotorid.tables import Job
+
+
+def pieces_mounted(
+    job: Job, correction: Correction, influence: Influence, runs: Trials | None
+) -> Mounted | None:
+    """The pieces that `--split` proposes for a correction; None where others or none were mounted.
+
+    Parameters
+    ----------
+    job
+        With check runs, whose weights nobody states.
+    correction, influence, runs
+        Before the check runs.
+    """
+    from balancing import mount
+
+    if job.check_mounted or not set(correction.planes) & set(job.holes):
+        return None
+    with suppress(ValueError):  # no pieces can be proposed: the weights were
+        return mount(correction, influence, runs, job.holes)
+    return None
+
+
+def as_proposed(job: Job, correction: Correction, influence: Influence, runs: Trials | None) -> Job:
+    """The job with what was proposed as the weights of its check runs, where nobody states them.
+
+    Where the job has holes these are pieces, which are in them then, and no longer in stock.
+    """
+    import numpy as np
+
+    check = job.check
+    if check is None or job.check_mounted:
+        return job
+    pieces = pieces_mounted(job, correction, influence, runs)
+    mounted = np.tile((pieces or correction).weights, (len(check.runs), 1))
+    check, holes = replace(check, planes=correction.planes, weights=mounted), dict(job.holes)
+    placed = () if pieces is None else zip(correction.planes, pieces.discrete.mountings, strict=True)
+    for plane, mounting in placed:
+        if mounting is not None:
+            old = holes[plane]
+            stock = None if old.stock is None else old.stock - mounting.counts.sum(axis=0)
+            try:
+                holes[plane] = replace(old, taken=old.taken + mounting.amounts, stock=stock)
+            except ValueError:  # no hole or no piece is left: more only elsewhere
+                del holes[plane]
+    return replace(job, check=check, check_pieces=pieces, holes=holes)
+
+
+def left_to_do(
+    solved: Solved,
+    job: Job,
+    options: BalanceOptions,
+    check: CheckComparison | None,
+    verdict: Verdict | None,
+    pieces: Mounted | None,
+) -> LeftToDo:
+    """What is left to do after the check run, by all runs where the coefficients are measured.
+
+    Parameters
+    ----------
+    solved, job, options
+        The check run counts in them where `options.refine`.
+    check, verdict
+        What it says of the prediction, and limits of it; None: nothing.
+    pieces
+        Those of a trim.
+    """
+    from balancing import after_check_run, mount
+
+    runs, (result, known, *_) = job.check, solved
+    assert runs is not None
+    stop = "; ".join(result.contradictions)
+    if not options.refine:
+        influence, baseline = known
+        measured = baseline is None and influence.trials is not None and options.machine_type is None
+        try:
+            known = (
+                choose(job, options.coefficients, options.model_error, refined=True)
+                if measured
+                else (influence, runs)
+            )
+            result = correct_job(job, known, result.planes, options)
+        except ValueError as error:
+            stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
+            there = runs.runs[-1], runs.planes, runs.weights[-1]
+            result = replace(result, mounted=type(result.mounted)(*there))
+    if job.check_pieces is not None and pieces is None and not stop:
+        with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
+            pieces = mount(result, *known, job.holes, on_top=True)
+    explained = None if check is None else check.explained
+    judged = "" if verdict is None else verdict.overall
+    return after_check_run(result, runs, explained=explained, judged=judged, stop=stop, pieces=pieces)

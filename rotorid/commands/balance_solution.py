@@ -1,0 +1,196 @@
+"""The correction of a job by the options of `balance`, also as it were under other conventions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+from warnings import catch_warnings
+
+from rotorid.base.text import listing
+from rotorid.commands.coefficients import choose, used_planes
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.option_quantities import largest_amplitudes, largest_weights, limited
+from rotorid.commands.quantities import names, speeds
+
+if TYPE_CHECKING:
+    from balancing import ConventionTest, Correction, Influence, Subsets, Trials
+    from rotorid.commands.balance_options import BalanceOptions
+    from rotorid.commands.type_coefficients import TypeKnowledge
+    from rotorid.tables import Job
+    from rotorid.tables.job.job_as_written import JobSource
+
+    JobGiven = Job | Path | str | Sequence[Path | str]
+    """A job, its file, or a runs table and a weights table."""
+
+
+def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
+    """A job that has been read, or what is to be read."""
+    from rotorid.tables import Job
+    from rotorid.tables.job.job_as_written import JobSource
+    from rotorid.tables.job.job_data import Overrides
+
+    stored = None if options.influence is None else Path(options.influence)
+    errors = options.amplitude_error, options.phase_error, options.run_error
+    stated = (options.phase, options.angles, *errors, options.waveforms)
+    if not isinstance(job, Job):
+        files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
+        return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
+    if any(value is not None for value in (stored, *stated)):
+        raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
+    return job
+
+
+def read_source(source: Job | JobSource, options: BalanceOptions) -> Job:
+    """The job, with the limits of the options."""
+    from rotorid.tables import job_from_files, read_job
+    from rotorid.tables.job.job_as_written import JobSource
+
+    if isinstance(source, JobSource):
+        files, overrides = source.files, asdict(source.overrides)
+        single = len(files) == 1 and source.influence is None
+        if single and files[0].suffix.lower() in (".toml", ".xlsx"):
+            source = read_job(files[0], **overrides)
+        else:
+            source = job_from_files(files, influence=source.influence, **overrides)
+    return limited(source, options.max_mass, options.limit)
+
+
+def with_limits_of(source: JobSource, job: Job, options: BalanceOptions) -> JobSource:
+    """What the job was read from, with the limits put in place of its own."""
+    return replace(
+        source,
+        max_weights=largest_weights(job, options.max_mass),
+        limits=largest_amplitudes(job, options.limit),
+    )
+
+
+class Solved(NamedTuple):
+    """A correction with the coefficients and the runs that it is made of, and the choice of its planes."""
+
+    result: Correction
+    known: tuple[Influence, Trials | None]
+    planes: Sequence[str]
+    subsets: Subsets | None
+    of_type: TypeKnowledge | None
+
+
+def solve(job: Job, options: BalanceOptions, planes: Sequence[str] | None = None) -> Solved:
+    """By the options, in the planes that they say or in given ones.
+
+    Raises
+    ------
+    UndeterminedError
+        Whether the runs contradict their conventions first: these may be all that is wrong.
+    """
+    from balancing import UndeterminedError
+
+    try:
+        return _solved(job, options, planes)
+    except UndeterminedError as error:
+        words = _test(job).contradiction(job.trials.labels)
+        raise UndeterminedError("\n".join((*words, str(error)))) from None
+
+
+def _test(job: Job) -> ConventionTest:
+    """What trial and check runs say of their conventions."""
+    from balancing import convention_test, with_check_runs
+
+    runs, check = job.trials, job.check
+    return convention_test(with_check_runs(runs, check) if check is not None and check.planes else runs)
+
+
+def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
+    from balancing import compare_planes
+
+    of_type, subsets = None, None
+    if options.machine_type is None:
+        known = choose(job, options.coefficients, options.model_error, refined=options.refine)
+    else:
+        from rotorid.commands.type_coefficients import type_coefficients
+
+        of_type = type_coefficients(job, options.machine_type, refined=options.refine)
+        known = of_type.influence, None
+    if planes is None:
+        planes = names(options.planes) or used_planes(job, known[0])
+        if options.best_planes is not None:
+            criterion: Any = "max" if options.method == "minmax" else "rms"
+            subsets = compare_planes(
+                *known,
+                planes,
+                options.best_planes,
+                speeds=_speeds(job, options),
+                criterion=criterion,
+                row_weights=job.row_weights,
+            )
+            planes = subsets.planes[0]
+    result = correct_job(job, known, planes, options)
+    return Solved(result if of_type is None else of_type.judged(result), known, planes, subsets, of_type)
+
+
+def correct_job(
+    job: Job, known: tuple[Influence, Trials | None], planes: Sequence[str], options: BalanceOptions
+) -> Correction:
+    """Of some planes, with coefficients and the runs that give the vibration (None: theirs)."""
+    from balancing import correct
+
+    influence, runs = known
+    return correct(
+        influence,
+        runs,
+        planes,
+        _speeds(job, options),
+        refuse=options.machine_type is None,  # how a machine differs from its type is no error of readings
+        method=options.method,
+        limits=job.limits_of(influence.planes),
+        row_weights=job.row_weights,
+        strength=options.ridge,
+        remove=sorted(job.remove),
+    )
+
+
+def _speeds(job: Job, options: BalanceOptions) -> list[float] | None:
+    return None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
+
+
+def with_other_conventions(
+    solved: Solved, job: Job, source: JobSource | None, options: BalanceOptions
+) -> Correction:
+    """The correction with what the runs say about its conventions, and what other ones give.
+
+    `source` is read again under these; None where it cannot be.
+    """
+    result, labels, test = solved.result, solved.result.labels, _test(job)
+    turned: list[tuple[str, ...]] = [(name,) for name in labels.assumed if test.verdict != "confirmed"]
+    turned += [labels.assumed] if len(labels.assumed) == 2 else []
+    others: list[tuple[list[str], Correction]] = []
+    for assumed in turned:
+        if source is None:
+            break
+        other = labels.otherwise(assumed)
+        overrides = replace(source.overrides, phase=other.phase, angles=other.angles)
+        try:
+            with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
+                again = read_source(replace(source, overrides=overrides), options)
+                found = solve(again, options, solved.planes).result
+        except ValueError:  # no answer, as where limits cannot be met
+            continue
+        words = " and ".join(getattr(other, name).removesuffix(" rotation") for name in assumed)
+        same = next((each for each, one in others if _alike(one, found)), None)
+        if same is not None:
+            same.append(words)
+        elif not _alike(result, found):
+            others.append(([words], found))
+    readings = tuple(one.otherwise(listing(words)) for words, one in others)
+    return replace(result, convention_test=test, others=readings)
+
+
+def _alike(a: Correction, b: Correction) -> bool:
+    """Whether both say the same numbers, as they are printed."""
+    import numpy as np
+
+    one, two = (
+        m * np.exp(1j * np.radians(angle)) for m, angle in (c.labels.weight(c.weights) for c in (a, b))
+    )
+    return bool(np.abs(one - two).max() <= 1e-6 * np.abs(one).max())

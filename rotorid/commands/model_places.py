@@ -1,0 +1,90 @@
+"""Where the planes and sensors of a job are in its rotor model, and what its sensors read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from fem import Sensor
+    from rotorid.base.words import Quantity
+    from rotorid.tables import Job
+
+
+@dataclass(frozen=True)
+class ModelPlaces:
+    """Where the planes and sensors of a job are in its rotor model, and what the sensors read.
+
+    Radii are those that make an unbalance, kg·m, of the job's masses; None where its weights are unbalances.
+    """
+
+    nodes: Mapping[str, int]
+    sensors: Mapping[str, Sensor]
+    radii: Mapping[str, float] | None
+    quantity: Quantity
+
+    @property
+    def derivatives(self) -> int:
+        """How often what the sensors read is differentiated: 0 for displacements."""
+        return {"displacement": 0, "velocity": 1, "acceleration": 2}[self.quantity]
+
+
+def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPlaces:
+    """The places of all planes, or of given stations per unbalance, and of all sensors.
+
+    Raises
+    ------
+    ValueError
+        Where the job has no rotor, or no place in it for a plane or sensor.
+    """
+    from rotorid.tables.reader.units import weight
+
+    if job.rotor is None:
+        raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
+    missing = [f"[sensors.{s}]" for s in job.trials.sensors if s not in job.sensor_places]
+    nodes = stations or {p: job.plane_nodes[p] for p in job.planes if p in job.plane_nodes}
+    missing += [f"[planes.{p}]" for p in job.planes if stations is None and p not in nodes]
+    if missing or not nodes:
+        raise ValueError(
+            "computed coefficients need the place of every sensor and plane in the model: node = … (or "
+            f"station) in {', '.join(missing) or 'a [planes.NAME]'}"
+        )
+    by_mass = stations is None and weight(job.trials.labels.weight_unit).kind == "mass"
+    if by_mass and (lost := [p for p in job.planes if p not in job.radii]):
+        raise ValueError(
+            f"weights as masses need the radius of every plane: radius_mm in [planes.{lost[0]}], or weights "
+            "as unbalances"
+        )
+    return ModelPlaces(
+        nodes,
+        {s: job.sensor_places[s] for s in job.trials.sensors},
+        {p: job.radii[p] for p in job.planes} if by_mass else None,
+        _quantity(job.trials.labels.vibration_unit),
+    )
+
+
+def _quantity(unit: str) -> Quantity:
+    """What an amplitude in this unit is.
+
+    Raises
+    ------
+    ValueError
+        For a unit that is only a label.
+    """
+    from rotorid.tables.reader.units import vibration
+
+    kinds: dict[str, Quantity] = {
+        "length": "displacement",
+        "displacement": "displacement",
+        "velocity": "velocity",
+        "acceleration": "acceleration",
+    }
+    kind = vibration(unit).kind if unit else ""
+    if kind not in kinds:
+        raise ValueError(
+            "computed coefficients need amplitudes in a unit of length, velocity or acceleration, such as "
+            f"um_pp or mm_s_rms; {unit or 'a column without a unit'} is none"
+        )
+    return kinds[kind]

@@ -1,0 +1,195 @@
+"""Balancing with a calibrated rotor: coefficients with its errors, and the trial run that would narrow them.
+
+The parameters of the rotor err by L ε with L Lᵀ their covariance and independent real ε; a coefficient by
+Σ ∂W/∂θ L ε, the same ε at all speeds and sensors, and by the lack of fit at its own speed and sensor.
+
+A trial run adds rows K to what is known of the parameters: C becomes C − C Kᵀ (1 + K C Kᵀ)⁻¹ K C, whatever
+it will read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from balancing import Gaussian, Trials, reading_of, usual_run_errors, with_parameters
+from fem.parameters import as_change, parameter_value
+from rotorid.calibration import RunReadings
+from rotorid.commands.outcome import hash_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from balancing import Influence, Labels
+    from fem import Rotor
+    from rotorid.base.arrays import ComplexArray, FloatArray
+    from rotorid.commands.model_places import ModelPlaces
+    from rotorid.tables import Job
+
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
+"""Why its coefficients alone are not enough."""
+
+
+def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
+    """Computed coefficients as those of a job's calibrated rotor: at the angles it found, with its errors.
+
+    What changes between runs is as the job states it, else assumed.
+    """
+    assert job.rotor is not None
+    calibration = job.rotor.calibration
+    assert calibration is not None
+    W, dW = _derivatives(_runs(influence, places, job.key_phasor), job.rotor)
+    L = calibration.columns()
+    columns = np.einsum("nscp,nm->mscp", dW, L)
+    lack = calibration.lack_at(influence.speeds, influence.sensors)
+    none = Gaussian.none(*W.shape).noise
+    errors = Gaussian(none.own[0], none.columns, influence.reading, usual_run_errors(job.trials))
+    found = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
+    if not calibration.needs_trial_run:
+        return found
+    warnings = *found.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(found, remarks=found.remarks._replace(warnings=warnings))
+
+
+def counted_before(job: Job) -> bool:
+    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
+    known = None if job.rotor is None else job.rotor.calibration
+    own = job.files[:2]  # the job, then its runs
+    return known is not None and any(hash_of(file) in known.data.values() for file in own)
+
+
+def needs_trial_run(job: Job, influence: Influence) -> bool:
+    """Whether these coefficients are those of a model alone that contradicts its own data."""
+    known = None if job.rotor is None else job.rotor.calibration
+    alone = influence is not job.influence and not job.trials.weights.any()
+    return known is not None and known.needs_trial_run and alone
+
+
+def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
+    """One bare run at these places, to ask for coefficients."""
+    S, C, P = influence.W.shape
+    trials = Trials(
+        ("bare",),
+        influence.speeds,
+        influence.sensors,
+        influence.planes,
+        np.ones((1, S, C), dtype=complex),
+        np.zeros((1, P), dtype=complex),
+    )
+    radii = np.array([1.0 if places.radii is None else places.radii[plane] for plane in influence.planes])
+    return RunReadings(
+        trials,
+        tuple(places.nodes[plane] for plane in influence.planes),
+        radii,
+        tuple(places.sensors[sensor] for sensor in influence.sensors),
+        places.derivatives,
+        key_phasor,
+    )
+
+
+def _values(rotor: Rotor) -> Mapping[str, float]:
+    """The calibrated numbers as they stand."""
+    assert rotor.calibration is not None
+    angles = dict(rotor.calibration.readings)
+    paths = dict.fromkeys(as_change(rotor, path) for path in (*rotor.calibration.names, *angles))
+    return {path: angles[path] if path in angles else parameter_value(rotor, path) for path in paths}
+
+
+def _derivatives(runs: RunReadings, rotor: Rotor) -> tuple[ComplexArray, ComplexArray]:
+    """Coefficients and their derivatives by the calibrated numbers that act on these sensors."""
+    assert rotor.calibration is not None
+    names = [as_change(rotor, path) for path in rotor.calibration.names]
+    return runs.coefficients(rotor, _values(rotor), names)
+
+
+@dataclass(frozen=True)
+class NextTrial:
+    """The trial run that would tell most: its plane and weight, and the prediction's error before and after.
+
+    Errors are half widths of 95 %, root mean square over the readings, by the parameters of the model alone.
+    """
+
+    plane: str
+    weight: complex
+    before: float
+    after: float
+    labels: Labels
+
+    @property
+    def words(self) -> str:
+        """A clause."""
+        before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
+        return (
+            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow "
+            f"what the model leaves open most: expected ± from {before} to {after}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units."""
+        scale = self.labels.vibration_scale
+        weight = self.labels.weight_entry(self.weight)
+        return {
+            "plane": self.plane,
+            **weight,
+            "error_now": self.before * scale,
+            "error_after": self.after * scale,
+        }
+
+
+def next_trial(
+    job: Job, influence: Influence, weights: ComplexArray, planes: tuple[str, ...]
+) -> NextTrial | None:
+    """Of trial runs with the correction of one plane, the one after which the correction is known best.
+
+    Parameters
+    ----------
+    job
+        With a calibrated rotor.
+    influence
+        Its computed coefficients.
+    weights, planes
+        The correction.
+    """
+    from rotorid.commands.model_places import model_places
+
+    rotor = job.rotor
+    if rotor is None or rotor.calibration is None or influence is job.influence:
+        return None
+    if job.trials.weights.any() or not weights.any():
+        return None
+    runs = _runs(influence, model_places(job), job.key_phasor)
+    W, dW = _derivatives(runs, rotor)
+    D = np.zeros(len(influence.planes), dtype=complex)
+    D[[influence.planes.index(plane) for plane in planes]] = weights
+    moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
+
+    def error(C: FloatArray) -> float:
+        square = np.einsum("ni,nm,mi->", moved, C, moved.conj()).real
+        return float(1.96 * np.sqrt(square / (2 * moved.shape[1])))
+
+    C = np.asarray(rotor.calibration.covariance)
+    bare = job.trials.mean[0]
+    found = []
+    for p in np.flatnonzero(D):
+        one = np.zeros_like(D)
+        one[p] = D[p]
+        two = Trials(
+            ("bare", "trial"),
+            influence.speeds,
+            influence.sensors,
+            influence.planes,
+            np.stack((bare, bare + W @ one)),
+            np.stack((0 * one, one)),
+            errors=influence.reading.errors or reading_of(job.trials).errors,
+            run_errors=job.trials.run_errors,
+        )
+        rows = replace(runs, trials=two).rows(W)
+        K = rows.jacobian(W, dW)
+        CK = C @ K.T
+        after = C - CK @ np.linalg.solve(np.eye(len(K)) + K @ CK, CK.T)
+        found.append(
+            NextTrial(influence.planes[p], complex(one[p]), error(C), error(after), job.trials.labels)
+        )
+    return min(found, key=lambda trial: trial.after)

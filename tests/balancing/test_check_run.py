@@ -1,0 +1,345 @@
+"""Check runs beside their prediction, detection, words, and coefficients that they refine."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, stored, synthetic
+from cases import each_of
+from fem_rotors import rotor23
+from repetitions import highest_share, lowest_share
+
+import fem
+from balancing import (
+    Labels,
+    ReadingErrors,
+    UndeterminedError,
+    compare_check,
+    correct,
+    estimate_influence,
+    refine,
+)
+from balancing.check_run import with_check_runs
+
+ERRORS = ReadingErrors(amplitude=0.02, phase=np.deg2rad(1.0))
+P, C, S = 2, 4, 3
+
+
+def rotor(rng):
+    """W, Y0 and trial weights that change the vibration well."""
+    W, Y0 = complex_normal(rng, (S, C, P)) * 1e3, complex_normal(rng, (S, C))
+    return W, Y0, np.vstack((np.zeros(P), np.eye(P))) * GRAM
+
+
+def runs_of(readings, weights, **options):
+    return job(readings, weights, speeds=100.0 * np.arange(1, S + 1), **options)
+
+
+def check_of(readings, **options):
+    """A check run (or several) without weights: the proposed corrections were mounted."""
+    readings = np.asarray(readings)
+    readings = readings[None] if readings.ndim == 2 else readings
+    return runs_of(readings, np.zeros((readings.shape[-3], 0)), **options)
+
+
+def balanced(rng, W, Y0, T, *, errors=ERRORS, **options):
+    """Influence and correction from noisy trial runs."""
+    exact = Y0 + np.einsum("scp,rp->rsc", W, T)
+    influence = estimate_influence(runs_of(noisy(rng, exact, errors), T, errors=errors, **options))
+    return influence, correct(influence, refuse=False)
+
+
+def test_linear_jobs_are_called_explained_and_chi_square_has_its_degrees_of_freedom():
+    n, explained, sizes, distances = 60, [], [], []
+    for seed in range(n):
+        rng = np.random.default_rng(seed)
+        W, Y0, T = rotor(rng)
+        influence, correction = balanced(rng, W, Y0, T)
+        check = check_of(noisy(rng, Y0 + W @ correction.weights, ERRORS), errors=ERRORS)
+        comparison = compare_check(correction, check, influence)
+        explained.append(comparison.explained)
+        sizes.append(comparison.chi_square)
+        distances.append(comparison.distance)
+    assert lowest_share(n, 0.95) <= np.mean(explained) <= highest_share(n, 0.95)
+    assert comparison.n == 2 * S * C
+    assert np.mean(sizes) == pytest.approx(24, abs=4 * np.sqrt(48 / n))
+    assert np.mean(np.array(distances) < 2.4477) == pytest.approx(0.95, abs=0.03)
+
+
+def test_unbalance_outside_the_planes_is_detected():
+    """The 23-element rotor: planes at nodes 4 and 20, and a part at node 12 that moved before the check."""
+    model = fem.influence(rotor23(2e4), [4, 20, 12], [3, 8, 16, 22], [150.0, 280.0, 420.0])
+    W, outside = model.W[..., :2], model.W[..., 2]
+    rng = np.random.default_rng(76)
+    comparisons = []
+    for _ in range(12):
+        Y0 = model.W @ complex_normal(rng, 3)
+        influence, correction = balanced(rng, W, Y0, np.vstack((np.zeros(2), np.eye(2))))
+        true = Y0 + W @ correction.weights + outside
+        check = check_of(noisy(rng, true, ERRORS), errors=ERRORS)
+        comparisons.append(compare_check(correction, check, influence))
+    assert not any(c.explained for c in comparisons)
+    # in a few noisy jobs weights in the planes could have done the same
+    assert sum("unbalance outside the planes, or a nonlinearity" in c.verdict for c in comparisons) > 9
+
+
+def test_a_wrongly_mounted_weight_is_named():
+    """The weight of plane B at the wrong angle: the change that explains it, within its error, is named."""
+    rng, fine = np.random.default_rng(78), ReadingErrors(0.004, 0.004)
+    W, Y0, T = rotor(rng)
+    influence, correction = balanced(rng, W, Y0, T, errors=fine)
+    mounted = correction.weights * np.array([1.0, np.exp(1j * np.deg2rad(60))])
+    check = check_of(noisy(rng, Y0 + W @ mounted, fine), errors=fine)
+    comparison = compare_check(correction, check, influence)
+    assert comparison.explained is False
+    delta = mounted - correction.weights
+    assert np.allclose(comparison.change, delta, atol=0.06 * np.abs(delta).max())
+    assert "plane 'B' had" in comparison.verdict
+    assert "plane 'A'" not in comparison.verdict
+    # the same check, with what was mounted in its weights table
+    same = compare_check(correction, runs_of(check.readings, mounted[None], errors=fine), influence)
+    assert (same.explained, same.as_proposed, same.change) == (True, False, None)
+
+
+def test_the_covariance_is_that_of_a_prediction_and_a_reading():
+    """B C Bᵀ of the coefficients, and the errors of a reading at what is predicted."""
+    rng = np.random.default_rng(79)
+    floor = ReadingErrors(floor=0.02)
+    W, Y0, T = rotor(rng)
+    influence, correction = balanced(rng, W, Y0, T, errors=floor)
+    mounted = np.stack((correction.weights, 0.5 * correction.weights))
+    check = runs_of(Y0 + np.einsum("scp,rp->rsc", W, mounted), mounted, errors=floor)
+    comparison = compare_check(correction, check, influence)
+    total = 0.0
+    for s, c in np.ndindex(S, C):
+        B = np.vstack(
+            [np.hstack([[[z.real, -z.imag], [z.imag, z.real]] for z in (1.0 + 0j, *D)]) for D in mounted]
+        )
+        V = B @ influence.channels()[s, c] @ B.T + 0.02**2 * np.eye(4)
+        z = comparison.difference[:, s, c]
+        d = np.array([z[0].real, z[0].imag, z[1].real, z[1].imag])
+        total += d @ np.linalg.solve(V, d)
+        assert np.allclose(comparison.covariance[1, s, c], V[2:, 2:])
+    assert comparison.chi_square == pytest.approx(total, rel=1e-6)
+    assert comparison.n == 4 * S * C
+    # the same within what 400 draws tell
+    ratio = np.trace(comparison.covariance[0], axis1=-2, axis2=-1) / np.trace(
+        correction.after_covariance, axis1=-2, axis2=-1
+    )
+    assert np.median(ratio) == pytest.approx(1, abs=0.1)
+
+
+def test_some_sensors_and_speeds_are_enough():
+    rng = np.random.default_rng(81)
+    influence, correction = balanced(rng, *rotor(rng))
+    whole = compare_check(
+        correction, check_of(noisy(rng, correction.after, ERRORS), errors=ERRORS), influence
+    )
+    part = job(
+        whole.achieved[:, [2, 0]][..., [3, 1]],
+        np.zeros((1, 0)),
+        speeds=[300.0, 100.0],
+        sensors=("s3", "s1"),
+        errors=ERRORS,
+    )
+    comparison = compare_check(correction, part, influence)
+    assert np.allclose(comparison.distance[0], whole.distance[0][[2, 0]][:, [3, 1]], rtol=1e-6)
+    assert comparison.n == 8
+    with pytest.raises(ValueError, match="no coefficients of sensor 'x'"):
+        compare_check(correction, replace(part, sensors=("s3", "x")), influence)
+    with pytest.raises(ValueError, match="there are no coefficients at 2387"):
+        compare_check(correction, replace(part, speeds=np.array([300.0, 250.0])), influence)
+    with pytest.raises(ValueError, match="no coefficients of plane 'Z'"):
+        compare_check(correction, runs_of(whole.achieved, [[GRAM]], planes=("Z",)), influence)
+    empty = runs_of(whole.achieved, [[0.0, 0.0]], planes=("A", "Z"), errors=ERRORS)
+    assert not compare_check(correction, empty, influence).weights.any()
+
+
+def test_without_known_errors_there_is_no_verdict():
+    measured = estimate_influence(bruel_kjaer())
+    influence = stored(measured.W, measured.baseline, labels=measured.labels)
+    check = job([[0.5, 1.0]], np.zeros((1, 0)))
+    comparison = compare_check(correct(influence), check, influence)
+    assert comparison.explained is comparison.chi_square is None
+    assert comparison.verdict == (
+        "no verdict: the errors of the readings are not known (state them, or repeat readings); "
+        "sensor 's1' at 954.93 rpm differs most, by 1.00"
+    )
+    assert comparison.improvement_predicted is None  # an exact solution leaves nothing
+    assert comparison.improvement_achieved == pytest.approx(np.hypot(7.2, 13.5) / np.hypot(0.5, 1.0))
+    document = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
+    assert document["readings"][0]["predicted_phase_deg"] is None
+    assert document["readings"][0]["covariance"] is None
+    assert "std" not in comparison.answer.whole()
+
+
+def test_two_planes_and_two_sensors():
+    """3 % of the vibration before is explained by 2 % and 2°, 30 % is not; no weights are named for it."""
+    errors = ReadingErrors(0.02, np.deg2rad(2))
+    influence = estimate_influence(bruel_kjaer(errors=errors))
+    correction = correct(influence)
+    small, large = (
+        compare_check(
+            correction, job([[share * 7.2, share * 13.5]], np.zeros((1, 0)), errors=errors), influence
+        )
+        for share in (0.03, 0.3)
+    )
+    assert small.explained is True
+    assert small.verdict.startswith("the differences are explained by the errors (probability ")
+    assert large.explained is False
+    assert large.change is None  # two planes explain any two readings: that says nothing
+
+
+def test_json_and_table_in_the_units_of_the_job():
+    """Lag and against the rotation: phases, angles and covariances are mirrored; amplitudes in um_pp."""
+    rng = np.random.default_rng(82)
+    W, Y0, T = rotor(rng)
+    labels = Labels("um_pp", 2e6, "g", 1e3, "lag", "against rotation")
+    influence, correction = balanced(rng, W, Y0, T, labels=labels)
+    check = check_of(noisy(rng, Y0 + W @ correction.weights, ERRORS), errors=ERRORS, labels=labels)
+    comparison = compare_check(correction, check, influence)
+    document = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
+    row, z, V = document["readings"][5], comparison.achieved[0, 1, 1], comparison.covariance[0, 1, 1]
+    assert (row["speed_rpm"], row["sensor"]) == (pytest.approx(200 * 30 / np.pi), "s1")
+    assert row["achieved"] == pytest.approx(abs(z) * 2e6)
+    assert row["achieved_phase_deg"] == pytest.approx(np.degrees(-np.angle(z)) % 360)
+    assert np.allclose(row["covariance"], 4e12 * V * [[1, -1], [-1, 1]])
+    mounted = document["mounted"][0]["weights"][1]
+    assert mounted["angle_deg"] == pytest.approx(np.degrees(-np.angle(correction.weights[1])) % 360)
+    assert comparison.to_frame()["distance"].to_numpy() == pytest.approx(comparison.distance.ravel())
+    assert comparison.answer.brief().startswith("As predicted: ")
+    assert comparison.improvement_achieved == pytest.approx(
+        np.linalg.norm(comparison.before) / np.linalg.norm(comparison.achieved)
+    )
+
+
+def test_repeats_of_the_check_run_that_scatter_more_count():
+    """Stated 2 %, but the check run scatters by 30 %: that is used, and told."""
+    rng = np.random.default_rng(84)
+    W, Y0, T = rotor(rng)
+    influence, correction = balanced(rng, W, Y0, T)
+    wild = ReadingErrors(0.3, 0.3)
+    check = check_of(noisy(rng, Y0 + W @ correction.weights, wild, (6, 1)), errors=ERRORS)
+    comparison = compare_check(correction, check, influence)
+    assert any("scatter" in w for w in comparison.warnings)
+    once = compare_check(correction, check_of(correction.after, errors=ERRORS), influence)
+    more = np.trace(comparison.covariance[0] - once.covariance[0], axis1=-2, axis2=-1) / 2
+    assert np.allclose(np.sqrt(more) / np.abs(correction.after), 0.3 / np.sqrt(6), rtol=0.1)
+
+
+# refined coefficients
+
+
+def mounted(trials, W, Y0, weights, *, runs=("check",), noise=0.0, rng=None):
+    """Check runs with weights (R, P) of a rotor that is linear."""
+    T = np.atleast_2d(np.asarray(weights, dtype=complex))
+    readings = Y0 + np.einsum("scp,rp->rsc", W, T)
+    if noise:
+        readings = readings * (1 + noise * complex_normal(rng, readings.shape))
+    return replace(trials, runs=runs, readings=readings[None], weights=T, warnings=())
+
+
+def test_a_linear_rotor_keeps_its_coefficients():
+    trials, W, Y0 = synthetic(np.random.default_rng(3))
+    weights = np.array([[0.5, 0.2j], [-0.3, 0.1]]) * GRAM
+    refined = refine(trials, mounted(trials, W, Y0, weights, runs=("first", "second")))
+    assert np.allclose(refined.W, W, rtol=1e-9)
+    assert np.allclose(refined.baseline, Y0, rtol=1e-9)
+    assert refined.mounted.run == "second"
+    assert np.allclose(correct(refined).to_add, correct(refined).weights - weights[1])
+    assert refined.remarks.warnings == ()
+
+
+def test_check_runs_are_runs_like_others():
+    rng = np.random.default_rng(4)
+    trials, W, Y0 = synthetic(rng)
+    trials = replace(
+        trials, readings=trials.readings * (1 + 0.02 * complex_normal(rng, trials.readings.shape))
+    )
+    checks = [mounted(trials, W, Y0, [[0.5 * GRAM, k * 1j * GRAM]], noise=0.02, rng=rng) for k in (1, 2)]
+    refined = refine(trials, *checks)
+    T = np.concatenate([each.weights for each in (trials, *checks)])
+    Y = np.concatenate([each.mean for each in (trials, *checks)])
+    together = estimate_influence(replace(trials, runs=tuple("12345"), weights=T, readings=Y))
+    assert np.array_equal(refined.W, together.W)
+    assert refined.reading.source == "residuals"
+
+
+def test_check_runs_make_coefficients_more_certain():
+    trials, W, Y0 = synthetic(np.random.default_rng(5), errors=ReadingErrors(0.02, 0.02))
+    check = mounted(trials, W, Y0, [[2 * GRAM, 1j * GRAM]])
+    old, new = (
+        np.trace(i.channels()[..., 2:, 2:], axis1=-2, axis2=-1)
+        for i in (estimate_influence(trials), refine(trials, check))
+    )
+    assert (new < old).all()
+
+
+@each_of("factor, words", [(1.4, None), (0.2, "+0°"), (np.exp(0.7j), None)])
+def test_a_coefficient_that_moves_is_named(factor, words):
+    """With the weights 0, T and 2 T in three runs the last one nearly decides: W = (Y₂ − Y₀) / 2 T."""
+    trials = job([[1.0, 1.0], [1.5, 1.5j]], [[0], [GRAM]])
+    old = estimate_influence(trials).W[0, :, 0]
+    refined = refine(trials, job([1 + 2 * GRAM * old * [factor, 1.0]], [[2 * GRAM]], runs=("check",)))
+    moved = [
+        w
+        for w in refined.remarks.warnings
+        if w.startswith("the check runs move the coefficient of plane 'A' on sensor 's0'")
+    ]
+    assert bool(moved) is (words is not None)
+    assert not moved or words in moved[0]
+
+
+def test_names_and_corrections_that_were_mounted():
+    trials, W, Y0 = synthetic(np.random.default_rng(9))
+    proposed = correct(estimate_influence(trials))
+    silent = replace(
+        mounted(trials, W, Y0, [proposed.weights], runs=("run 0",)), planes=(), weights=np.zeros((1, 0))
+    )
+    for given in (proposed, dict(zip(proposed.planes, proposed.weights, strict=True))):
+        refined = refine(trials, silent, silent, corrections=given)
+        assert np.allclose(refined.W, W, rtol=1e-9)
+        assert refined.mounted.run == "run 0 (check 2)"
+        assert np.array_equal(refined.mounted.weights, proposed.weights)
+    with pytest.raises(ValueError, match="what was mounted in the check run 'run 0' is not known"):
+        refine(trials, silent)
+
+
+def test_trial_runs_that_need_the_check_runs():
+    trials, W, Y0 = synthetic(np.random.default_rng(10))
+    first = replace(trials, runs=trials.runs[:2], readings=trials.readings[:, :2], weights=trials.weights[:2])
+    refined = refine(first, mounted(trials, W, Y0, [[0, GRAM]]))
+    assert np.allclose(refined.W, W, rtol=1e-9)
+    with pytest.raises(UndeterminedError, match="plane 'B'"):
+        refine(first, mounted(trials, W, Y0, [[GRAM, 0]]))
+
+
+def test_check_runs_that_do_not_fit():
+    trials, W, Y0 = synthetic(np.random.default_rng(10))
+    check = mounted(trials, W, Y0, [[0, GRAM]])
+    some = replace(check, sensors=check.sensors[:2], readings=check.readings[..., :2])
+    with pytest.raises(ValueError, match="no readings of sensor 's2'"):
+        refine(trials, some)
+    assert with_check_runs(trials, some).sensors == ("s0", "s1")
+    with pytest.raises(ValueError, match="which the trial runs do not have"):
+        refine(trials, replace(check, sensors=("s0", "s1", "s2", "new")))
+    with pytest.raises(ValueError, match="there is no check run"):
+        refine(trials)
+
+
+def test_joined_runs_keep_the_errors_that_were_measured():
+    trials, W, Y0 = synthetic(np.random.default_rng(11))
+    check = mounted(trials, W, Y0, [[GRAM, GRAM]])
+
+    def measured(runs, variance):
+        return replace(
+            runs, covariance=np.tile(variance * np.eye(2)[..., None, None, None, None], runs.readings.shape)
+        )
+
+    joint = with_check_runs(measured(trials, 0.01), measured(check, 0.25))
+    assert np.allclose(joint.covariance[0, 0, 0, :, 0, 0], [0.01, 0.01, 0.01, 0.25])
+    # typed ones have the mean of the others, unless errors are stated
+    assert np.allclose(with_check_runs(measured(trials, 0.01), check).covariance[0, 0, 0, 3], 0.01)
+    both = (replace(each, errors=ERRORS) for each in (measured(trials, 0.01), check))
+    assert not with_check_runs(*both).covariance[:, :, 0, 3].any()

@@ -1,0 +1,66 @@
+"""Conditioning: singular values, refusals, and resolution against errors."""
+
+import numpy as np
+import pytest
+from balancing_data import complex_normal
+
+from balancing.conditioning import (
+    UndeterminedError,
+    check_planes,
+    check_runs,
+    conditioning,
+    unresolved,
+)
+
+
+@pytest.mark.parametrize("near", [0.0, 0.02, 0.3, 5.0])
+def test_singular_values_of_scaled_columns(near):
+    rng = np.random.default_rng(1)
+    W = complex_normal(rng, (6, 3))
+    W[:, 2] = 2j * W[:, 0] - W[:, 1] + near * W[:, 2]
+    numbers = conditioning(W * [1e-3, 1.0, 1e3], "ABC")
+    s = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
+    assert np.allclose(numbers.singular_values, s, atol=1e-12)
+    assert numbers.rank == (3 if near else 2)
+    assert near == 0 or numbers.condition_number == pytest.approx(s[0] / s[-1])
+    assert ("leave out" in numbers.sentence()) == (near < 1)
+
+
+def test_planes_that_are_alike_are_mostly_told_within_their_errors():
+    """χ² with 16 degrees of freedom at 95 %, or one reading at 99 %: some 6 of 100 look determined."""
+    rng = np.random.default_rng(2)
+    W = complex_normal(rng, (10, 3))
+    W[:, 2] = W[:, :2] @ complex_normal(rng, 2)
+    errors = np.tile(1e-4 * np.eye(6), (10, 1, 1))
+    words = [unresolved(W + 0.01 * complex_normal(rng, W.shape), "ABC", errors) for _ in range(200)]
+    assert 0.88 < np.mean([bool(each) for each in words]) < 0.99
+
+
+def test_planes_within_errors():
+    W = np.array([[1, 1.001], [2j, 2j], [1.5, 1.5]])
+    errors = np.tile(0.01 * np.eye(4), (3, 1, 1))
+    assert "told apart by" in unresolved(W, "AB", errors)
+    assert "no instrument supports" in unresolved(W, "AB", 0 * errors)
+    assert not unresolved(np.array([[1, 0], [0, 1], [1, 1]]), "AB", 1e-3 * errors)
+
+
+@pytest.mark.parametrize(
+    ("weights", "words"),
+    [
+        ([[0, 0], [1, 0]], "no run has a weight greater than zero in plane 'B'"),
+        ([[0, 0], [1, 2], [2, 4]], "no run separates plane 'A' from plane 'B'"),
+        ([[1, 0], [0, 1]], "add a baseline run"),
+    ],
+)
+def test_runs_that_do_not_determine(weights, words):
+    with pytest.raises(UndeterminedError, match=words):
+        check_runs([str(k) for k in range(len(weights))], "AB", np.array(weights, dtype=complex))
+
+
+def test_planes_that_readings_cannot_tell_apart():
+    with pytest.raises(UndeterminedError, match="2 planes need at least 2 readings"):
+        check_planes(np.ones((1, 2)), "AB")
+    with pytest.raises(UndeterminedError, match="has no effect"):
+        check_planes(np.array([[1, 0], [1, 0]]), "AB")
+    with pytest.raises(UndeterminedError, match="does what 2 times that weight does"):
+        check_planes(np.array([[2, 1], [2j, 1j]]), "AB")

@@ -1,0 +1,146 @@
+"""Influence coefficients: numbers by hand, draws that have the covariance they say, rebased ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from balancing_data import bruel_kjaer, feese_grazier, job, polar, synthetic
+
+from balancing.conditioning import UndeterminedError
+from balancing.conventions import Labels
+from balancing.errors import NO_RUN_ERRORS, Reading
+from balancing.influence import Gaussian, Influence, estimate_influence
+from balancing.trials import Placement, ReadingErrors, RunScatter
+
+STATED = ReadingErrors(0.01, 0.02)
+
+
+def test_coefficients_by_hand():
+    influence = estimate_influence(bruel_kjaer(labels=Labels("mm_s", 1e3, "g", 1e3)))
+    by_hand = (polar(4.9, 114) - polar(7.2, 238)) / 2.5
+    row = influence.to_dict()["rows"][0]
+    assert influence.unit == "mm_s/g"
+    assert row["influence"] == pytest.approx(1000 * abs(by_hand))
+    assert row["phase_deg"] == pytest.approx(np.degrees(np.angle(by_hand)) % 360)
+    # left in: the second weight alone made the change from the second run
+    left = estimate_influence(feese_grazier())
+    change = (polar(0.54, 9) - polar(1.31, 1)) / polar(3.7e-3, 135)
+    assert left.W[0, 0, 1] == pytest.approx(change)
+
+
+def test_covariance_of_a_difference():
+    """W = (Y₁ − Y₀)/T: errors of both readings, and the same Y₀ in Y₀."""
+    floor = replace(bruel_kjaer(errors=ReadingErrors(floor=0.1)), run_errors=RunScatter(0.0, 1e-12))
+    V = estimate_influence(floor).channels()[0, 0]
+    assert np.allclose(
+        V[:4, :4], np.kron([[1, -400], [-400, 2 * 400**2]], 0.01 * np.eye(2)), rtol=1e-6, atol=1e-4
+    )
+
+
+def every_error():
+    """Coefficients with every kind of error, at 12 readings."""
+    trials, _, _ = synthetic(np.random.default_rng(1), errors=STATED)
+    return estimate_influence(
+        replace(trials, placement=Placement(0.03, 0.05), drift=0.02, run_errors=RunScatter(0.02))
+    )
+
+
+def test_draws_have_the_covariance_of_channels():
+    influence = every_error()
+    Y0, W = (np.concatenate(parts) for parts in zip(*influence.draws(4000, block=700), strict=True))
+    theta = np.concatenate((Y0[..., None], W), axis=-1)
+    error = (theta - theta.mean(axis=0)).view(float)
+    drawn = np.einsum("bscp,bscq->scpq", error, error) / len(error)
+    stated = influence.channels()
+    # sizes of the parts are drawn, those of channels typical: variances agree to their mean
+    ratio = np.einsum("scpp->scp", drawn) / np.einsum("scpp->scp", stated)
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
+
+
+def test_draws_do_not_depend_on_blocks():
+    influence = every_error()
+    one, many = (np.concatenate([W for _, W in influence.draws(20, block=b)]) for b in (20, 3))
+    assert np.allclose(one, many, rtol=1e-12)
+
+
+def test_columns_are_what_readings_have_in_common():
+    influence = every_error()
+    columns = influence.columns()
+    # a drift is a factor of all readings: with runs in order 0, ½, 1 the coefficients err by their share
+    sizes = np.linalg.norm(columns.reshape(len(columns), -1), axis=1)
+    assert columns.shape[1:] == (3, 4, 3)
+    assert (sizes[-2:] > 0).all()
+    assert np.allclose(columns[-1], 1j * columns[-2])
+
+
+def test_a_part_errs_as_the_whole_does():
+    influence = every_error()
+    part = influence.part([2, 0], [1], [1])
+    assert part.W[0, 0, 0] == influence.W[2, 1, 1]
+    keep = [0, 1, 4, 5]
+    assert np.allclose(part.channels()[1, 0], influence.channels()[0, 1][np.ix_(keep, keep)])
+
+
+def test_rebased_on_its_own_baseline_is_the_same():
+    influence = every_error()
+    assert np.allclose(influence.rebased(influence.baseline).channels(), influence.channels())
+
+
+def test_rebased_on_new_runs():
+    influence = every_error()
+    trials = influence.trials
+    T = np.array([[0.5e-3, 0.2e-3]])
+    readings = influence.baseline * 0.8 + influence.W @ T[0]
+    new = replace(trials, runs=("today",), readings=readings[None], weights=T, drift=0.0)
+    today = influence.rebased(new)
+    assert np.allclose(today.baseline, 0.8 * influence.baseline)
+    assert today.mounted.run == "today"
+    assert np.allclose(today.mounted.weights, T[0])
+    assert np.allclose(today.channels()[..., 2:, 2:], influence.channels()[..., 2:, 2:])
+    # with the weights that are mounted only the new run errs
+    Y0, W = (np.concatenate(parts) for parts in zip(*today.draws(2000), strict=True))
+    back = Y0 + W @ T[0]
+    alone = estimate_errors(today, readings, T[0])
+    assert np.std(back.real, axis=0) == pytest.approx(np.std(alone.real, axis=0), rel=0.15)
+
+
+def estimate_errors(influence, readings, weights):
+    return np.concatenate(list(influence.further(readings, weights, 2000)))
+
+
+def test_runs_without_weights_that_differ():
+    influence = every_error()
+    trials = influence.trials
+    with pytest.raises(UndeterminedError, match="give the weights table"):
+        influence.rebased(replace(trials, weights=np.zeros((3, 2))))
+
+
+def test_stored_coefficients_without_errors_have_no_draws():
+    zero = np.zeros((1, 2, 4, 4))
+    errors = Gaussian(zero, np.zeros((0, 1, 2, 2), dtype=complex), Reading(), NO_RUN_ERRORS)
+    stored = Influence(
+        np.array([100.0]), ("a", "b"), ("P",), np.ones((1, 2, 1)), np.full((1, 2), np.nan), errors
+    )
+    assert not stored.known_errors
+    assert not stored.has_baseline
+    assert list(stored.draws()) == []
+
+
+def test_a_trial_weight_without_effect():
+    with pytest.raises(UndeterminedError, match="changed no reading"):
+        estimate_influence(job(np.ones((2, 3)), [[0], [1e-3]]))
+    readings = np.array([[1.0, 1.0, 1.0], [1.001, 0.999, 1.002]])
+    with pytest.raises(UndeterminedError, match="repeat the run with a larger trial weight, at least"):
+        estimate_influence(job(readings, [[0], [1e-3]], errors=ReadingErrors(0.02, 0.02)))
+
+
+def test_runs_that_disagree():
+    readings = np.array([[1.0, 1.0], [1.5, 0.5], [3.0, 4.0]])
+    remarks = estimate_influence(job(readings, [[0], [0], [1e-3]])).remarks
+    assert "is missing in the weights table" in remarks.contradictions[0]
+    assert remarks.contradictions == remarks.warnings
+
+
+def test_no_planes():
+    with pytest.raises(UndeterminedError, match="no planes"):
+        estimate_influence(job(np.ones((1, 2)), np.zeros((1, 0))))

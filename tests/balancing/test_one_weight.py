@@ -1,0 +1,297 @@
+"""One weight: in holes against trying everything; two masses, drilling, rounding against closed forms."""
+
+import itertools
+
+import numpy as np
+import pytest
+from cases import each_of
+from scipy.integrate import quad
+
+from balancing.conventions import Labels
+from balancing.holes import equal_holes, from_list
+from balancing.one_weight import (
+    Drill,
+    combine,
+    drill_holes,
+    grind,
+    round_to,
+    rounded,
+    split,
+    trim,
+    two_positions,
+)
+
+GRAMS = Labels(weight_unit="g", weight_scale=1e3)
+STEEL = 7850.0
+
+
+def everything(target, holes, most):
+    """Error and pieces of every choice, by trying it."""
+    K = len(holes.pieces)
+    one = [c for c in itertools.product(range(holes.per_hole + 1), repeat=K) if sum(c) <= holes.per_hole]
+    for combination in itertools.product(*[one if free else [(0,) * K] for free in holes.free]):
+        counts = np.array(combination)
+        if holes.stock is not None and (counts.sum(axis=0) > holes.stock).any():
+            continue
+        if most is not None and counts.sum() > most:
+            continue
+        vector = (counts @ holes.pieces) @ np.exp(1j * holes.angles)
+        if holes.allows(vector):
+            yield round(float(abs(vector - target)), 11), int(counts.sum())
+
+
+def problem(seed):
+    """Small enough to try everything: odd and regular holes, stock, taken holes, limits."""
+    rng = np.random.default_rng(seed)
+    H, K, per_hole = int(rng.integers(2, 6)), int(rng.integers(1, 3)), int(rng.integers(1, 3))
+    taken = np.where(rng.random(H) < 0.2, 0.004, 0.0)
+    taken[0] = 0.0
+    holes = from_list(
+        np.sort(rng.uniform(0, 2 * np.pi, H)) if seed % 2 else equal_holes(H, 0.3),
+        rng.choice(np.arange(1, 9), K, replace=False) * 1e-3,
+        per_hole=per_hole,
+        stock=rng.integers(1, 4, K) if seed % 3 == 0 else None,
+        taken=taken,
+        max_weight=float(rng.uniform(0.008, 0.02)) if seed % 4 == 0 else np.inf,
+    )
+    target = complex(rng.normal(), rng.normal()) * 0.01
+    return target, holes, int(rng.integers(1, 5)) if seed % 5 == 0 else None
+
+
+@each_of("seed", range(80))
+def test_equal_to_trying_everything(seed):
+    target, holes, most = problem(seed)
+    every = list(everything(target, holes, most))
+    found = split(target, holes, most_pieces=most)
+    assert (round(abs(found.error), 11), found.pieces) == min(every)
+    assert found.mounting.vector - target == pytest.approx(found.error, abs=1e-15)
+    assert (found.mounting.counts.sum(axis=1) <= holes.per_hole).all()
+    assert not found.mounting.amounts[~holes.free].any()
+    few = split(target, holes, most_pieces=most, good_enough=0.2)
+    errors = [abs(one.error) for one in (*few.fewer, few)]
+    assert errors == sorted(errors, reverse=True)
+    if few.pieces:
+        assert min(error for error, n in every if n < few.pieces) > 0.2 * abs(target) or few.pieces > 2
+
+
+def test_the_published_split_on_holes():
+    # the example of hsbalance, proven by branch and bound
+    target = 0.2437 * np.exp(0.937j)
+    for n, error, pieces in ((20, 0.005829541398759976, 6), (36, 0.0002441627517601361, 13)):
+        found = split(target, from_list(equal_holes(n), [0.09]))
+        assert (found.relative_error, found.pieces) == (pytest.approx(error, rel=1e-6), pieces)
+    # the farthest sum along a row was once lost to rounding
+    holes = from_list(equal_holes(5), [0.015, 0.019])
+    weight = 0.010743398576858063 * np.exp(1j * np.radians(318))
+    assert abs(split(weight, holes).error) == pytest.approx(
+        min(everything(weight, holes, None))[0], abs=1e-10
+    )
+
+
+def test_regular_holes_beat_every_random_choice():
+    target, holes = 0.035 * np.exp(2j), from_list(equal_holes(24), [0.01, 0.02])
+    found = split(target, holes)
+    tried = np.random.default_rng(1).choice([0.0, 0.01, 0.02], (200_000, 24)) @ np.exp(1j * holes.angles)
+    assert abs(found.error) <= np.abs(tried - target).min()
+    assert split(0.02, from_list(equal_holes(36), [0.01, 0.02])).in_holes(GRAMS) == ["20 g in hole 1 (0°)"]
+    assert split(0.0, from_list(equal_holes(36), [0.01])).pieces == 0
+
+
+def test_fewer_pieces_stand_below_what_is_proposed():
+    few = split(
+        0.0109 * np.exp(0.1j), from_list(equal_holes(12), [0.001, 0.002, 0.005], per_hole=2), good_enough=0.2
+    )
+    assert few.pieces == 2
+    assert few.relative_error <= 0.2
+    assert few.mounting.amounts.sum() <= 1.5 * 0.0115
+    (one,) = few.fewer
+    assert (one.pieces, one.relative_error > 0.5) == (1, True)
+    text = few.answer(GRAMS).brief()
+    assert text.startswith("Mount 2 pieces: 10 g")
+    assert "With fewer pieces:\n  1: error 55 %: 5 g in hole 1 (0°)" in text
+    document = few.to_dict(GRAMS)
+    assert document["number_of_pieces"] == 2
+    assert [one["number_of_pieces"] for one in document["fewer_pieces"]] == [1]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_free_amounts_in_steps_equal_trying_everything(seed):
+    rng = np.random.default_rng(seed)
+    step, H = 0.5, int(rng.integers(2, 7))
+    angles = np.sort(rng.uniform(0, 2 * np.pi, H))
+    limit = float(rng.uniform(2, 5)) if seed % 2 else np.inf
+    holes = from_list(angles, step=step, max_weight=limit)
+    target = complex(rng.normal(), rng.normal()) * 3
+    multiples, best = np.arange(0, 61) * step, np.inf
+    for g, h in [(k, (k + 1) % H) for k in range(H)]:
+        if np.mod(angles[h] - angles[g], 2 * np.pi) <= 2 * np.pi / 3 + 1e-6:
+            vectors = multiples[:, None] * np.exp(1j * angles[g]) + multiples * np.exp(1j * angles[h])
+        else:
+            vectors = multiples[:, None] * np.exp(1j * angles[[g, h]])
+        best = min(best, np.abs(vectors[holes.allows(vectors)] - target).min())
+    assert abs(split(target, holes).error) == pytest.approx(best, abs=1e-9)
+
+
+def test_free_amounts_fill_the_sector_between_neighbours():
+    around = split(3 + 4j, from_list(np.radians([0, 90, 180, 270])))
+    np.testing.assert_allclose(around.mounting.amounts, [3, 4, 0, 0], atol=1e-6)
+    # not all around, or limited: in thousandths of the weight
+    np.testing.assert_allclose(
+        split(3 + 4j, from_list(np.radians([0, 90]))).mounting.amounts, [3, 4], atol=4e-3
+    )
+    limited = split(3 + 4j, from_list(np.radians([0, 90, 200]), max_weight=2.5))
+    assert limited.mounting.vector == pytest.approx(1.5 + 2j, abs=0.02)
+    assert abs(limited.mounting.vector) <= 2.5
+    open_ = split(2 * np.exp(1j * np.radians(120)), from_list(np.radians([0, 75])))
+    assert open_.mounting.vector == pytest.approx(
+        2 * np.cos(np.pi / 4) * np.exp(1j * np.radians(75)), abs=2e-3
+    )
+
+
+def test_what_is_mounted_counts_for_the_largest_weight():
+    # 20 g are there at 0°, the plane may have 15: only something opposite makes it admissible
+    holes = from_list(np.radians([0, 120, 180, 240]), [0.005], taken=[0.02, 0, 0, 0], max_weight=0.015)
+    assert split(0.01, holes).in_holes(GRAMS) == ["5 g in hole 3 (180°)"]
+    for options in ({"pieces": [0.005], "taken": [0.02, 0]}, {"step": 0.005, "taken": [0.02, 0]}):
+        with pytest.raises(ValueError, match="no admissible weight at all"):
+            split(0.01, from_list(np.radians([0, 10]), max_weight=0.015, **options))
+
+
+def test_words_follow_the_angles_of_the_job():
+    against = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
+    holes = from_list(-equal_holes(12), [0.01], per_hole=2)
+    found = split(0.02 * np.exp(-1j * np.radians(120)), holes)
+    assert found.in_holes(against) == ["2 × 10 g in hole 5 (120°)"]
+    document = found.to_dict(against)
+    assert document["holes"][0]["pieces"] == [{"count": 2, "mass": 10.0}]
+    assert document["mounted"] == {"mass": 20.0, "angle_deg": 120.0}
+    (table,) = found.tables(against)
+    (row,) = table.rows
+    cells = dict(zip(table.headings, row, strict=True))
+    assert (cells["hole"], cells["mass"], cells["angle_deg"]) == ("5", 20.0, 120.0)
+
+
+@pytest.mark.parametrize("way", ["radial", "axial"])
+@pytest.mark.parametrize("tip", [60.0, 118.0, 180.0])
+@pytest.mark.parametrize("depth", [0.0008, 0.012, 0.045])
+def test_a_hole_takes_away_what_the_integral_over_its_depth_says(way, tip, depth):
+    drill = Drill(0.008, 0.1, STEEL, way, np.radians(tip))
+    slope = np.tan(np.radians(tip) / 2) if tip < 180 else np.inf
+
+    def area(z):  # the tip is at `depth`, the radius there grows by the tangent of half its angle
+        return np.pi * min(0.004, (depth - z) * slope if np.isfinite(slope) else 0.004) ** 2
+
+    def lever(z):
+        return 0.1 - z if way == "radial" else 0.1
+
+    knee = [max(depth - drill.tip_height, 0.0)]
+    mass = STEEL * quad(area, 0, depth, points=knee, epsabs=0, epsrel=1e-11)[0]
+    moment = STEEL * quad(lambda z: area(z) * lever(z), 0, depth, points=knee, epsabs=0, epsrel=1e-11)[0]
+    np.testing.assert_allclose(drill.removed(depth), (mass, moment), rtol=1e-9)
+    assert drill_holes(moment, drill).values["tip_depth_m"] == pytest.approx(depth, rel=1e-9)
+
+
+def test_a_flat_axial_hole_by_hand():
+    # 10 g at 50 mm with a 10 mm end mill: V = 10e-3/7850, depth V/(π 25e-6)
+    found = drill_holes(0.01 * 0.05, Drill(0.01, 0.05, STEEL, "axial", np.pi))
+    assert found.values["depth_m"] == pytest.approx(0.01 / STEEL / (np.pi * 25e-6), rel=1e-12)
+    assert found.values["mass_of_one_kg"] == pytest.approx(0.01, rel=1e-12)
+    np.testing.assert_allclose(found.angles, [np.pi])
+
+
+@pytest.mark.parametrize("way", ["radial", "axial"])
+def test_a_row_of_holes_sums_exactly_to_the_weight(way):
+    weight = 3.5e-3 * np.exp(1j * np.radians(120))
+    found = drill_holes(weight, Drill(0.008, 0.1, STEEL, way), max_depth=0.012)
+    assert len(found.angles) > 2
+    assert found.values["depth_m"] <= 0.012
+    each = found.values["unbalance_of_one_kg_m"] * np.exp(1j * found.angles)
+    assert -each.sum() == pytest.approx(weight, rel=1e-10)
+    assert np.diff(found.angles) == pytest.approx(1.5 * 0.008 / 0.1)
+    # one hole fewer would be too deep
+    one = Drill(0.008, 0.1, STEEL, way).removed(0.012 + Drill(0.008, 0.1, STEEL).tip_height)[1]
+    n, half = len(found.angles) - 1, 0.06
+    assert one * np.sin(n * half) / np.sin(half) < abs(weight)
+    words = found.sentence(Labels(weight_unit="g_mm", weight_scale=1e6))
+    assert words.startswith(f"Drill {n + 1} holes of diameter 8 mm at ")
+
+
+def test_grinding_stands_opposite():
+    found = grind(3.5e-3j, 0.1)
+    assert found.values["mass_kg"] == pytest.approx(0.035)
+    assert found.angles == pytest.approx([1.5 * np.pi])
+    document = found.to_dict(GRAMS)
+    assert (document["angle_deg"], document["target"]) == (270.0, {"mass": 35.0, "angle_deg": 90.0})
+
+
+@each_of(
+    ("call", "words"),
+    [
+        (lambda: Drill(0.008, 0.0, STEEL), "radius must be positive"),
+        (lambda: Drill(-0.008, 0.1, STEEL), "diameter must be positive"),
+        (lambda: Drill(0.3, 0.1, STEEL), "does not fit"),
+        (lambda: Drill(0.008, 0.1, STEEL, "axial", 4.0), "tip angle"),
+        (lambda: drill_holes(1.0, Drill(0.008, 0.1, STEEL)), "cannot be taken away"),
+        (lambda: drill_holes(3e-2, Drill(0.008, 0.1, STEEL), max_depth=0.001), "larger drill or depth"),
+        (lambda: drill_holes(np.nan, Drill(0.008, 0.1, STEEL)), "finite"),
+        (lambda: grind(1.0, 0.0), "radius must be positive"),
+        (lambda: split(np.nan, from_list([0.0, 1.0], [0.01])), "must be finite"),
+        (lambda: split(1.0, from_list([0.0, 1.0], [0.01]), most_pieces=0), "1 or more"),
+        (
+            lambda: split(1.0, from_list([0.0, 1.0], np.arange(1, 12) * 0.01, per_hole=9)),
+            "too many combinations",
+        ),
+        (lambda: combine([]), "no weight"),
+        (lambda: combine([np.nan]), "finite"),
+        (lambda: round_to(1.0, -0.1), "step"),
+        (lambda: round_to(np.inf, 0.1), "finite"),
+        (lambda: rounded(1.0, 0.0, 7.0), "angle"),
+        (lambda: two_positions(0.051, 0.02, 0.03), r"reach from 0\.01 to 0\.05"),
+        (lambda: two_positions(0.01, 0.0, 0.03), "positive"),
+    ],
+)
+def test_what_cannot_be_is_refused(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
+def test_two_masses_make_the_target_in_two_mirrored_ways():
+    rng = np.random.default_rng(7)
+    for _ in range(40):
+        a, b = rng.uniform(0.01, 0.05, 2)
+        target = rng.uniform(abs(a - b), a + b) * np.exp(1j * rng.uniform(0, 2 * np.pi))
+        found = two_positions(target, a, b)
+        np.testing.assert_allclose(found.weights().sum(axis=1), [target, target], rtol=1e-9)
+        mirrored = np.exp(1j * (2 * np.angle(target) - found.angles[0]))
+        np.testing.assert_allclose(np.exp(1j * found.angles[1]), mirrored, atol=1e-9)
+        assert ((found.angles >= 0) & (found.angles < 2 * np.pi)).all()
+    np.testing.assert_allclose(two_positions(0.05j, 0.02, 0.03).angles, np.full((2, 2), np.pi / 2), atol=1e-7)
+    np.testing.assert_allclose(two_positions(0.0, 0.02, 0.02).weights().sum(axis=1), 0, atol=1e-15)
+
+
+def test_combining_and_trimming_are_inverse():
+    weights = [3 + 1j, -2j, 0.5]
+    assert combine(weights) == 3.5 - 1j
+    assert combine([*weights, trim(1 + 1j, weights)]) == pytest.approx(1 + 1j)
+    assert combine(np.exp(2j * np.pi * np.arange(3) / 3)) == 0
+    assert (trim(2.0, []), trim(2.0, 0.5j)) == (2.0, 2.0 - 0.5j)
+
+
+def test_the_worst_rounding_error_is_the_largest_that_occurs():
+    assert [round_to(34.7, 0.5), round_to(0.34, 0.1), round_to(34.71, 0.1), round_to(1.23, 0.0)] == [
+        34.5,
+        0.3,
+        34.7,
+        1.23,
+    ]
+    found = []
+    for phase in np.random.default_rng(3).uniform(0, 2 * np.pi, 4000):
+        # sizes a hair inside the middle between two marks are the worst
+        one = rounded((3.0 + 0.4999) * np.exp(1j * phase), 1.0, np.radians(10))
+        assert abs(one.error) <= one.worst * (1 + 1e-12)
+        found.append(abs(one.error) / one.worst)
+    assert max(found) > 0.95
+    assert rounded(3.5, 1.0, np.radians(10)).worst == pytest.approx(
+        abs(4.0 * np.exp(1j * np.radians(5)) - 3.5)
+    )
+    assert rounded(2.3 + 1j).error == 0

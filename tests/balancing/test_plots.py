@@ -1,0 +1,189 @@
+"""Pictures: what is drawn stands where it is mounted, as large as it is; angles run as stated."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from balancing_data import bruel_kjaer, synthetic
+from documents import check_hygiene
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from balancing import Labels, Limits, ReadingErrors, correct, estimate_influence, trial_from_force
+from balancing.holes import equal_holes, from_list, mounting
+from balancing.plots import (
+    correction_figure,
+    draw_correction,
+    draw_disc,
+    draw_readings,
+    mounted_discs,
+    trial_figure,
+    type_figure,
+)
+from balancing.plots.correction import weights
+
+GRAMS = Labels(weight_unit="g", weight_scale=1e3)
+AGAINST = replace(GRAMS, angles="against rotation")
+HOLES = from_list(equal_holes(8), [0.01, 0.04], taken=[0.02, *[0.0] * 7])
+COUNTS = np.zeros((8, 2), dtype=int)
+COUNTS[2, 0] = COUNTS[5, 1] = 1
+MOUNTED = mounting(HOLES, COUNTS)
+
+
+def disc(*of, **options):
+    return draw_disc(Figure().add_subplot(), "A", *of, **options)
+
+
+def texts(ax):
+    return {t.get_text(): complex(*t.get_position()) for t in ax.texts}
+
+
+def circles(ax, colour):
+    """Centres and radii of the filled circles of one grey."""
+    drawn = [p for p in ax.patches if isinstance(p, Circle) and p.get_fill()]
+    grey = [p for p in drawn if np.isclose(p.get_facecolor()[0], colour)]
+    return [(complex(*p.center), p.radius) for p in grey]
+
+
+def test_weights_stand_in_their_holes_with_area_by_mass():
+    ax = disc(HOLES, MOUNTED, GRAMS, weight=0.03j)
+    (small, r1), (large, r2) = circles(ax, 0.2)
+    assert np.degrees(np.angle([small, large])) == pytest.approx([90, -135])
+    assert (r2 / r1) ** 2 == pytest.approx(4)
+    ((taken, r3),) = circles(ax, 0.85)
+    assert np.angle(taken) == pytest.approx(0)
+    assert (r3 / r2) ** 2 == pytest.approx(0.5)
+    assert {*"12345678", "3: 10", "6: 40"} <= set(texts(ax))
+    assert ax.get_title() == "A: add, g"
+
+
+def test_removal_stands_opposite():
+    ax = disc(HOLES, MOUNTED, GRAMS, remove=True, weight=0.03j)
+    crossed = [p for p in ax.patches if p.get_hatch() == "xxx"]
+    assert sorted(round(np.degrees(np.angle(complex(*p.center)))) for p in crossed) == [-90, 45]
+    assert {"3: −10", "6: −40"} <= set(texts(ax))
+    assert ax.get_title() == "A: take away, g"
+    assert "like adding, wanted" in " ".join(texts(ax))
+
+
+def test_angles_are_written_as_the_job_counts_them():
+    same, mirrored = (texts(disc(HOLES, MOUNTED, labels)) for labels in (GRAMS, AGAINST))
+    assert same["60°"] == pytest.approx(np.conj(mirrored["60°"]))
+    assert same["60°"].imag > 0.9
+    assert "90°" not in same, "a weight stands there, and its text"
+    assert same["3"] == pytest.approx(mirrored["3"])
+    behind = texts(disc(HOLES, MOUNTED, replace(GRAMS, rotation="clockwise", view="free end")))
+    assert behind["3"] == pytest.approx(np.conj(same["3"]))
+    assert {"↺ rotation", "↻ rotation"} <= set(same) | set(behind)
+
+
+def test_tolerance_is_a_circle_around_the_wanted_weight_in_its_scale():
+    ax = disc(HOLES, MOUNTED, GRAMS, weight=0.08j, tolerance=0.02)
+    (ring,) = [p for p in ax.patches if isinstance(p, Circle) and not p.get_fill()]
+    assert complex(*ring.center) == pytest.approx(4j * ring.radius)
+
+
+def test_all_planes_side_by_side():
+    correction = SimpleNamespace(
+        planes=("left", "right", "fan", "coupling"),
+        weights=np.array([0.03j, 0.02, -0.01, 0]),
+        labels=AGAINST,
+        limits=None,
+        remove=("right",),
+    )
+    pieces = SimpleNamespace(mountings=(MOUNTED, None, None, None))
+    every = SimpleNamespace(correction=correction, holes=(HOLES, None, None, None), discrete=pieces)
+    figure = mounted_discs(every)
+    assert [ax.get_title() for ax in figure.axes] == [
+        "left: add, g",
+        "right: take away, g",
+        "fan: add, g",
+        "coupling: add, g",
+    ]
+    assert "−20 g\n180.0°" in texts(figure.axes[1])
+    assert "against the rotation" in figure.get_suptitle()
+    check_hygiene(figure)
+
+
+def test_a_correction_is_drawn_on_any_axes_and_changes_no_settings():
+    before = dict(mpl.rcParams)
+    c = correct(estimate_influence(bruel_kjaer()))
+    polar, bars = Figure().add_subplot(projection="polar"), Figure().add_subplot()
+    assert draw_correction(c, polar) is polar
+    assert polar.get_legend().get_texts()[0].get_text().startswith("A: 2.951")
+    assert draw_correction(c, bars) is bars
+    assert len(bars.patches) == 2
+    assert dict(mpl.rcParams) == before
+    with pytest.raises(ValueError, match="projection='polar'"):
+        weights(c, bars)
+
+
+@pytest.mark.parametrize(("angles", "direction"), [("with rotation", 1), ("against rotation", -1)])
+def test_angles_of_the_weights_run_as_the_job_counts_them(angles, direction):
+    ax = weights(
+        correct(estimate_influence(bruel_kjaer(labels=Labels("um_pp", 1e6, "g", 1e3, "lag", angles))))
+    )
+    assert ax.get_theta_direction() == direction
+    tip = next(line for line in ax.lines if line.get_marker() == "o")
+    assert np.degrees(tip.get_xdata()[-1]) % 360 == pytest.approx(direction * 50.19 % 360, abs=0.01)
+
+
+def test_limits_arcs_and_many_readings():
+    trials, _, _ = synthetic(
+        np.random.default_rng(2), planes=3, sensors=9, speeds=14, errors=ReadingErrors(0.02, np.deg2rad(1))
+    )
+    influence = estimate_influence(trials)
+    most, residual = np.array([1e3, np.inf, np.inf]), np.full((14, 9), np.inf)
+    limits = Limits(max_weight=most, residual=residual, forbidden=((), ((0.5, 1.0),), ()))
+    figure = correction_figure(correct(influence, limits=limits))
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"closed lines: 95 % regions", "dashed circles: largest weights"} < set(names)
+    assert "thick arcs: nothing can be mounted" in names
+    [arc] = [line for line in figure.axes[0].lines if line.get_linewidth() == 5 and len(line.get_xdata())]
+    assert np.ptp(arc.get_xdata()) == pytest.approx(1.0)
+    # of 14 speeds every other has its name, the first among them
+    [upper] = figure.axes[1].child_axes
+    speeds = [text.get_text() for text in upper.get_xticklabels()]
+    assert speeds == [f"{v * 30 / np.pi:.6g}" for v in trials.speeds[::2]]
+
+
+def test_readings_of_the_runs_and_trial_weights():
+    trials = bruel_kjaer()
+    one = replace(trials, readings=trials.readings[..., :1], sensors=trials.sensors[:1])
+    covariance = np.broadcast_to(1e-16 * np.eye(2), (len(one.runs), 1, 1, 2, 2))
+    ax = draw_readings(one, covariance, one.runs[0])
+    changes = [line for line in ax.lines if line.get_linestyle() == ":"]
+    assert len(changes) == len(one.runs)
+    assert changes[-1].get_ydata()[-1] == pytest.approx(
+        np.abs(one.mean[-1, 0, 0]) * one.labels.vibration_scale
+    )
+    weight = trial_from_force("A", 300.0, 0.2, 1e4, labels=GRAMS)
+    turned = [replace(weight, angle=angle, angle_reach=0.5) for angle in (0.3, 2.0)]
+    figure = trial_figure(turned)
+    check_hygiene(figure)
+    tips = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
+    assert [line.get_xdata()[-1] for line in tips] == pytest.approx([0.3, 2.0])
+    assert figure.axes[0].get_rmax() >= weight.amount * 1e3
+
+
+def test_a_type_of_machines_shows_four_sensors_and_planes():
+    rng = np.random.default_rng(1)
+    mean = rng.normal(size=(1, 5, 2)) + 2j
+    effects = SimpleNamespace(groups=np.zeros(3), new_group=0.01 * np.eye(20), within=0.01 * np.eye(20))
+    kind = SimpleNamespace(
+        mean=mean,
+        effects=effects,
+        coefficients=lambda groups: np.stack([mean * f for f in (0.9, 1.0, 1.1)]),
+        widening=1.0,
+        sensors=tuple("abcde"),
+        planes=("P", "Q"),
+        speeds=np.array([100.0]),
+        odd=[(SimpleNamespace(machine="M7", W=1.5 * mean), None)],
+    )
+    figure = type_figure(kind)
+    assert [ax.get_title() for ax in figure.axes[:5:4]] == ["P on a", "Q on a"]
+    dots = next(line for line in figure.axes[0].lines if line.get_marker() == ".")
+    assert dots.get_xdata() == pytest.approx([-10, 0, 10])
+    assert figure.axes[0].texts[0].get_text() == "M7"

@@ -1,0 +1,221 @@
+"""Pass, fail, not decidable: regions against closed forms, residual unbalance against what is mounted."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from balancing_data import complex_normal, stored, synthetic
+
+from balancing import (
+    Labels,
+    Limits,
+    ReadingErrors,
+    correct,
+    estimate_influence,
+    verdict_of_check,
+    verdict_of_prediction,
+)
+from balancing.iso21940 import tolerance
+from balancing.regions import NORMAL_RADIUS as RADIUS
+from balancing.regions import Region
+from balancing.verdict import judge, judge_unbalance
+
+ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
+
+
+def rigid(limit, **options):
+    """A tolerance of `limit` kg·m in each of the planes A and B."""
+    return tolerance(
+        2 * limit * 100 * pi / 2.5e-3, 100 * pi, "G2.5", planes={"A": None, "B": None}, **options
+    )
+
+
+def one(value, limit, covariance):
+    return judge(
+        "sensor", "s", limit, Region(np.array([value], dtype=complex), np.asarray(covariance), RADIUS)
+    )
+
+
+def test_a_round_region():
+    row = one(3 + 4j, 5.0, 0.04 * np.eye(2))
+    assert (row.low, row.high) == pytest.approx((5 - 0.2 * RADIUS, 5 + 0.2 * RADIUS), rel=1e-6)
+    words = {5.49: "pass", 5.48: "not decidable", 4.50: "fail", 4.52: "not decidable"}
+    assert {limit: one(3 + 4j, limit, 0.04 * np.eye(2)).verdict for limit in words} == words
+
+
+def test_an_oblong_region():
+    # on the axis: 10 ± 0.1 ρ along, 3 ρ across: the farthest points are off the axis
+    row = one(10.0, 20.0, np.diag([0.01, 9.0]))
+    a, b = 0.1 * RADIUS, 3 * RADIUS
+    cos = -10 * a / (a**2 - b**2)  # stationary point of |10 + a cos t + i b sin t|²
+    assert row.high == pytest.approx(np.hypot(10 + a * cos, b * np.sqrt(1 - cos**2)), rel=1e-5)
+    assert row.low == pytest.approx(10 - a, rel=1e-6)
+    assert one(0.1, 1.0, np.eye(2)).low == 0.0
+
+
+def test_unknown_errors_and_no_errors():
+    assert one(1.0, 2.0, np.full((2, 2), np.nan)).verdict == "not decidable"
+    assert one(1.0, 2.0, np.zeros((2, 2))).verdict == "pass"
+    assert one(1.0, 0.9, np.zeros((2, 2))).verdict == "fail"
+    with pytest.raises(ValueError, match="limit of sensor 's' must be"):
+        one(1.0, np.nan, np.eye(2))
+
+
+def test_planes_bearings_and_radii():
+    whole = tolerance(100, 300, "G2.5", planes={"A": 0.25, "B": 0.75}, bearings=(0, 1), centre=0.5)
+    u = whole.total * np.array([0.6, -0.2])  # A over its half, but together below at the bearings
+    exact = np.tile(u, (400, 1)).astype(complex)
+    rows = judge_unbalance(u / [0.2, 0.4], exact / [0.2, 0.4], whole, ("A", "B"), radii={"A": 0.2, "B": 0.4})
+    words = [(r.kind, r.name, r.verdict) for r in rows]
+    assert words == [
+        ("plane", "A", "fail"),
+        ("plane", "B", "pass"),
+        ("bearing", "A", "pass"),
+        ("bearing", "B", "pass"),
+    ]
+    # 0.75·0.6 − 0.25·0.2 = 0.4, 0.25·0.6 − 0.75·0.2 = 0
+    assert [r.size / whole.total for r in rows[2:]] == pytest.approx([0.4, 0.0], abs=1e-12)
+    assert rows[0].limit == pytest.approx(whole.total / 2 / 0.2)
+    turned = judge_unbalance(u[::-1], exact[:, ::-1], whole, ("B", "A"))
+    assert [r.size / whole.total for r in turned[2:]] == pytest.approx([0.4, 0.0], abs=1e-12)
+    # errors of A alone: at bearing A 0.75 of them
+    rng = np.random.default_rng(0)
+    some = exact + 0.1 * whole.total * np.outer(complex_normal(rng, 4000)[:400], [1, 0])
+    assert judge_unbalance(u, some, whole, ("A", "B"))[2].high / whole.total == pytest.approx(
+        0.4 + 0.075 * RADIUS, rel=0.05
+    )
+    none = np.zeros((0, 2), dtype=complex)
+    with pytest.raises(ValueError, match="name the same planes in both"):
+        judge_unbalance(u, none, whole, ("A", "C"))
+    with pytest.raises(ValueError, match="radius of plane 'B'"):
+        judge_unbalance(u, none, whole, ("A", "B"), radii={"A": 0.2})
+
+
+@pytest.fixture
+def job():
+    made, W, Y0 = synthetic(np.random.default_rng(5), errors=ERRORS)
+    return made, W, Y0, estimate_influence(made)
+
+
+def check_run(made, W, residual, errors=ERRORS):
+    readings = np.einsum("scp,p->sc", W, residual)[None]
+    return replace(
+        made, runs=("check",), readings=readings, weights=np.zeros((1, 0)), planes=(), errors=errors
+    )
+
+
+def test_residual_unbalance_of_a_check_run(job):
+    made, W, _, influence = job
+    residual = np.array([2e-4, 1e-4j])
+    check = check_run(made, W, residual)
+    found = verdict_of_check(influence, check, tolerance=rigid(1.5e-4))
+    assert [r.value for r in found.rows] == pytest.approx(residual, rel=1e-9)
+    assert [r.verdict for r in found.rows] == ["fail", "pass"]
+    assert found.overall == "fail"
+    assert verdict_of_check(influence, check, tolerance=rigid(3e-4)).overall == "pass"
+    close = verdict_of_check(influence, check, tolerance=rigid(2e-4))
+    assert close.rows[0].verdict == "not decidable"
+    assert close.overall == "not decidable"
+    assert "lies on both sides" in close.answer.brief()
+    # what was mounted does not matter
+    mounted = replace(check, planes=made.planes, weights=np.array([[1e-3, 2e-3]]))
+    again = verdict_of_check(influence, mounted, tolerance=rigid(2e-4))
+    assert again.to_dict() == close.to_dict()
+    unknown = verdict_of_check(stored(influence.W, speeds=influence.speeds), check, tolerance=rigid(1))
+    assert "errors of the influence coefficients are not known" in unknown.warnings[0]
+
+
+def test_vibration_that_the_planes_do_not_explain_is_named(job):
+    made, W, Y0, influence = job
+    check = check_run(made, W, np.array([2e-4, 1e-4j]))
+    assert verdict_of_check(influence, check, tolerance=rigid(1e-3)).warnings == ()
+    more = replace(check, readings=check.readings + 0.3 * Y0)
+    found = verdict_of_check(influence, more, tolerance=rigid(1e-3))
+    assert "does not explain the readings within their errors" in found.warnings[0]
+    assert "Warning: unbalance in these planes" in found.answer.brief()
+    # one plane alone does not explain what two leave
+    one = tolerance(1, 100, "G1", planes={"A": None})
+    assert len(verdict_of_check(influence, check, tolerance=one).warnings) == 1
+
+
+def test_readings_against_limits(job):
+    made, W, _, influence = job
+    residual = np.array([2e-4, 1e-4j])
+    check = check_run(made, W, residual)
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 5.0, "s3": 1e-3})
+    found = verdict_of_check(influence, check, limits=limits)
+    assert [(r.name, r.speed) for r in found.rows] == [(s, v) for v in made.speeds for s in ("s1", "s3")]
+    for row in found.rows:
+        s, c = list(made.speeds).index(row.speed), made.sensors.index(row.name)
+        size = abs(W[s, c] @ residual)
+        assert row.size == pytest.approx(size)
+        assert row.high == pytest.approx(size * (1 + 0.01 * RADIUS), rel=1e-3)
+        assert row.verdict == ("pass" if size * (1 + 0.01 * RADIUS) < row.limit else "fail")
+    assert {row.verdict for row in found.rows} == {"pass", "fail"}
+    with pytest.raises(ValueError, match="nothing to judge by"):
+        verdict_of_check(influence, check)
+
+
+def test_part_of_the_sensors_and_speeds(job):
+    made, W, _, influence = job
+    residual = np.array([2e-4, 1e-4j])
+    whole = check_run(made, W, residual)
+    part = replace(
+        whole, sensors=("s2", "s0"), speeds=made.speeds[1:2], readings=whole.readings[:, :, 1:2, [2, 0]]
+    )
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s2": 1.0})
+    found = verdict_of_check(influence, part, tolerance=rigid(3e-4), limits=limits)
+    assert [r.value for r in found.rows[:2]] == pytest.approx(residual, rel=1e-9)
+    assert [r.name for r in found.rows] == ["A", "B", "s2"]
+    with pytest.raises(ValueError, match="no coefficients of sensor 'far'"):
+        verdict_of_check(influence, replace(part, sensors=("s2", "far")), limits=limits)
+
+
+def test_prediction(job):
+    made, W, Y0, influence = job
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 5.0})
+    c = correct(influence, limits=limits)
+    wide = 10 * np.sqrt(np.trace(c.covariance))
+    found = verdict_of_prediction(c, tolerance=rigid(wide))
+    assert [r.size for r in found.rows[:2]] == [0.0, 0.0]
+    assert found.rows[0].high == pytest.approx(
+        RADIUS * np.sqrt(np.linalg.eigvalsh(c.covariance[:2, :2])[-1]), rel=0.1
+    )
+    assert [r.kind for r in found.rows] == ["plane"] * 2 + ["sensor"] * 3
+    assert found.rows[0].verdict == "pass"
+    assert verdict_of_prediction(c, tolerance=rigid(wide / 1e3)).rows[0].verdict == "not decidable"
+    # pieces 5 tolerances off
+    mounted = c.weights + np.array([5 * wide, 0])
+    off = verdict_of_prediction(c, tolerance=rigid(wide), mounted=mounted, after=Y0 + W @ mounted)
+    assert off.rows[0].verdict == "fail"
+    assert off.rows[2].value == pytest.approx((Y0 + W @ mounted)[0, 1])
+
+
+def test_words_and_table(job):
+    made, W, _, influence = job
+    check = check_run(made, W, np.array([2e-4, 1e-4j]))
+    labels = Labels(vibration_unit="um", vibration_scale=1.0, weight_unit="g", weight_scale=1e3)
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 0.2})
+    found = verdict_of_check(
+        replace(influence, labels=labels),
+        replace(check, labels=labels),
+        tolerance=rigid(1.5e-4),
+        limits=limits,
+    )
+    rows = found.to_dict()["rows"]
+    assert rows[0]["size"] == pytest.approx(0.2)
+    assert rows[0]["limit"] == pytest.approx(0.15)
+    assert rows[0]["unit"] == "g"
+    assert rows[1]["angle_deg"] == pytest.approx(90)
+    assert rows[0]["low"] < rows[0]["size"] < rows[0]["high"]
+    text = found.answer.brief()
+    assert text.startswith("Fail (check run check): 4 of 5 limits not kept.")
+    assert "plane A: 0.2 g" in text
+    assert max(len(line) for line in text.splitlines()) <= 100
+    whole = found.answer.whole()
+    assert found.answer.tables == ()  # with five limits no other is left
+    assert all(whole.count(f"  {row['kind']} {row['name']}") >= 1 for row in rows)
+    assert whole.count(": pass\n") + whole.count(": fail\n") + whole.count(": not decidable") >= len(rows) - 1
+    frame = found.to_frame()
+    assert list(frame.verdict[:2]) == ["fail", "pass"]

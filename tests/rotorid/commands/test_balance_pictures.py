@@ -1,0 +1,112 @@
+"""Pictures of balancing: what is drawn is what the result says, with units and letters that can be read."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from documents import check_hygiene
+
+from rotorid.commands.balance import BalanceOptions, balance
+from rotorid.commands.tolerance import ToleranceOptions, tolerance
+from rotorid.commands.unbalance import UnbalanceOptions, unbalance
+from rotorid.samples import sample_data
+
+TURBO, MODEL = sample_data() / "turbo_job", sample_data() / "model_job" / "job.toml"
+
+
+@pytest.fixture(scope="module")
+def turbo():
+    found = balance(TURBO / "job.toml")
+    return found, found.figure()
+
+
+@pytest.fixture(scope="module")
+def checked():
+    found = balance(TURBO / "checked.toml")
+    return found, found.figure()
+
+
+def named(ax, label):
+    """The only line of this name."""
+    [line] = [line for line in ax.lines if line.get_label() == label]
+    return line
+
+
+def test_corrections_before_and_after_have_one_legend_and_units_in_words(turbo):
+    found, figure = turbo
+    check_hygiene(figure)
+    *_, before, closer = figure.axes
+    assert before.get_ylabel() == "vibration, µm pp"
+    # linear: what is left needs a scale of its own, and has it
+    for ax in (before, closer):
+        assert ax.get_yscale() == "linear"
+        assert ax.get_ylim()[0] == 0
+    assert closer.get_ylim()[1] < 0.1 * before.get_ylim()[1]
+    result = found.result
+    sizes = np.abs(result.before).ravel() * 2e6
+    assert [bar.get_height() for bar in before.patches] == pytest.approx(sizes)
+    for ax in (before, closer):
+        dots = named(ax, "predicted, with 95 % of a check run")
+        assert dots.get_ydata() == pytest.approx(np.abs(result.after).ravel() * 2e6)
+        band = np.array(ax.collections[0].get_segments())[:, :, 1]
+        reach = result.within.ravel()
+        assert band[:, 1] == pytest.approx(dots.get_ydata() + reach)
+        assert band[:, 0] == pytest.approx(np.maximum(dots.get_ydata() - reach, 0))
+        assert band.max() < ax.get_ylim()[1], "the whole band is in the picture"
+
+
+def test_a_checked_job_draws_what_was_achieved(checked):
+    found, figure = checked
+    check_hygiene(figure)
+    check = found.check
+    for ax in figure.axes[1:]:
+        stars = named(ax, "achieved")
+        dots = named(ax, "predicted, with 95 % of a check run")
+        assert stars.get_marker() == "*"
+        assert stars.get_ydata() == pytest.approx(np.abs(check.achieved).ravel() * 2e6)
+        assert dots.get_ydata() == pytest.approx(np.abs(check.predicted).ravel() * 2e6)
+        assert (stars.get_xdata() - dots.get_xdata()).min() > 0.3, "one does not hide the other"
+
+
+def test_an_undecided_residual_is_hollow():
+    options = BalanceOptions(planes="left,right", grade="G1", rotor_mass="20kg", service_speed="9000rpm")
+    found = balance(TURBO / "job.toml", options)
+    words = [row.verdict for row in found.verdict.rows if row.kind == "plane"]
+    assert "not decidable" in words
+    figure = found.figure()
+    check_hygiene(figure)
+    drawn = [line for line in figure.axes[1].lines if line.get_label() == "residual unbalance"]
+    for word, line in zip(words, drawn, strict=True):
+        assert (line.get_mfc() == "white") == (word == "not decidable")
+
+
+def test_permissible_unbalance_along_the_shaft():
+    options = ToleranceOptions(
+        mass="500kg",
+        speed="3000rpm",
+        grade="G2.5",
+        planes="left=100mm,right=600mm",
+        bearings="0mm,700mm",
+        centre="320mm",
+    )
+    figure = tolerance(options).figure()
+    check_hygiene(figure)
+    [ax] = figure.axes
+    assert [bar.get_height() for bar in ax.patches] == pytest.approx([2160, 2228, 1751, 1819], rel=1e-3)
+
+
+def test_unbalance_is_a_vector_at_each_station():
+    found = unbalance(MODEL, UnbalanceOptions("6,12,19", model_error=2.0))
+    figure = found.figure()
+    check_hygiene(figure)
+    [ax] = figure.axes
+    assert ax.get_ylabel() == "unbalance, g·mm"
+    assert ax.get_aspect() == 1
+    arrows = ax.collections[0]
+    assert pytest.approx(found.found.unbalance * 1e6) == arrows.U + 1j * arrows.V
+    edges = [line for line in ax.lines if line.get_color() == "black"]
+    assert len(edges) == 3
+    tip = arrows.X[0] + arrows.U[0] + 1j * arrows.V[0]
+    reach = np.abs(edges[0].get_xdata() + 1j * edges[0].get_ydata() - tip)
+    std = found.found.std[0] * 1e6
+    assert 1.5 * std < reach.min() <= reach.max() < 3.5 * std

@@ -1,0 +1,67 @@
+"""`rotorid.commands.trial_weight`: from Python as from the command line."""
+
+import math
+
+import pytest
+from documents import same
+
+from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+
+RPM3000 = 100 * math.pi
+BK = sample_data() / "bk_two_plane" / "job.toml"
+
+
+@pytest.mark.parametrize(
+    ("args", "options"),
+    [
+        (
+            "--rotor-mass 500kg --carried-by 2 --speed 3000rpm --radius 200mm --fraction 8 --max-mass 30g",
+            {"rotor_mass": 500, "carried_by": 2, "speed": RPM3000, "radius": 0.2, "fraction": 8}
+            | {"max_mass": 0.03},
+        ),
+        (
+            "--bearing-load 9kN --speed 50Hz --radius 8in --reading-phase 120 --lag below "
+            "--measures velocity --sensor-angle 30 --key-phasor -10 --phase lag --unit oz",
+            {"bearing_load": 9e3, "speed": RPM3000, "radius": 0.2032, "reading_phase": 120, "lag": "below"}
+            | {"measures": "velocity", "sensor_angle": 30, "key_phasor": -10, "phase": "lag", "unit": "oz"},
+        ),
+        (
+            "--rotor-mass 500kg --speed 3000rpm --radius 0.2m --reading-phase 9 --critical 40Hz "
+            "--damping 0.1",
+            {"rotor_mass": 500.0, "speed": RPM3000, "radius": 0.2, "reading_phase": 9}
+            | {"critical": 80 * math.pi, "damping": 0.1},
+        ),
+    ],
+)
+def test_from_the_load(cli, args, options):
+    printed = cli("trial-weight", *args.split(), "--json").json
+    found = trial_weight(None, TrialWeightOptions(**options))
+    same(found.document, printed)
+    assert set(printed["provenance"]["options"]) == set(found.provenance["options"]) == set(options)
+
+
+def test_from_a_job(cli):
+    args = (
+        "--plane",
+        "1",
+        "--mass",
+        "2.5g",
+        "--max-mass",
+        "1=3g",
+        "--radius",
+        "100mm",
+        "--rotor-mass",
+        "9kg",
+    )
+    printed = cli("trial-weight", BK, *args, "--share", "30", "--angles", "with rotation", "--json").json
+    options = {"plane": ["1"], "mass": 2.5e-3, "radius": 0.1, "rotor_mass": 9, "share": 30}
+    found = trial_weight(BK, TrialWeightOptions(max_mass="1=3g", angles="with rotation", **options))
+    same(found.document, printed)
+    assert found.provenance["inputs"] == printed["provenance"]["inputs"]
+    assert set(printed["provenance"]["options"]) == {*options, "max_mass", "angles"}
+    job = read_job(BK)
+    same(trial_weight(job).document, trial_weight(BK).document)
+    with pytest.raises(ValueError, match="stated where it is read"):
+        trial_weight(job, TrialWeightOptions(phase="lag"))
