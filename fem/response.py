@@ -561,7 +561,8 @@ class Receptance:
     def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, ComplexArray]]:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, a, b, S)."""
         stiffness = supported(self.rotor, speeds).stiffness
-        step = 256 if self.unknowns.size <= 64 else 64  # to stay in the cache of the processor
+        # as many as stay in the cache of the processor
+        step = max(64, 32_768 // (self.unknowns.size * self.loads.shape[1]))
         for start in range(0, speeds.size, step):
             part = slice(start, start + step)
             omega = speeds[part]
