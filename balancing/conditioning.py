@@ -201,7 +201,9 @@ def check_stack(
         raise ValueError(f"the vibration must have shape {K.shape[:1]}; got {y.shape}")
     if not (np.isfinite(K).all() and np.isfinite(y).all()):
         raise ValueError("influence coefficients and vibration must be finite; found NaN or infinity")
-    w = np.ones(len(K)) if row_weights is None else np.asarray(row_weights, dtype=np.float64)
+    if row_weights is None:
+        return K, y, np.ones(len(K))
+    w = np.asarray(row_weights, dtype=np.float64)
     if w.shape != y.shape or not np.isfinite(w).all() or (w < 0).any() or not w.any():
         raise ValueError(f"the row weights must be {len(K)} finite numbers ≥ 0, not all zero")
     return K, y, w

@@ -163,6 +163,9 @@ def stands_in(weight: complex, sectors: Sectors) -> bool:
 
 def within(bounds: Bounds, weights: ComplexArray) -> bool:
     """Whether weights are within every limit."""
+    anywhere = all(sectors is None for sectors in bounds.sectors)
+    if anywhere and bounds.max_weight.min() == bounds.residual.min() == np.inf:
+        return True
     return bool(
         (np.abs(weights) <= bounds.max_weight).all()
         and (np.abs(bounds.Y + bounds.W @ weights) <= bounds.residual).all()

@@ -234,8 +234,8 @@ def solve(  # noqa: PLR0913
         raise ValueError(f"{P} planes and {N} readings need as many names")
     bounds = bounds_of(K, y, limits)
     n = 2 * P + 2
-    channels = np.broadcast_to(0.0, (N, n, n)) if channels is None else channels.reshape(N, n, n)
-    columns = np.zeros((0, N, P + 1)) + 0j if columns is None else columns.reshape(-1, N, P + 1)
+    channels = np.zeros((N, n, n)) if channels is None else channels.reshape(N, n, n)
+    columns = np.zeros((0, N, P + 1), complex) if columns is None else columns.reshape(-1, N, P + 1)
     job = Job(method, K, y, w, bounds, planes, explained)
     if strength is not None:
         if method != "least-squares" or limits is not None or not 0 < strength < np.inf:
