@@ -164,7 +164,7 @@ def stands_in(weight: complex, sectors: Sectors) -> bool:
 def within(bounds: Bounds, weights: ComplexArray) -> bool:
     """Whether weights are within every limit."""
     anywhere = all(sectors is None for sectors in bounds.sectors)
-    if anywhere and bounds.max_weight.min() == bounds.residual.min() == np.inf:
+    if anywhere and min(bounds.max_weight.min(initial=np.inf), bounds.residual.min()) == np.inf:
         return True
     return bool(
         (np.abs(weights) <= bounds.max_weight).all()
