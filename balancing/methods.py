@@ -120,9 +120,6 @@ class Solution:
         return self.model_error == 0
 
 
-Fitted = Solution
-
-
 class Job(NamedTuple):
     """Equations W (N, P), Y (N,), row weights w (N,), bounds and names of planes that may carry a weight.
 
@@ -137,7 +134,7 @@ class Job(NamedTuple):
     planes: Sequence[str]
     explained: Explained | None = None
 
-    def fitted(self, D: ComplexArray, resolve: Resolve, **more: Any) -> Fitted:  # noqa: ANN401
+    def fitted(self, D: ComplexArray, resolve: Resolve, **more: Any) -> Solution:  # noqa: ANN401
         """The result."""
         residual, limit, share = self.Y + self.W @ D, self.bounds.residual, 1 - AT_LIMIT
         left = self.w * np.abs(residual)
@@ -146,10 +143,10 @@ class Job(NamedTuple):
             objective = float(left.max())
             limit = np.minimum(limit, objective / np.maximum(self.w, TINY))
         active = np.abs(D) >= share * self.bounds.max_weight, np.abs(residual) >= share * limit
-        return Fitted(D, residual, self.method, objective, *active, resolve, **more)
+        return Solution(D, residual, self.method, objective, *active, resolve, **more)
 
 
-Solver = Callable[[Job, FloatArray, ComplexArray], Fitted]
+Solver = Callable[[Job, FloatArray, ComplexArray], Solution]
 
 
 def method_words(name: str, *, weighted: bool) -> str:
@@ -264,9 +261,6 @@ def solve(  # noqa: PLR0913
     )
 
 
-fit = solve
-
-
 def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
@@ -276,7 +270,7 @@ def _closed_form(job: Job) -> ComplexArray:
     return np.asarray(weights)
 
 
-def _fit_plain(job: Job, *_: Any) -> Fitted:  # noqa: ANN401
+def _fit_plain(job: Job, *_: Any) -> Solution:  # noqa: ANN401
     D, minmax, first = _closed_form(job), job.method == "minmax", None
 
     def again(bounds: Bounds, target: ComplexArray, tolerance: float = DRAWN) -> Optimum:
@@ -435,7 +429,7 @@ class _Errors(NamedTuple):
         return Q, D
 
 
-def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Fitted:
+def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solution:
     start, on, bounds = _closed_form(job), job.w > 0, job.bounds
     if not len(start):
         return _fit_plain(job)
