@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from balancing.conditioning import UndeterminedError
 from balancing.cones import InfeasibleError
-from balancing.methods import fit, solve
+from balancing.methods import solve
 from balancing.trials import Limits
 from rotorid.regression import stretch, unstretch
 
@@ -47,7 +47,7 @@ def test_least_squares_is_the_closed_form(seed, P, weighted):
     assert not fitted.active_weights.any()
     assert not fitted.active_residuals.any()
     # and the same gain for redrawn data
-    again = fit(W, Y, "least-squares", row_weights=w).resolve(np.stack((W, 2 * W)), np.stack((Y, Y)))
+    again = solve(W, Y, "least-squares", row_weights=w).resolve(np.stack((W, 2 * W)), np.stack((Y, Y)))
     np.testing.assert_allclose(again, np.stack((expected, expected / 2)), rtol=1e-8, atol=1e-10)
 
 
@@ -102,11 +102,11 @@ def test_what_cannot_be():
     with pytest.raises(ValueError, match="the limits are for 3 readings and 1 planes; there are 2 and 1"):
         solve([[1.0], [1.0]], [1.0, 2.0], limits=limits(3, 1, max_weight=1))
     with pytest.raises(ValueError, match="needs errors of the readings"):
-        fit([[1.0], [1.0]], [1.0, 2.0], "weighted")
+        solve([[1.0], [1.0]], [1.0, 2.0], "weighted")
     with pytest.raises(ValueError, match="least squares without limits only"):
-        fit([[1.0]], [1.0], "minmax", strength=0.1)
+        solve([[1.0]], [1.0], "minmax", strength=0.1)
     with pytest.raises(ValueError, match="a strength above 0"):
-        fit([[1.0]], [1.0], "least-squares", strength=0.0)
+        solve([[1.0]], [1.0], "least-squares", strength=0.0)
 
 
 def test_limits_in_conflict_are_explained():
@@ -114,14 +114,14 @@ def test_limits_in_conflict_are_explained():
     with pytest.raises(InfeasibleError, match=r"with at most 1 in plane '1', 'a' .limit 2. stays at 3"):
         solve(np.eye(2), [4.0, 1.0], limits=most, readings=["'a'", "'b'"])
     with pytest.raises(InfeasibleError, match="with at most 1 in plane '1'"):
-        fit(np.eye(2), [4.0, 1.0], "weighted", channels=np.zeros((2, 6, 6)) + np.eye(6), limits=most)
+        solve(np.eye(2), [4.0, 1.0], "weighted", channels=np.zeros((2, 6, 6)) + np.eye(6), limits=most)
 
 
 def test_a_ridge_minimises_what_it_says_and_has_no_interval():
     rng, W, Y = numbers(7)
     W[:, 2] = W[:, 0]
     w, strength = rng.uniform(0.5, 2, 10), 0.1
-    fitted = fit(W, Y, "least-squares", row_weights=w, strength=strength)
+    fitted = solve(W, Y, "least-squares", row_weights=w, strength=strength)
     A = w[:, None] * W
     size = np.linalg.norm(A, axis=0)
     top = np.linalg.svd(A / size, compute_uv=False)[0]
@@ -143,7 +143,7 @@ def test_the_weighted_fit_against_an_independent_optimiser():
     C = root @ np.swapaxes(root, 1, 2)
     e = (root @ rng.standard_normal((6, 6, 1)))[..., 0]
     z = np.column_stack((-W @ D, W)) + e[:, ::2] + 1j * e[:, 1::2]
-    fitted = fit(z[:, 1:], z[:, 0], "weighted", channels=C, row_weights=w)
+    fitted = solve(z[:, 1:], z[:, 0], "weighted", channels=C, row_weights=w)
     best = minimize(errors_of, stretch(D), (z[:, 1:], z[:, 0], C, w), method="BFGS", options={"gtol": 1e-7})
     np.testing.assert_allclose(stretch(fitted.weights), best.x, atol=1e-5)
 
@@ -154,7 +154,7 @@ def test_unbalance_outside_the_planes_becomes_a_further_error():
     D = complex_normal(rng, 2)
     Y = -W @ D + 0.4 * np.linalg.norm(W @ D) / np.sqrt(24) * complex_normal(rng, 12)
     C = np.zeros((12, 6, 6)) + np.diag(np.repeat([0.05, 0.1, 0.1], 2)) ** 2
-    fitted = fit(W, Y, "weighted", channels=C)
+    fitted = solve(W, Y, "weighted", channels=C)
     wide = C.copy()
     wide[:, [0, 1], [0, 1]] += fitted.model_error**2
     assert errors_of(stretch(fitted.weights), W, Y, wide) == pytest.approx(20, rel=1e-5)
@@ -179,7 +179,7 @@ def test_errors_that_readings_have_in_common_do_not_contradict():
     channels = C + pairs[:, :, None] * pairs[:, None]
     for _ in range(100):
         Y = -W @ D + rng.standard_normal() * direction + 0.02 * complex_normal(rng, 20)
-        fitted = fit(W, Y, "weighted", channels=channels, columns=columns)
+        fitted = solve(W, Y, "weighted", channels=channels, columns=columns)
         chi.append(fitted.chi_square)
         assert fitted.dof == 36
     assert np.mean(chi) == pytest.approx(36, abs=4 * np.sqrt(72 / 100))
@@ -204,7 +204,7 @@ def simulated(seed, effect, draws=200):
             pair = np.ascontiguousarray(linear[:, p] * (way * runs[:, p])[:, None]).view(float)
             channels = channels + pair[:, :, None] * pair[:, None]
     z = runs @ linear.T
-    fitted = fit(z[:, 1:], z[:, 0], "weighted", channels=channels)
+    fitted = solve(z[:, 1:], z[:, 0], "weighted", channels=channels)
     again = read(np.broadcast_to(runs, (draws, *runs.shape))) @ linear.T
     x = np.ascontiguousarray(fitted.resolve(again[..., 1:], again[..., 0]) - fitted.weights).view(float)
     inverse = np.linalg.inv(np.cov(x.T))
@@ -222,7 +222,7 @@ def test_regions_of_redrawn_runs_hold_the_truth(effect, least):
 def test_each_method_keeps_limits_and_solves_again(method):
     W, Y, C = drawn(3)
     N, P = W.shape
-    free = fit(W, Y, method, channels=C)
+    free = solve(W, Y, method, channels=C)
     arcs = ((np.angle(free.weights[1]) - 0.2, 0.5),)
     given = limits(
         N,
@@ -230,7 +230,7 @@ def test_each_method_keeps_limits_and_solves_again(method):
         max_weight=[0.8 * abs(free.weights[0]), *[np.inf] * (P - 1)],
         forbidden=((), arcs, *[()] * (P - 2)),
     )
-    fitted = fit(W, Y, method, channels=C, limits=given)
+    fitted = solve(W, Y, method, channels=C, limits=given)
     assert fitted.active_weights[0] == (method != "minmax")
     assert abs(fitted.weights[0]) <= given.max_weight[0]
     turn = np.mod(np.angle(fitted.weights[1]) - arcs[0][0], 2 * np.pi)
@@ -247,11 +247,11 @@ def test_a_limit_that_barely_binds_keeps_the_errors_of_what_is_not_bound(method)
     C += np.diag(np.repeat([0.02, 0.01, 0.01], 2)) ** 2
     e = rng.standard_normal((800, 12, 6)) * np.repeat([0.02, 0.01, 0.01], 2)
     e = np.ascontiguousarray(e).view(complex)
-    free = fit(W, Y, method, channels=C)
+    free = solve(W, Y, method, channels=C)
 
     def widths(share):
         most = limits(12, 2, max_weight=[share * abs(free.weights[0]), np.inf])
-        fitted = fit(W, Y, method, channels=C, limits=most)
+        fitted = solve(W, Y, method, channels=C, limits=most)
         assert fitted.active_weights.tolist() == [share < 1, False]
         return np.std(np.abs(fitted.resolve(W + e[..., 1:], Y + e[..., 0])), axis=0)
 
@@ -263,7 +263,7 @@ def test_a_limit_that_barely_binds_keeps_the_errors_of_what_is_not_bound(method)
 @pytest.mark.parametrize("seed", [1, 8, 15, 24, 44, 47])
 def test_the_weighted_fit_within_limits_against_a_global_search(seed):
     W, Y, C, wider, given = problem(seed)
-    fitted = fit(W, Y, "weighted", channels=C, limits=given)
+    fitted = solve(W, Y, "weighted", channels=C, limits=given)
     assert (np.abs(fitted.weights) <= given.max_weight).all()
     assert (np.abs(fitted.residual) <= given.residual.ravel() * (1 + 1e-12)).all()
 
@@ -276,7 +276,7 @@ def test_the_weighted_fit_within_limits_against_a_global_search(seed):
 
 def test_redrawn_data_without_a_solution_are_not_a_number():
     given = limits(2, 1, max_weight=1.0, residual=2.0)
-    fitted = fit([[1.0], [1.0]], [2.5, 2.5], "least-squares", limits=given)
+    fitted = solve([[1.0], [1.0]], [2.5, 2.5], "least-squares", limits=given)
     draws = fitted.resolve(
         np.ones((2, 2, 1), dtype=complex), np.array([[2.5, 2.5], [3.5, 3.5]], dtype=complex)
     )
@@ -289,8 +289,8 @@ def test_units_do_not_matter_to_the_weighted_fit():
     P = W.shape[1]
     unit = np.repeat([1e-6, *[1e3] * P], 2)
     plain, scaled = (
-        fit(W, Y, "weighted", channels=C),
-        fit(W * 1e3, Y * 1e-6, "weighted", channels=C * np.outer(unit, unit)),
+        solve(W, Y, "weighted", channels=C),
+        solve(W * 1e3, Y * 1e-6, "weighted", channels=C * np.outer(unit, unit)),
     )
     np.testing.assert_allclose(scaled.weights, plain.weights * 1e-9, rtol=1e-6)
     assert scaled.chi_square == pytest.approx(plain.chi_square, rel=1e-7)
