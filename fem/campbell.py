@@ -40,12 +40,11 @@ from fem.whirl import (
     solve_whirl,
     whirling,
 )
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text
-from rotorid.base.tables import Column, Table, terminal
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, listing
 
 HEAVY = 1.28
@@ -193,14 +192,6 @@ class Campbell(Result):
         count = counted(light, "damped critical speed") if light else "No damped critical speed"
         more = f", {heavy} more without a peak" if heavy else ""
         return f"{text}. {count}{more} from {range_text(self.speeds[0], self.speeds[-1])}."
-
-    @property
-    def answer(self) -> Answer:
-        """The sentence, the damped critical speeds, the warnings, and the modes at every speed."""
-        criticals, modes = map(terminal, self.tables())
-        text = criticals if self.critical_speeds.size else ""
-        cut = (self.cut,) if self.cut else ()
-        return Answer(self.sentence(), text, self.warnings, cut, (modes,), "the modes at every speed")
 
     def mesh_change(self) -> tuple[float, float]:
         """Largest relative change of frequencies and of damped critical speeds on elements cut in two.

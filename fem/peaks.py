@@ -30,7 +30,7 @@ from fem.undamped import critical_speeds_below
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.tables import Column, Table, terminal
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
 
 UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
@@ -145,6 +145,11 @@ class Peaks(Result):
     peaks: tuple[Peak, ...]
     operating: tuple[float, float] | None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is missing of each peak."""
+        return tuple(f"{rpm_text(peak.speed)}: {peak.note}" for peak in self.peaks if peak.note)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         columns = peak_columns(self.peaks)
@@ -155,21 +160,14 @@ class Peaks(Result):
         ]
         return plain({"operating_rad_s": self.operating, "peaks": peaks})
 
-    def tables(self, unit: str = "", scale: float = 1.0) -> tuple[Table, ...]:
-        """One row per peak, amplitudes times `scale` with the name of their unit."""
-        return (Table("peaks", peak_columns(self.peaks, unit, scale)),)
+    def tables(self) -> tuple[Table, ...]:
+        """One row per peak."""
+        return (Table("peaks", peak_columns(self.peaks)),)
 
     def sentence(self) -> str:
         """Where they are."""
         where = listing([rpm_text(peak.speed) for peak in self.peaks], "and")
         return f"peaks at {where}" if where else "no peak in this range of speeds"
-
-    def summary(self, unit: str = "", scale: float = 1.0) -> str:
-        """The peaks as text, amplitudes times `scale` with the name of their unit."""
-        if not self.peaks:
-            return self.sentence()
-        notes = [f"    {rpm_text(peak.speed)}: {peak.note}" for peak in self.peaks if peak.note]
-        return "\n".join([*map(terminal, self.tables(unit, scale)), *notes])
 
 
 def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:

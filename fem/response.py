@@ -52,12 +52,11 @@ from fem.undamped import (
     lowest_modes,
     one_plane,
 )
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
-from rotorid.base.tables import Column, Table, terminal
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted
 
 Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
@@ -209,11 +208,6 @@ class Response(Result):
         return f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes. {self.highest}"
 
     @property
-    def answer(self) -> Answer:
-        """The sentence and the warnings."""
-        return Answer(self.sentence(), warnings=self.warnings)
-
-    @property
     def highest(self) -> str:
         """The largest amplitude in a sentence."""
         if not self.steady.any():
@@ -350,11 +344,6 @@ class InfluenceCoefficients(Result):
             largest = f"The largest is {max(first.columns[2].values):.4g} µm per g·mm."
         what = f"Influence coefficients of {counted(C, 'sensor')} and {counted(P, 'plane')}"
         return f"{what} at {speed_range(self.speeds)}. {largest}"
-
-    @property
-    def answer(self) -> Answer:
-        """Where the coefficients are largest, and over many speeds how small they get."""
-        return Answer(self.sentence(), "".join(map(terminal, self.tables()[:-1])), self.warnings)
 
 
 def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:

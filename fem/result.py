@@ -31,8 +31,17 @@ class Result(Answered):
 
     @property
     def answer(self) -> Answer:
-        """The sentence and the first table."""
-        return Answer(self.sentence(), terminal(self.tables()[0]))
+        """The sentence, the first table and the warnings; the other tables behind them."""
+        first, *others = self.tables()
+        notes = tuple(filter(None, [getattr(self, "cut", "")]))
+        return Answer(
+            self.sentence(),
+            terminal(first),
+            getattr(self, "warnings", ()),
+            notes,
+            tuple(map(terminal, others)),
+            ", ".join(table.name for table in others),
+        )
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.sentence()})"

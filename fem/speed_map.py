@@ -30,19 +30,12 @@ class SpeedMap(Result):
         Critical speeds, rad/s, shape (K, n); NaN where a mode has none (thin discs).
     free, pinned
         Their limits for vanishing and for infinite stiffness, rad/s, shape (n,).
-    own
-        What the supports really have: label, stiffness (N/m) and the speeds (rad/s) at which they have it
-        (none: at all speeds).
-    rotor
-        The rotor.
     """
 
     stiffness: FloatArray
     speeds: FloatArray
     free: FloatArray
     pinned: FloatArray
-    own: tuple[tuple[str, FloatArray, FloatArray], ...]
-    rotor: Rotor
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; one list of speeds per mode."""
@@ -119,13 +112,4 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     pinned, chart = 2 * stiffer - more, np.array(speeds)
     free = np.where(np.abs(softer / less - 0.5) < 0.05, 0.0, softer - (less - softer) / 3)
     read_only(k, chart, free, pinned)
-    curves = (_curves(s, s.name or f"support {i}") for i, s in enumerate(rotor.supports, 1))
-    return SpeedMap(k, chart, free, pinned, sum(curves, ()), rotor)
-
-
-def _curves(support: Support, name: str) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
-    """Label, stiffness with its pedestal, and the speeds at which the support has it."""
-    K = np.array([support.dynamic_stiffness(0.0, speed).real for speed in support.speeds or (0.0,)])
-    x, y = K[:, 0, 0], K[:, 1, 1]
-    curves = {name: x} if np.array_equal(x, y) else {f"{name}, x": x, f"{name}, y": y}
-    return tuple((label, curve, np.array(support.speeds)) for label, curve in curves.items())
+    return SpeedMap(k, chart, free, pinned)

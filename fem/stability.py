@@ -35,7 +35,6 @@ from fem.whirl import (
     solve_whirl,
     whirling,
 )
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
@@ -209,11 +208,6 @@ class Stability(Result):
             f"{self.frequency:.6g} rad/s{ratio}"
         )
 
-    @property
-    def answer(self) -> Answer:
-        """The sentence and the warnings."""
-        return Answer(self.sentence(), warnings=self.warnings)
-
 
 def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     """Frequency above which no mode grows at each speed, rad/s, shape (S,); 0: none grows, inf: not known."""
@@ -331,21 +325,17 @@ def roots(
     return new, g
 
 
-def root(function: Callable[[float], float], ends: FloatArray, values: FloatArray) -> float:
-    """Where a function of speed vanishes between two ends with these values, which it need not repeat."""
-    from scipy.optimize import brentq
-
-    there = dict(zip(ends.tolist(), values.tolist(), strict=True))
-
-    def value(speed: float) -> float:
-        return there[speed] if speed in there else function(speed)
-
-    return float(brentq(value, *ends, xtol=1e-10 * max(ends), rtol=1e-15))
-
-
 def _edge(whirl: Whirl, ends: FloatArray, rates: FloatArray) -> tuple[float, bool, complex]:
     """Speed between a stable and an unstable one where growth begins or ends, and the eigenvalue there."""
-    speed = root(lambda speed: float(fastest(whirl.at(speed))[1][0]) - GROWTH, ends, rates - GROWTH)
+    from scipy.optimize import brentq
+
+    there = dict(zip(ends, rates - GROWTH, strict=True))  # not computed again, with another rounding
+    speed = brentq(
+        lambda speed: there.get(speed) or fastest(whirl.at(speed))[1].item() - GROWTH,
+        *ends,
+        xtol=1e-10 * ends[1],
+        rtol=1e-15,
+    )
     step = _BACK * (ends[rates.argmax()] - speed)
     value, other = fastest(whirl.at(speed, speed + step))[0]
     rise = (other - value).real

@@ -20,7 +20,7 @@ from fem.rotor import Rotor
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, Table, terminal
+from rotorid.base.tables import Column, Table
 
 GRAVITY = 9.80665  # m/s²
 
@@ -91,10 +91,6 @@ class StaticDeflection(Result):
         k = int(np.argmax(self.deflection))
         largest = f"{1e6 * self.deflection[k]:.4g} µm at node {k + 1}"
         return f"Weight {self.weight:.6g} N; largest deflection {largest}"
-
-    def summary(self) -> str:
-        """Weight, largest deflection and reactions, as text."""
-        return f"{self.sentence()}\n{terminal(self.tables()[0])}"
 
 
 def static_deflection(

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from fem.assembly import (
+    FROM_XY,
     TO_XY,
     Matrices,
     assemble,
@@ -38,7 +39,6 @@ from fem.elements import strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import NORMAL_95, Result
 from fem.rotor import Pedestal, Rotor, refined
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
@@ -157,11 +157,6 @@ class Modes(Result):
         rpm = [f"{speed:.6g}" for speed in self.rpm if speed > 0]
         shown = listing(rpm, "and") if len(rpm) < 6 else f"{', '.join(rpm[:6])} …"
         return f"{counted(len(rpm), 'critical speed')} without damping{f': {shown} rpm' if rpm else ''}."
-
-    @property
-    def answer(self) -> Answer:
-        """The critical speeds, in rpm, Hz and rad/s, and what must be known about them."""
-        return replace(super().answer, warnings=self.warnings, notes=(self.cut,) if self.cut else ())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -308,33 +303,30 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
     """
     if most < 1:
         raise ValueError(f"{most} critical speeds cannot be found: ask for 1 or more")
-    A, warnings, cut = assemble(rotor), ignored_inertia(rotor), ""
+    A, warnings, cut, rigid = assemble(rotor), ignored_inertia(rotor), "", 0
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
         rigid = pencil.rigid.shape[1]
-        parts = [_positive(pencil, most + rigid)]
-        if (count := parts[0].squares.size - rigid) < least:
+        modes = _positive(pencil, most + rigid)
+        if (count := modes.squares.size - rigid) < least:
             raise ValueError(
                 f"{least} critical speeds cannot be found: the model has 1 to {count}; divide the shaft into "
                 "more elements (discs whose polar inertia exceeds the diametral one take some away)"
             )
+        modes = modes.only(slice(most + rigid))
+        squares, rounding, motion = modes.squares, modes.rounding, modes.motion
     else:
-        rigid, (parts, beyond, cut) = 0, _over_speed(rotor, A, most)
+        parts, beyond, cut = _over_speed(rotor, A, most)
         warnings = beyond + warnings
-    last = most + rigid
-    squares, rounding = (
-        np.concatenate([getattr(part, name) for part in parts])[:last] for name in ("squares", "rounding")
-    )
-    motion = np.concatenate([part.motion for part in parts], axis=2)[..., :last]
-    sizes = motion[:2].real ** 2 + motion[:2].imag ** 2
-    largest = sizes.max(axis=1)
-    in_x = largest[0] >= largest[1] * (1 - 2e-6)
-    size, major = np.where(in_x, *sizes), np.where(in_x, motion[::2], motion[1::2])
-    first = np.where(size[0] > 1e-12 * np.where(in_x, *largest), 0, size.argmax(axis=0))
+        squares, rounding = np.array([(*part.squares, *part.rounding) for part in parts]).T
+        motion = np.concatenate([part.motion for part in parts], axis=2)
+    largest = np.abs(motion[:2]).max(axis=1)
+    major = np.where(largest[0] >= largest[1] * (1 - 1e-6), motion[::2], motion[1::2])
+    size = np.abs(major[0])
+    first = np.where(size[0] > 1e-6 * size.max(axis=0), 0, size.argmax(axis=0))
     scale = 1 / major[0, first, np.arange(squares.size)]
     x, y = motion[:2] * scale
-    one_wave = len(parts[0].pencil.waves) == 1
-    ways = np.ones(squares.size) if one_wave else whirl_direction(x.T, y.T)
+    ways = np.ones(squares.size) if rotor.symmetric else whirl_direction(x.T, y.T)
     direction = tuple(DIRECTION_NAMES[way] for way in ways.tolist())
     frequencies, (shapes, slopes) = np.sqrt(squares), (major * scale).real
     read_only(frequencies, shapes, slopes, x, y)
@@ -438,29 +430,25 @@ def _gap(speed: float, rotor: Rotor, A: Matrices, k: int, sign: float = 1.0) -> 
 def _brackets(rotor: Rotor, A: Matrices, knots: FloatArray) -> tuple[float, list[tuple[float, float, int]]]:
     """Lowest natural frequency at the first knot, and every (upper end, lower end, mode) with one crossing.
 
-    |λ − Ω²| of a mode is nearly convex where it is small, between knots: without a change of sign, a part of
-    this can hold two crossings only if the lines through the parts beside it fall below 0 in it.
+    Where |λ − Ω²| of a mode is least without a change of sign, its minimum tells whether there are two.
     """
     from scipy.optimize import minimize_scalar
 
     top = (1.01 * knots[-1]) ** 2
     parts = knots[:-1, None] + np.diff(knots)[:, None] * _PARTS[:-1]
-    speeds = np.append(parts, knots[-1])
-    lists = [np.zeros(1)]
+    speeds, lists, brackets = np.append(parts, knots[-1]), [np.zeros(1)], []
     for speed in speeds:
         lists.append(_positive(whole_rotor(rotor, A, speed), lists[-1].size, top).squares)
     modes = np.array([*itertools.zip_longest(*lists[1:], fillvalue=top)])
-    brackets, steps = [], np.diff(speeds)
     if 0 < modes[0, -1] < 1e-12 * top:
         raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
     for k, gaps in enumerate(modes - speeds**2):
-        slopes, signs, points = np.diff(gaps) / steps, np.sign(gaps), dict(zip(speeds, gaps, strict=True))
-        right, left = gaps[1:-2] + slopes[:-2] * steps[1:-1], gaps[2:-1] - slopes[2:] * steps[1:-1]
-        inside = np.array([gaps[2:-1], -right, -left]) * signs[1:-2]
-        for i in 1 + np.flatnonzero((inside > 0).all(axis=0)):
-            ends, args = speeds[i : i + 2], (rotor, A, k, signs[i])
-            turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * ends[1]})
-            points[turn.x] = signs[i] * turn.fun
+        signs, points = np.where(gaps > 0, 1.0, -1.0), dict(zip(speeds, gaps, strict=True))
+        for i in 1 + np.flatnonzero(np.abs(gaps[1:-1]) <= np.minimum(*np.abs((gaps[:-2], gaps[2:])))):
+            if signs[i - 1] == signs[i + 1]:
+                ends, args = speeds[[i - 1, i + 1]], (rotor, A, k, signs[i])
+                turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * ends[1]})
+                points[turn.x] = signs[i] * turn.fun
         for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
             if (one > 0) != (other > 0):
                 brackets.append((b, a, k))
@@ -488,12 +476,10 @@ class Pencil:
         What it describes.
     stiffness, mass
         Upper bands, shape (width + 1, size); Hermitian, the stiffness not negative.
-    waves, tilts
-        Unknowns of the shaft that are deflections and slopes, shape (w, N): forward and backward.
     shaft
-        All unknowns of the shaft, shape (w, size of its matrices).
+        All unknowns of the shaft, shape (w, size of its matrices): forward and backward.
     springs
-        Pairs of unknowns (i, j) and the stiffness between them, shape (e,) each.
+        Unknowns that each acts on, and its stiffness matrix of these.
     hold
         Sum of the springs, N/m, tilting springs as such at the end of the rotor.
     rigid
@@ -504,12 +490,20 @@ class Pencil:
     matrices: Matrices
     stiffness: AnyArray
     mass: AnyArray
-    waves: IndexArray
-    tilts: IndexArray
     shaft: IndexArray
-    springs: tuple[IndexArray, IndexArray, AnyArray]
+    springs: list[tuple[IndexArray, AnyArray]]
     hold: float
     rigid: AnyArray
+
+    @property
+    def waves(self) -> IndexArray:
+        """Unknowns of the shaft that are deflections, shape (w, N)."""
+        return self.shaft[:, :: self.matrices.stride]
+
+    @property
+    def tilts(self) -> IndexArray:
+        """Unknowns of the shaft that are slopes, shape (w, N)."""
+        return self.shaft[:, 1 :: self.matrices.stride]
 
     @property
     def size(self) -> int:
@@ -518,12 +512,9 @@ class Pencil:
 
     def energy(self, X: AnyArray) -> AnyArray:
         """Xᴴ K X, shape (m, m), summed from strains: few digits are lost."""
-        i, j, k = self.springs
-        energy = (X[i].conj().T * k) @ X[j]
-        for unknowns in self.shaft:
-            S = strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1])
-            energy = energy + S.conj().T @ S
-        return energy
+        S = [strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1]) for unknowns in self.shaft]
+        parts = [s.conj().T @ s for s in S] + [X[u].conj().T @ k @ X[u] for u, k in self.springs]
+        return np.asarray(sum(parts))
 
 
 def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, float] | None = None) -> Pencil:
@@ -570,54 +561,56 @@ def _pencil(
     rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, FloatArray, Pedestal | None]]
 ) -> Pencil:
     """Pencil on springs: node, stiffness in (x, y), shape (2, 2), and what they stand on."""
-    planes, w, s = len(whirls), A.deflections, rotor.positions
+    planes, size, springs = len(whirls), A.size, list[tuple[IndexArray, AnyArray]]()
     held = [each for each in held if each[1].any()]
-    feet = [(A.deflection(node) + 0.5, pedestal.mass) for node, _, pedestal in held if pedestal]
+    feet = [(A.deflection(node) + 0.5, stand.mass) for node, _, stand in held if stand]
     # Waves alternate, and a foot stands behind the deflection of its node.
-    order = np.append(np.arange(A.size), [at for at, _ in feet]).argsort(kind="stable")
+    order = np.append(np.arange(size), [at for at, _ in feet]).argsort(kind="stable")
     places = planes * order.argsort() + np.arange(planes)[:, None]
-    entries: list[tuple[Any, ...]] = []
 
     def spring(k: FloatArray, *ends: int) -> None:
-        mean, differ = (k[0, 0] + k[1, 1]) / 2, (k[0, 0] - k[1, 1]) / 2 + (k[0, 1] and 1j * k[0, 1])
-        form, largest = ((mean, differ), (differ.conjugate(), mean)), abs(mean) + abs(differ)
-        for one, other in itertools.product(ends, repeat=2):
-            for a, b in itertools.product(range(planes), repeat=2):
-                entry = form[a][b] if one == other else -form[a][b]
-                entries.append((places[a, one], places[b, other], entry, entry / largest))
+        form = (FROM_XY @ k @ TO_XY)[:planes, :planes]
+        form = form if form.imag.any() else form.real
+        if len(ends) > 1:
+            form = np.kron(((1, -1), (-1, 1)), form)
+        springs.append((places[:, ends].T.ravel(), form))
 
-    stands = itertools.count(A.size)
+    stands = itertools.count(size)
     for node, k, pedestal in held:
         ends = [A.deflection(node)]
         if pedestal:
             ends.append(next(stands))
             spring(np.diag(pedestal.xy("stiffness")), ends[1])
         spring(k, *ends)
-    attached = len(entries)
+    attached = springs[:]
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
             spring(support.tilting_stiffness * np.eye(2), A.deflection(support.node) + 1)
-    i, j = np.array([entry[:2] for entry in entries], np.intp).reshape(-1, 2).T
-    k, alike = np.array([entry[2:] for entry in entries]).reshape(-1, 2).T
-    shaft = places[:, : A.size]
+    shaft, w = places[:, :size], A.deflections
     width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
-    bands = np.zeros((2, places.size * (width + 1)), k.dtype)
-    columns, inertia = width * (1 + shaft), A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
+    bands = np.zeros((2, places.size * (width + 1)), np.result_type(float, *(k for _, k in attached)))
+    entries = np.empty((2, planes, A.width + 1, size))
+    entries[0], entries[1] = A.shaft, A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
     for off in range(A.width + 1):
-        at, row = shaft[:, : A.size - off] + columns[:, off:], A.width - off
-        bands[0, at], bands[1, at] = A.shaft[row, off:], inertia[:, row, off:]
+        i, j = shaft[:, : size - off], shaft[:, off:]
+        bands[:, width * (1 + j) + i] = entries[:, :, A.width - off, off:]
     K, M = bands.reshape(2, -1, width + 1).transpose(0, 2, 1)
-    M[-1, places[:, A.size :]] = [mass for _, mass in feet]
-    for one, other, stiffness, _ in entries[:attached]:
-        if one <= other:
-            K[width + one - other, other] += stiffness
-    R = np.zeros((places.size, 2 * planes))
+    M[-1, places[:, size:]] = [mass for _, mass in feet]
+    for unknowns, form in attached:
+        for (a, b), stiffness in np.ndenumerate(form):
+            if (i := unknowns[a]) <= (j := unknowns[b]):
+                K[width + i - j, j] += stiffness
+    s, R = rotor.positions / rotor.positions[-1], np.zeros((places.size, 2 * planes))
     for wave, row in enumerate(shaft):
-        R[row[w], wave], R[row[w], planes + wave], R[row[w + 1], planes + wave] = 1.0, s / s[-1], 1 / s[-1]
-    values, V = np.linalg.eigh((R[i].T * alike) @ R[j])
+        R[row[w], wave], R[row[w], planes + wave] = 1.0, s
+        R[row[w + 1], planes + wave] = 1 / rotor.positions[-1]
+    holding = [(R[u].T @ k @ R[u], np.abs(k).max()) for u, k in springs]
+    values, V = np.linalg.eigh(
+        sum((one / largest for one, largest in holding), np.zeros((2 * planes, 2 * planes)))
+    )
     rigid = R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
-    hold = float((k @ (R[i] * R[j])).real.sum()) / planes
-    return Pencil(rotor, A, K, M, shaft[:, w], shaft[:, w + 1], shaft, (i, j, k), hold, rigid)
+    hold = float(sum(one.trace().real for one, _ in holding)) / planes
+    return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -769,9 +762,17 @@ def _largest(
     T: AnyArray, m: int, energy: AnyArray | None = None, ends: tuple[int, int] | None = None
 ) -> tuple[FloatArray, AnyArray]:
     """The m eigenvalues of largest size, of those at `ends` if given, and their vectors of energy 1."""
-    from scipy.linalg import eigh
+    from scipy.linalg import lapack
 
-    mu, Q = np.linalg.eigh(T) if energy is None else eigh(T, energy, subset_by_index=ends, check_finite=False)
+    if energy is None:
+        mu, Q = np.linalg.eigh(T)
+    else:
+        first, last = ends or (1, len(T))
+        solve = lapack.zhegvx if np.iscomplexobj(T) else lapack.dsygvx
+        mu, Q, _, _, info = solve(T, energy, range="I", il=first, iu=last)
+        mu = mu[: Q.shape[1]]
+        if info:
+            raise np.linalg.LinAlgError
     order = np.argsort(-np.abs(mu), kind="stable")[:m]
     return mu[order], Q[:, order]
 
@@ -823,5 +824,5 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             last, residual = residual, outside.max(initial=0.0)
             if residual < 1e-9 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, image @ Q)[0])
-    ends = None if pencil.matrices.gyroscopic.any() else (size - most, size - 1)  # only M - G may be negative
+    ends = None if pencil.matrices.gyroscopic.any() else (size - most + 1, size)  # only M - G may be negative
     return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]

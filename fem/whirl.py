@@ -37,7 +37,6 @@ from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import Result
 from fem.rotor import Rotor, Support
 from fem.undamped import Spectrum, finite_modes, lowest_modes
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
@@ -388,11 +387,6 @@ class WhirlModes(Result):
             f"{counted(self.eigenvalues.size, 'whirl mode')} at {speed_text(self.speed)}; mode {least + 1} "
             f"decays least, log decrement {self.log_decrements[least]:z.4g}."
         )
-
-    @property
-    def answer(self) -> Answer:
-        """The sentence, the modes and the warnings."""
-        return replace(super().answer, warnings=self.warnings)
 
     @property
     def _ways(self) -> list[str]:

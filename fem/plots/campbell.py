@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
-from fem.result import NORMAL_95
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
     BOX,
     COLORS,
-    DARK,
-    MARKERS,
     QUIET,
     VERMILION,
     WARNING,
@@ -30,7 +27,6 @@ from rotorid.base.plot_style import (
     plain_numbers,
     rad_s_above,
     scale_beside,
-    shade_bands,
     shade_operating,
     shade_unstable,
 )
@@ -68,8 +64,7 @@ def draw_campbell(
 
     Forward whirl is a solid line with filled triangles that point up, backward whirl a dashed one with open
     triangles that point down, neither (a straight line) a dotted one: told apart in black and white too.
-    Where a mode is heavily damped its line is pale. The range of operating speeds, rad/s, is shaded, and 95 %
-    of the frequencies of a calibrated rotor.
+    Where a mode is heavily damped its line is pale. The range of operating speeds, rad/s, is shaded.
     """
     ax = ax or new_axes((WIDTH, 4.8))
     speeds, frequencies = campbell.speeds * RPM, campbell.frequencies * RPM
@@ -78,8 +73,6 @@ def draw_campbell(
     _draw_curves(ax, campbell, frequencies)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
-    if campbell.std is not None:
-        shade_bands(ax, speeds, frequencies, NORMAL_95 * RPM * campbell.std, cycle(COLORS))
     note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top", fontsize=11)
     if campbell.criticals:
         _mark_criticals(ax, campbell.criticals, top)
@@ -126,12 +119,6 @@ def draw_speed_map(
         speeds = np.where(curve > 0, curve * RPM, np.nan)
         ax.plot(chart.stiffness, speeds, linewidth=2, label=f"critical speed {mode + 1}", **look(mode))
     ax.set(xscale="log", yscale="log")
-    for (name, stiffness, speeds), marker in zip(chart.own, cycle(MARKERS), strict=False):
-        style: dict[str, Any] = {"label": name, "color": DARK, "linestyle": ":", "linewidth": 1.3}
-        if speeds.size:
-            ax.plot(stiffness, speeds * RPM, marker=marker, markerfacecolor="white", scaley=False, **style)
-        else:
-            ax.axvline(stiffness[0], **style)
     if operating:
         first, last = operating
         ax.axhspan(first * RPM, last * RPM, color="black", alpha=0.07, linewidth=0, label="operating range")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import ArrayLike
 from fem.orbits import DIRECTION_NAMES, orbits
 from fem.peaks import smooth_curves
 from fem.plots.rotor import draw_rotor
-from fem.result import NORMAL_95
 from fem.rotor import SensorLike, as_sensor, label
 from fem.stability import Window, within
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
@@ -34,7 +32,6 @@ from rotorid.base.plot_style import (
     on_figure,
     plain,
     rad_s_above,
-    shade_bands,
     shade_operating,
     shade_unstable,
 )
@@ -101,7 +98,6 @@ def bode_figure(
     peaks: Sequence[Peaks] = (),
     *,
     operating: tuple[float, float] | None = None,
-    std: FloatArray | None = None,
 ) -> Figure:
     """Make a figure of the amplitude and phase of sensors over speed.
 
@@ -115,8 +111,6 @@ def bode_figure(
         Of each sensor, to mark on its curves; none if empty.
     operating
         Range of operating speeds, rad/s, shaded.
-    std
-        Standard deviations of the amplitudes, m, shape (S, C): 95 % are shaded.
     """
     figure = new_figure(6.0)
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
@@ -125,10 +119,6 @@ def bode_figure(
     shade_operating(below, operating)
     _amplitudes(above, response, 1e6 * Z, labels, "amplitude, µm peak").set_xlabel("")
     _phases(below, response, Z, labels)
-    if std is not None:
-        middle, half = np.where(response.steady[:, None], 1e6 * np.abs(Z), np.nan), NORMAL_95 * 1e6 * std
-        shade_bands(above, omega * RPM, middle, half, cycle(COLORS))
-        above.set_ylim(top=np.nanmax(middle + half, initial=above.get_ylim()[1]))
     for k, each in enumerate(peaks):
         places = np.array([peak.speed for peak in each.peaks]) * RPM
         for line in (above.get_lines()[k], below.get_lines()[k]):

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -143,13 +142,6 @@ def shade_unstable(
     for k, (first, last) in enumerate(ranges):
         band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
         band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
-
-
-def shade_bands(ax: Axes, x: FloatArray, middle: FloatArray, half: FloatArray, colors: Iterable[str]) -> None:
-    """Shade 95 % of curves, shape (S, n), of which the half widths are given; not below 0."""
-    for low, high, color in zip((middle - half).clip(min=0.0).T, (middle + half).T, colors, strict=False):
-        ax.fill_between(x, low, high, color=color, alpha=0.2, linewidth=0)
-    ax.set_ylabel(f"{ax.get_ylabel()}\nshaded: 95 % (calibration)")
 
 
 def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:

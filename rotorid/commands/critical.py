@@ -125,7 +125,7 @@ def _pictures(
 
     pictures: dict[str, Callable[[], Figure]] = {}
     if chart is not None:
-        caption = "Critical speeds over the stiffness of the supports; dotted: what the supports have."
+        caption = "Critical speeds over the stiffness of the supports."
         pictures[caption] = lambda: on_figure(lambda ax: draw_speed_map(chart, ax, operating), height=5.0)
     pictures["Mode shapes, each to its largest value 1, over the rotor."] = lambda: on_figure(
         lambda ax: draw_modes(modes, ax)
@@ -179,8 +179,5 @@ def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
         if support.kind == "seal":
             remarks.append(f"map: seal {name} is left out, its stiffness is that of no bearing")
         elif support.pedestal is not None:
-            remarks.append(
-                f"map: bearing {name} stands on the ground there; of its pedestal the stiffness counts in "
-                "the bearing's own line, mass and damping are left out"
-            )
+            remarks.append(f"map: bearing {name} stands on the ground there, its pedestal is left out")
     return chart, remarks

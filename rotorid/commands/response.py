@@ -222,7 +222,7 @@ class Vibration:
         draw: dict[str, tuple[str, Callable[[], Figure]]] = {
             "bode": (
                 "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading.",
-                lambda: bode_figure(finer, places, self.peaks, operating=self.operating, std=self.std),
+                lambda: bode_figure(finer, places, self.peaks, operating=self.operating),
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
             "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),

@@ -10,6 +10,7 @@ from fem import (
     api_unbalance,
     critical_peaks,
     open_question,
+    peak_columns,
     response_peaks,
     unsearched,
 )
@@ -140,7 +141,7 @@ def test_no_peak():
     speeds = np.linspace(1.0, 50.0, 30)
     found = peaks_of(speeds, np.square)
     assert found.peaks == ()
-    assert found.summary() == "no peak in this range of speeds"
+    assert found.sentence() == "no peak in this range of speeds"
     assert found.to_dict()["peaks"] == []
 
 
@@ -148,8 +149,8 @@ def test_results_speak():
     speeds = np.linspace(3.0, 400.0, 300)
     found = peaks_of(speeds, damped(0.05), operating=(110.0, 150.0))
     assert "NOT ENOUGH" in found.summary()
-    assert "amplitude, µm" in found.summary("µm", 1e6)
-    assert f"{1e6 * found.peaks[0].amplitude:.4g}" in found.summary("µm", 1e6)
+    assert peak_columns(found.peaks, "µm", 1e6)[2].heading == "amplitude, µm peak"
+    assert f"{found.peaks[0].amplitude:.4g}" in found.summary()
     assert len(found.to_frame()) == 1
     assert found.to_dict()["peaks"][0]["enough"] is False
 

@@ -52,16 +52,6 @@ def test_it_is_the_critical_speeds_at_each_stiffness():
     assert np.abs(forward - omega).min() < 1e-7 * omega
 
 
-def test_own_stiffness_of_supports_with_their_pedestals():
-    supports = [
-        fem.Support(1, [5e7, 1e8, 4e8], speeds=(50.0, 300.0, 900.0), name="front"),
-        fem.Support(11, ((1e8, 0.0), (0.0, 3e8)), pedestal=fem.Pedestal(10.0, 1e8)),
-    ]
-    found = fem.speed_map(uniform(10, supports=supports), [1e7, 1e8], n=1)
-    assert [label for label, _, _ in found.own] == ["front", "support 2, x", "support 2, y"]
-    np.testing.assert_allclose(np.concatenate([k for _, k, _ in found.own]), [5e7, 1e8, 4e8, 5e7, 7.5e7])
-
-
 def test_results_speak():
     found = fem.speed_map(rotor23(), n=3)
     assert "pinned" in found.summary()
