@@ -27,14 +27,13 @@ Symmetric bands are kept as LAPACK does, upper form: `band[width + i - j, j]` is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fem.elements import dense as dense
 from fem.elements import multiply as multiply
 from fem.elements import shaft_bands, strains
 from fem.forces import InternalDamping, kind_of
+from fem.result import holding_arrays
 from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
@@ -43,7 +42,7 @@ FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
 _TURN = np.kron(FROM_XY, TO_XY.T).T
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Matrices:
     """The assembled rotor, one plane.
 
@@ -148,15 +147,15 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     """One warning for each kind of moments of inertia of the discs that the model leaves out."""
-    warnings = []
-    for kind, effect, counted in (
-        ("diametral", "rotary inertia", rotor.model.rotary_inertia),
-        ("polar", "gyroscopic effect", rotor.model.gyroscopic),
-    ):
-        left_out = (disc for disc in rotor.discs if not counted and getattr(disc, f"{kind}_inertia"))
-        if nodes := ", ".join(str(disc.node) for disc in left_out):
-            warnings.append(f"disc at node {nodes}: {kind} inertia is ignored, the model has no {effect}")
-    return tuple(warnings)
+    effects = {
+        "diametral": ("rotary inertia", rotor.model.rotary_inertia),
+        "polar": ("gyroscopic effect", rotor.model.gyroscopic),
+    }
+    return tuple(
+        f"disc at node {', '.join(map(str, nodes))}: {kind} inertia is ignored, the model has no {effect}"
+        for kind, (effect, counted) in effects.items()
+        if (nodes := [disc.node for disc in rotor.discs if getattr(disc, f"{kind}_inertia")]) and not counted
+    )
 
 
 def static_stiffness(support: Support, speed: float) -> FloatArray:
@@ -179,7 +178,7 @@ def _turned(D: AnyArray) -> ComplexArray:
     return np.asarray(D.reshape(-1, 4) @ _TURN).reshape(D.shape)
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Supported:
     """Dynamic stiffness at the supported nodes at synchronous vibration, all that stands at a node added up.
 
@@ -199,9 +198,10 @@ class Supported:
     planes: int
 
     @property
-    def reference(self) -> FloatArray:
-        """Real spring nearest to D at each node, N/m, shape (s,); 0 for what is mostly negative."""
-        return np.asarray(np.maximum(np.median(self.stiffness[..., 0, 0].real, axis=0), 0.0))
+    def springs(self) -> dict[int, float]:
+        """Real spring nearest to D at each node, N/m; 0 for what is mostly negative."""
+        middle = np.median(self.stiffness[..., 0, 0].real, axis=0)
+        return dict(zip(self.nodes, np.maximum(middle, 0.0).tolist(), strict=True))
 
 
 def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
@@ -238,7 +238,7 @@ def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArr
     return _turned(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Planes:
     """A rotor as both planes see it.
 
@@ -293,7 +293,7 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
     )
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Reduced:
     """λ² M + λ (D₀ + Ω D₁ + supports) + K₀ + Ω K₁ + supports, in a basis of d shaft vectors per plane.
 
@@ -405,12 +405,10 @@ class WholeBand:
         for plane, turning in enumerate((1j * speed, -1j * speed)[:p]):
             powers = [value * value, -value * turning, value - turning, 1.0]
             band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
-        k, c = P.supports(np.array([speed]))
-        D = k[0] + value * c[0]
-        for i, foot in zip(P.pedestals, np.tensordot([value**2, value, 1.0], P.feet, 1).T, strict=True):
-            D[i] -= D[i] @ np.linalg.solve(D[i] + np.diag(foot), D[i])
-        for (i, a, b), entry in np.ndenumerate(self._from @ D @ self._to):
-            band[2 * reach + a - b, p * P.rows[i] + b] += entry
+        for row, support in zip(P.rows, P.rotor.supports, strict=True):
+            D = _turned(support.dynamic_stiffness(value / 1j, speed))
+            for a, b in np.ndindex(p, p):
+                band[2 * reach + a - b, p * row + b] += D[a, b]
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
         if info > 0:  # singular to the last bit: an eigenvalue
             lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
@@ -426,7 +424,7 @@ class WholeBand:
         return self._to @ np.swapaxes(alternating, -1, -2)
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Factored:
     """Solutions with one factored matrix."""
 

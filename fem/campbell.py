@@ -10,7 +10,7 @@ it slips to another mode the step is halved, too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from fem.assembly import both_planes
 from fem.orbits import DIRECTION_NAMES
 from fem.parameters import nearest_modes
-from fem.result import Result
+from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, refined
 from fem.stability import (
     Window,
@@ -40,7 +40,7 @@ from fem.whirl import (
     solve_whirl,
     whirling,
 )
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text
@@ -59,7 +59,7 @@ _VANISHES = 1e-8  # |f| at a root, of the speed
 _PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class Campbell(Result):
     """Whirl over speed; each column is one mode, followed through crossings.
 
@@ -246,12 +246,11 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     listed, decrements = {}, decrements_of(lam)
     for window in windows:
         k = int(np.searchsorted(speeds, window.first))
-        grows = np.flatnonzero(decrements[k] < 0)
-        if window.frequency and grows.size:
-            mode = grows[np.abs(lam[k, grows].imag - window.frequency).argmin()]
-            listed[window] = replace(window, mode=int(mode) + 1)
+        apart = np.where(decrements[k] < 0, np.abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
+        if not np.isnan(apart).all():
+            listed[window] = replace(window, mode=int(np.nanargmin(apart)) + 1)
     texts = [listed.get(window, window).sentence() for window in windows]
-    result = Campbell(
+    return Campbell(
         speeds=speeds,
         frequencies=lam.imag,
         log_decrements=decrements,
@@ -268,11 +267,9 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
         cut=_cut(paths),
         heavy=heavy,
     )
-    read_only(result.frequencies, result.log_decrements, direction, result.critical_speeds)
-    return result
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class _Paths:
     """The modes listed, over speeds (S,) in the basis of `whirl`.
 
@@ -414,8 +411,8 @@ def _cut(paths: _Paths) -> str:
     """What to say where modes that are not listed have critical speeds in the range, or may have."""
     speeds, lam = paths.speeds, paths.others
     f = np.where(decrements_of(lam) <= _SWINGS, off_synchronous(lam, speeds), np.nan)
-    size = np.abs(np.hstack((paths.values, lam)).imag)
-    more = (f[:-1] * f[1:] < 0).any(axis=1) | (np.fmax.reduce(size, axis=1) < speeds)[1:]
+    computed = np.fmax.reduce(np.abs(np.hstack((paths.values, lam)).imag), axis=1)
+    more = (f[:-1] * f[1:] < 0).any(axis=1) | (computed < speeds)[1:]
     if not (lam.size and more.any()):
         return ""
     return (
@@ -426,13 +423,13 @@ def _cut(paths: _Paths) -> str:
 
 def _warnings(paths: _Paths, n: int, gone: BoolArray) -> tuple[str, ...]:
     """What the modes listed are not; `gone`, shape (S, n): where they do not oscillate."""
-    count = gone.sum(axis=0)
     texts = [
-        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {count[mode]} of "
-        f"{len(gone)} speeds"
-        for mode in np.flatnonzero(count)
+        f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {column.sum()} of "
+        f"{column.size} speeds"
+        for mode, column in enumerate(gone.T)
+        if column.any()
     ]
-    texts += missing_modes(np.zeros(0), int(paths.whirl.still.max()), count.size, n)
+    texts += missing_modes(np.zeros(0), int(paths.whirl.still.max()), gone.shape[1], n)
     if paths.doubtful.any():
         first = paths.speeds[paths.doubtful.any(axis=1).argmax()]
         texts.append(f"modes could not be told apart by shape above {first:.6g} rad/s: two may be exchanged")

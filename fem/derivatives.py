@@ -14,12 +14,12 @@ difference of matrices, exact where they are linear or quadratic in θ; no equat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fem.assembly import WholeBand, assemble, both_planes, multiply, whirl_change
+from fem.result import holding_arrays
 from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
@@ -27,19 +27,16 @@ _BANDS = ("shaft", "mass", "gyroscopic", "material")
 _CHUNK = 32  # speeds at a time, so that memory does not grow with them
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class MatrixChange:
     """∂D by one number of a rotor: bands of shaft and discs that change, and supports at nodes.
 
-    The bands, by name, are those of the unknowns from `first` on; supports, (S, k, 2, 2), act on (F, b) as in
-    `Supported`.
+    Supports, (S, k, 2, 2), act on (F, b) as in `Supported`.
 
     Attributes
     ----------
     bands
-        By name, upper bands of the unknowns that change.
-    first
-        Their first unknown, from 0.
+        Those that change, by name, shape (width + 1, size).
     nodes
         Of the supports that change, from 1, length k.
     supports
@@ -47,7 +44,6 @@ class MatrixChange:
     """
 
     bands: dict[str, FloatArray]
-    first: int
     nodes: tuple[int, ...]
     supports: ComplexArray
 
@@ -86,13 +82,11 @@ def matrix_change(
         supports[:, k] = whirl_change(*pair, speeds) / width
     one, other = assemble(up), assemble(down)
     changes = {name: (getattr(one, name) - getattr(other, name)) / width for name in _BANDS}
-    columns = np.flatnonzero([each.any(axis=0) for each in changes.values()]) % one.size
-    first, end = max(0, columns.min(initial=one.size) - one.width), columns.max(initial=0) + 1
-    bands = {name: band[:, first:end] for name, band in changes.items() if band.any()}
-    return MatrixChange(bands, first, tuple(more.node for more, _ in pairs), supports)
+    bands = {name: band for name, band in changes.items() if band.any()}
+    return MatrixChange(bands, tuple(more.node for more, _ in pairs), supports)
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class ReceptanceWithDerivatives:
     """Receptance H (S, a, b) of sensors and loads, its derivatives by p numbers and by the sensors' angles.
 
@@ -163,9 +157,8 @@ def receptance_with_derivatives(
                 at = A.deflection(node)
                 derivative -= p[:, :, at] @ change.supports[part, k] @ q[:, at]
             for name, band in change.bands.items():
-                acting = slice(change.first, change.first + band.shape[1])
-                moved = q[:, acting].swapaxes(0, 1)
-                forces = multiply(band, moved.reshape(len(moved), -1)).reshape(moved.shape).swapaxes(0, 1)
+                moved = q.swapaxes(0, 1)
+                forces = multiply(band, moved.reshape(A.size, -1)).reshape(moved.shape).swapaxes(0, 1)
                 for plane, factor in enumerate(on_planes[_BANDS.index(name)]):
-                    derivative -= factor * (p[:, :, acting, plane] @ forces[:, :, plane])
+                    derivative -= factor * (p[..., plane] @ forces[:, :, plane])
     return ReceptanceWithDerivatives(H, by_number, by_angle)

@@ -6,18 +6,17 @@ circle F = (X + iY)/2 and a backward one B = (X − iY)/2: z = F e^{iωt} + B̄ 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fem.result import holding_arrays
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 STRAIGHT = 1e-9  # minor by major axis below which an orbit is a line: rounding, not whirl
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Orbits:
     """Ellipses, all arrays of one shape.
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -42,7 +42,7 @@ from fem.assembly import (
     supported,
 )
 from fem.orbits import orbits, probe
-from fem.result import Result
+from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, SensorLike, Support, as_sensor, label
 from fem.stability import Window, judge, within
 from fem.undamped import (
@@ -52,7 +52,7 @@ from fem.undamped import (
     lowest_modes,
     one_plane,
 )
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
@@ -68,7 +68,7 @@ PIVOT = 1e-4  # of the equations of the supports: below, four digits are lost
 _DIGITS = 1e-12  # of the static contribution of the modes left out, to which their series goes
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class Response(Result):
     """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
 
@@ -165,12 +165,12 @@ class Response(Result):
 
     def bearing_forces(self) -> BearingForces:
         """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
-        supports, speeds = self.rotor.supports, self.speeds
-        at = [self.column(support.node) for support in supports]
-        D = np.reshape([support.dynamic_stiffness(speeds) for support in supports], (-1, speeds.size, 2, 2))
-        x, y = np.einsum("bsij,jsb->isb", D, (self.x[:, at], self.y[:, at]))
-        read_only(x, y)
-        return BearingForces(speeds, supports, x, y, self.steady)
+        supports, xy = self.rotor.supports, np.array((self.x, self.y))
+        forces = np.zeros((2, self.speeds.size, len(supports)), complex)
+        for b, support in enumerate(supports):
+            D, at = support.dynamic_stiffness(self.speeds), self.column(support.node)
+            forces[..., b] = np.einsum("sij,js->is", D, xy[..., at])
+        return BearingForces(self.speeds, supports, *forces)
 
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
@@ -217,7 +217,7 @@ class Response(Result):
         return f"Largest amplitude {1e6 * self.largest[k]:.4g} µm peak at {where}."
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class BearingForces(Result):
     """Forces of the rotor on its supports, Re (x, y) e^{iωt}.
 
@@ -229,15 +229,12 @@ class BearingForces(Result):
         What is loaded, length B.
     x, y
         Complex amplitudes, N, shape (S, B).
-    steady
-        At which speeds they exist, shape (S,).
     """
 
     speeds: FloatArray
     supports: Sequence[Support]
     x: ComplexArray
     y: ComplexArray
-    steady: BoolArray
 
     @property
     def largest(self) -> FloatArray:
@@ -271,7 +268,7 @@ class BearingForces(Result):
         return f"Forces on {counted(len(self.supports), 'support')} at {speed_range(self.speeds)}."
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class InfluenceCoefficients(Result):
     """Vibration at sensors per unit of unbalance in planes.
 
@@ -430,7 +427,6 @@ def unbalance_response(
             both[: len(Z), part] = Z[:, kept - 1].swapaxes(1, 2)
             size = np.abs(Z).sum(axis=0)
             largest[part], where[part] = size.max(axis=0), size.argmax(axis=0) + 1
-        read_only(both, largest, where)
         warnings = receptance.warnings
         return Response(speeds, both[0], masses, rotor, warnings, both[1], largest, where, kept, solve)
 
@@ -483,7 +479,6 @@ def influence(
         read = H * (ways[: len(H)] * speeds[part] ** 2)
         W[part] = np.moveaxis(read.sum(axis=0), -1, 0)
     windows, texts = judge(rotor, speeds)
-    read_only(W)
     return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings, *texts), windows)
 
 
@@ -526,10 +521,8 @@ class Receptance:
         self.unknowns = A.deflections[np.subtract(nodes, 1)]
         self.loads = unit_loads(A, A.deflections[np.subtract(loaded, 1)]) @ weights
         at, beta = supported(rotor, speeds[:: 1 + speeds.size // 16]), rotor.material_damping
-        # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
-        middle = np.sort(at.stiffness[..., 0, 0].real, axis=0)[len(at.stiffness) // 2]
-        self.planes, self.springs, self.beta = at.planes, np.maximum(middle, 0.0), float(beta[0])
-        springs = dict(zip(at.nodes, self.springs.tolist(), strict=True))
+        springs, self.planes, self.beta = at.springs, at.planes, float(beta[0])
+        self.springs = np.array([*springs.values()])
         tilting = any(support.tilting_stiffness for support in rotor.supports)
         self.exact = exact or bool(at.planes == 2 and ((beta != beta[0]).any() or (beta[0] and tilting)))
         held = A.deflections[[node - 1 for node in at.nodes]]

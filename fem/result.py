@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar, dataclass_transform
+
+import numpy as np
 
 from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import read_only
 from rotorid.base.tables import Table, frame, html, terminal
 
 if TYPE_CHECKING:
@@ -14,8 +18,20 @@ if TYPE_CHECKING:
 NORMAL_95 = 1.959964  # standard deviations on each side that hold 95 % of a normal distribution
 
 
+T = TypeVar("T")
+
+
+@dataclass_transform(eq_default=False, frozen_default=True)
+def holding_arrays(cls: type[T]) -> type[T]:
+    """A frozen dataclass that equals itself only, as arrays have no one answer to `==`."""
+    return dataclass(frozen=True, eq=False, repr=False)(cls)
+
+
 class Result(Answered):
-    """A result with tables and one sentence."""
+    """A result with tables and one sentence; nobody may write into its arrays."""
+
+    def __post_init__(self) -> None:
+        read_only(*(value for value in vars(self).values() if isinstance(value, np.ndarray)))
 
     @abstractmethod
     def tables(self) -> tuple[Table, ...]:

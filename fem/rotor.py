@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.forces import NodeForce, check_numbers, code_of
+from fem.result import holding_arrays
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, read_only
 from rotorid.base.checks import attachment, number, whole
 from rotorid.base.registry import Method, find
@@ -265,7 +266,7 @@ class Support:
     ) -> tuple[ComplexArray, ComplexArray | None]:
         """What `dynamic_stiffness` puts in series: bearing and pedestal, (…, 2, 2) each; None: the ground."""
         k, c = self.at(omega if speed is None else speed)
-        w = np.asarray(omega, dtype=float)[..., None, None]
+        w = np.asarray(omega)[..., None, None]
         bearing = k + 1j * w * c
         stand = self.pedestal
         if stand is None:
@@ -333,7 +334,7 @@ def is_reading(path: str) -> bool:
     return re.fullmatch(r"probe\[[^*]+\]\.(angle|gain)|key_phasor\.angle", path) is not None
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Calibration:
     """Parameters that were fitted to readings, and how well the rotor with them agrees.
 
@@ -383,11 +384,10 @@ class Calibration:
         shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
         for name, shape in shapes.items():
             array = np.array(getattr(self, name), dtype=float)
-            if (array.size and array.shape != shape) or not np.isfinite(array).all():
+            if array.size != math.prod(shape) or not np.isfinite(array).all():
                 raise ValueError(f"calibration: {name} must be finite and of the shape {shape}")
-            array = array.reshape(shape)
-            read_only(array)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, array.reshape(shape))
+            read_only(getattr(self, name))
         R = self.correlation
         possible = np.allclose(R, R.T, rtol=0.0, atol=1e-9) and (np.linalg.eigvalsh(R) > -1e-9).all()
         if not possible or (self.lack_of_fit < 0).any():
@@ -436,7 +436,7 @@ class Calibration:
         return np.reshape(values, (-1, omega.size)).T
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Rotor:
     """A shaft of beam elements with discs and supports.
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.result import Result
+from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, Support
 from fem.undamped import lowest_critical_speeds
-from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class SpeedMap(Result):
     """Critical speeds over support stiffness.
 
@@ -111,5 +111,4 @@ def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> S
     softer, less, *speeds, more, stiffer = map(at, [soft / 4, soft, *k, stiff, 2 * stiff])
     pinned, chart = 2 * stiffer - more, np.array(speeds)
     free = np.where(np.abs(softer / less - 0.5) < 0.05, 0.0, softer - (less - softer) / 3)
-    read_only(k, chart, free, pinned)
     return SpeedMap(k, chart, free, pinned)

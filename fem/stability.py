@@ -23,7 +23,7 @@ import numpy as np
 from fem.assembly import both_planes
 from fem.forces import InternalDamping
 from fem.orbits import DIRECTION_NAMES
-from fem.result import Result
+from fem.result import Result, holding_arrays
 from fem.rotor import Rotor
 from fem.whirl import (
     GROWTH,
@@ -125,7 +125,7 @@ def within(windows: Iterable[Window], speeds: FloatArray) -> BoolArray:
     return sum(inside, np.zeros(speeds.shape, bool))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class Stability(Result):
     """Where a rotor loses stability.
 
@@ -171,6 +171,7 @@ class Stability(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; unknown values are None."""
+        way = None if self.direction is None else DIRECTION_NAMES[self.direction]
         return plain(
             {
                 "status": self.status,
@@ -181,7 +182,7 @@ class Stability(Result):
                 "mode": self.mode,
                 "frequency_rad_s": self.frequency,
                 "whirl_ratio": self.whirl_ratio,
-                "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
+                "direction": way,
                 "smallest_log_decrement": self.margin,
                 "warnings": self.warnings,
             }

@@ -1,7 +1,7 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
-In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass. Of these
-a have entries in C, b have none. Each kind is solved in turn: K for b, C for a', M for the acceleration of
+In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass. Of
+these a have entries in C, b have none. Each kind is solved in turn: K for b, C for a', M for the acceleration of
 what has mass. The states are q₁, q₁' and a.
 """
 
@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fem.assembly import both_planes, project
+from fem.result import holding_arrays
 from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Motion:
     """M q'' + C q' + K q = f of a rotor at one speed; real, in SI.
 
@@ -99,7 +99,7 @@ def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both"
     return Motion(M, D, K, tuple(itertools.compress(names, taken)), speed)
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class StateSpace:
     """s' = A s + B u, y = C s + D u.
 

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fem.assembly import Planes, WholeBand, both_planes, free_motions, multiply, rounding_error
-from fem.result import Result
+from fem.result import Result, holding_arrays
 from fem.rotor import Rotor
-from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import number
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -25,7 +25,7 @@ from rotorid.base.tables import Column, Table
 GRAVITY = 9.80665  # m/s²
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class StaticDeflection(Result):
     """A rotor under its own weight.
 
@@ -126,7 +126,6 @@ def static_deflection(
     springs = [support.dynamic_stiffness(0.0, speed).real for support in rotor.supports]
     x, y = X[:, P.A.deflections]
     at_x, at_y = -np.einsum("sij,js->is", springs, X[:, P.rows])
-    read_only(x, y, at_x, at_y)
     return StaticDeflection(x, y, at_x, at_y, gravity * rotor.total_mass, rotor, speed)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,9 +37,9 @@ from fem.assembly import (
 )
 from fem.elements import strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
-from fem.result import NORMAL_95, Result
+from fem.result import NORMAL_95, Result, holding_arrays
 from fem.rotor import Pedestal, Rotor, refined
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
@@ -59,7 +59,7 @@ _UNSTABLE = (
 _PARTS = (1 - np.cos(np.linspace(0, np.pi, 11))) / 2  # of an interval of the tables: fine at its ends
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class Modes(Result):
     """The lowest critical speeds of a rotor, and its shapes there.
 
@@ -159,7 +159,7 @@ class Modes(Result):
         return f"{counted(len(rpm), 'critical speed')} without damping{f': {shown} rpm' if rpm else ''}."
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class MeshCheck(Result):
     """Estimated discretisation errors of the critical speeds.
 
@@ -171,9 +171,6 @@ class MeshCheck(Result):
         Estimate for infinitely fine elements, rad/s, shape (n,).
     errors
         Estimated relative error of `frequencies`, shape (n,); positive: they are too high.
-    rates
-        Observed power of the element length with which the error falls, shape (n,); NaN where the errors
-        are below rounding. Near 4 the estimate is sound.
     elements
         Of the model.
     """
@@ -181,7 +178,6 @@ class MeshCheck(Result):
     frequencies: FloatArray
     extrapolated: FloatArray
     errors: FloatArray
-    rates: FloatArray
     elements: int
 
     def to_dict(self) -> dict[str, Any]:
@@ -192,17 +188,15 @@ class MeshCheck(Result):
                 "frequencies_rad_s": self.frequencies,
                 "extrapolated_rad_s": self.extrapolated,
                 "relative_error": self.errors,
-                "rate": self.rates,
             }
         )
 
     def tables(self) -> tuple[Table, ...]:
         """The errors, a row for each critical speed."""
         columns = (
-            Column("mode", range(1, self.rates.size + 1)),
+            Column("mode", range(1, self.errors.size + 1)),
             Column("rpm", self.frequencies * RPM, "{:.2f}".format, "frequencies_rad_s.*", RPM),
             Column("error of the mesh", self.errors, "{:.1e}".format, "relative_error.*"),
-            Column("rate (none: rounding)", self.rates, "{:.2f}".format, "rate.*"),
         )
         return (Table("errors of the mesh", columns),)
 
@@ -224,8 +218,7 @@ def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
     """Estimate how much the mesh changes each of the n lowest critical speeds; the rotor stays as it is.
 
     The frequencies f(h) of the elements of this package converge as h⁴, with and without shear; with
-    elements cut in two, f(h) − f(0) ≈ 16/15 (f(h) − f(h/2)) (Richardson). A third solution with h/4 shows the
-    rate.
+    elements cut in two, f(h) − f(0) ≈ 16/15 (f(h) − f(h/2)) (Richardson).
 
     Parameters
     ----------
@@ -239,16 +232,11 @@ def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
     ValueError
         As `critical_speeds`.
     """
-    lists = [critical_speeds(refined(rotor, times), n).frequencies for times in (1, 2, 4)]
-    common = min(map(len, lists))  # bearing tables may end between
-    coarse, middle, fine = (frequencies[:common] for frequencies in lists)
-    first, second = coarse - middle, middle - fine
-    extrapolated = coarse - 16 / 15 * first
-    with np.errstate(divide="ignore", invalid="ignore"):
-        errors = np.where(extrapolated > 0, 16 / 15 * first / extrapolated, 0.0)
-        rates = np.log2(np.where(np.abs(second) > 1e-10 * extrapolated, first / second, np.nan))
-    read_only(extrapolated, errors, rates)
-    return MeshCheck(coarse, extrapolated, errors, rates, rotor.n_elements)
+    lists = [critical_speeds(refined(rotor, times), n).frequencies for times in (1, 2)]
+    coarse, fine = (frequencies[: min(map(len, lists))] for frequencies in lists)  # tables may end between
+    extrapolated = coarse - 16 / 15 * (coarse - fine)
+    errors = np.where(extrapolated > 0, coarse / np.where(extrapolated > 0, extrapolated, 1.0) - 1, 0.0)
+    return MeshCheck(coarse, extrapolated, errors, rotor.n_elements)
 
 
 def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
@@ -313,8 +301,8 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
                 f"{least} critical speeds cannot be found: the model has 1 to {count}; divide the shaft into "
                 "more elements (discs whose polar inertia exceeds the diametral one take some away)"
             )
-        modes = modes.only(slice(most + rigid))
-        squares, rounding, motion = modes.squares, modes.rounding, modes.motion
+        last = most + rigid
+        squares, rounding, motion = modes.squares[:last], modes.rounding[:last], modes.motion[..., :last]
     else:
         parts, beyond, cut = _over_speed(rotor, A, most)
         warnings = beyond + warnings
@@ -329,7 +317,6 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
     ways = np.ones(squares.size) if rotor.symmetric else whirl_direction(x.T, y.T)
     direction = tuple(DIRECTION_NAMES[way] for way in ways.tolist())
     frequencies, (shapes, slopes) = np.sqrt(squares), (major * scale).real
-    read_only(frequencies, shapes, slopes, x, y)
     warnings += fine_mesh_warning(rotor, rounding)
     return Modes(frequencies, shapes, slopes, rotor, direction, x, y, warnings, cut)
 
@@ -462,11 +449,13 @@ def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
         spectrum = lowest_modes(pencil.rotor, pencil.matrices, min(m, finite), pencil)
         negative = np.count_nonzero(spectrum.squares < 0)
         if m >= finite or (m - negative >= n and spectrum.squares.max() > top):
+            if not negative:
+                return spectrum
             return spectrum.only(np.argsort(spectrum.squares, kind="stable")[negative:])
         m = 2 * m + 2
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Pencil:
     """Bands of stiffness and mass, and what is kept beyond them.
 
@@ -613,7 +602,7 @@ def _pencil(
     return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Spectrum:
     """The lowest m modes.
 
@@ -728,11 +717,8 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
     elastic = max(m - free, 0)
     K = pencil.stiffness + shift * pencil.mass
-    try:
-        moving = _vectors(pencil, K, U, elastic, multiply(pencil.mass, fixed))
-        mu, Y = _largest(moving.conj().T @ multiply(pencil.mass, moving), elastic, pencil.energy(moving))
-    except np.linalg.LinAlgError:
-        raise ValueError(_UNSTABLE) from None
+    moving = _vectors(pencil, K, U, elastic, multiply(pencil.mass, fixed))
+    mu, Y = _largest(moving.conj().T @ multiply(pencil.mass, moving), elastic, pencil.energy(moving))
     X = np.hstack((fixed, moving @ Y / np.sqrt(np.abs(mu))))[:, :m]
     mu = np.append(np.full(free, np.inf), mu)[:m]
     squares = 1 / mu
@@ -761,19 +747,18 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
 def _largest(
     T: AnyArray, m: int, energy: AnyArray | None = None, ends: tuple[int, int] | None = None
 ) -> tuple[FloatArray, AnyArray]:
-    """The m eigenvalues of largest size, of those at `ends` if given, and their vectors of energy 1."""
+    """The m eigenvalues of largest size, of those from to, from 1, and their vectors of energy 1."""
     from scipy.linalg import lapack
 
     if energy is None:
         mu, Q = np.linalg.eigh(T)
     else:
+        solve = lapack.dsygvx if np.isrealobj(T) else lapack.zhegvx
         first, last = ends or (1, len(T))
-        solve = lapack.zhegvx if np.iscomplexobj(T) else lapack.dsygvx
         mu, Q, _, _, info = solve(T, energy, range="I", il=first, iu=last)
-        mu = mu[: Q.shape[1]]
         if info:
-            raise np.linalg.LinAlgError
-    order = np.argsort(-np.abs(mu), kind="stable")[:m]
+            raise ValueError(_UNSTABLE)
+    order = np.argsort(-np.abs(mu[: Q.shape[1]]), kind="stable")[:m]
     return mu[order], Q[:, order]
 
 
@@ -790,14 +775,10 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
     size, block = pencil.size, 4  # equal frequencies are not missed
     most = min(m + 1, size - rigid.shape[1])
 
-    def inertia(W: AnyArray) -> AnyArray:
-        loads = multiply(pencil.mass, W)
-        if rigid.size:
-            loads = loads - rigid @ (rigid.conj().T @ W)
-        return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
-
     def operator(V: AnyArray) -> AnyArray:
-        return inertia(tbtrs(U, V)[0])
+        W = tbtrs(U, V)[0]
+        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
+        return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
 
     def orthonormal(Z: AnyArray) -> tuple[AnyArray, AnyArray]:
         packed, tau, *_ = geqrf(Z)
@@ -805,18 +786,17 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
 
     if size > DENSE:
         # Smooth loads, which differ from one to the other wave.
-        s = np.linspace(1, 2, size) * (1 + np.arange(size) % len(pencil.waves))
-        V = operator(inertia(np.cos(np.outer(np.arange(block), s)).astype(U.dtype).T))
-        V, residual = orthonormal(V)[0], np.inf
-        spaces = np.empty((2, size // 2, size), U.dtype).swapaxes(1, 2)
-        for k in range(block, size // 2, block):
+        s = np.linspace(1, 2, size) * (1 + np.arange(size) % len(pencil.shaft))
+        V = orthonormal(operator(operator(np.cos(np.outer(s, np.arange(block))).astype(U.dtype))))[0]
+        basis = image = np.empty((size, 0), U.dtype)
+        residual = np.inf
+        while basis.shape[1] < size // 2:
             Z = operator(V)
-            spaces[:, :, k - block : k] = V, Z
-            basis, image = spaces[:, :, :k]
+            basis, image = np.hstack((basis, V)), np.hstack((image, Z))
             for _ in range(2):
                 Z = Z - basis @ (basis.conj().T @ Z)
             V, beta = orthonormal(Z)
-            if k < 2.5 * m + 6:
+            if basis.shape[1] < 2.5 * m + 6:
                 continue
             mu, Q = _largest(basis.conj().T @ image, most)
             # What the operator adds outside the basis; on fine meshes rounding stops it before the tolerance.

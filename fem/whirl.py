@@ -26,17 +26,17 @@ Small real parts. With λ = ς + iω the imaginary part of xᴴ (λ² M + λ D +
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
+from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project, supported
 from fem.orbits import DIRECTION_NAMES, whirl_direction
-from fem.result import Result
-from fem.rotor import Rotor, Support
-from fem.undamped import Spectrum, finite_modes, lowest_modes
+from fem.result import Result, holding_arrays
+from fem.rotor import Rotor
+from fem.undamped import Spectrum, finite_modes, lowest_modes, one_plane
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
@@ -57,7 +57,7 @@ _INFINITE = 1e-6  # |μ| below this part of the largest: no mass moves, or too l
 _QUIET = 1e-6  # |Re λ| below this part of |λ| comes from work, not from the eigenvalue, which has rounding
 
 
-@dataclass(frozen=True, eq=False)
+@holding_arrays
 class Whirl:
     """Oscillating modes at each speed, by rising frequency, in one basis.
 
@@ -247,7 +247,7 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
 
 
 def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
-    """The m lowest modes of a plane on supports as at the middle speed, without pedestals; their scale.
+    """The m lowest modes of a plane on springs like the supports at the middle speed; their scale.
 
     Parameters
     ----------
@@ -258,13 +258,8 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     -------
     The modes, and the lowest frequency that is not 0, rad/s.
     """
-    K, _ = P.supports(speeds[speeds.size // 2, None])
-    springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
-    supports = [
-        Support(s.node, spring, tilting_stiffness=s.tilting_stiffness)
-        for s, spring in zip(P.rotor.supports, springs, strict=True)
-    ]
-    spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
+    springs = supported(P.rotor, speeds[speeds.size // 2, None]).springs
+    spectrum = lowest_modes(P.rotor, P.A, m, one_plane(P.rotor, P.A, 0, springs))
     moving = spectrum.squares[spectrum.squares > 0]
     return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
 
@@ -309,7 +304,7 @@ def _vectors_and_loads(whirl: Whirl, shift: float) -> tuple[ComplexArray, Comple
     return x, np.concatenate(((lam * lam - shift) * x, lam * turned, lam * x + turned), axis=3)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@holding_arrays
 class WhirlModes(Result):
     """Modes of the rotor at one speed, by rising frequency.
 

@@ -175,18 +175,15 @@ def draw_polar(
     room, marked = 0.08 * np.nanmax(np.abs(Z)), np.zeros(0)
     for k, (reading, name) in enumerate(zip(Z.T, labels, strict=True)):
         ax.plot(np.angle(reading), np.abs(reading), linewidth=1.6, label=name, **look(k))
-        there, color = ~np.isnan(reading), COLORS[k % len(COLORS)]
-        rpm, curve = omega[there] * RPM, reading[there]
-        way = np.cumsum(np.abs(np.diff(curve, prepend=curve[:1])))  # along it a resonance gets its share
-        even = np.interp(np.linspace(0, way[-1], marks + 1), way, rpm) if way.size else ()
-        for speed in np.unique(np.round(even)):
-            z = np.interp(speed, rpm, curve)
-            if (np.abs(marked - z) < room).any():
+        there, color = np.flatnonzero(~np.isnan(reading)), COLORS[k % len(COLORS)]
+        way = np.cumsum(np.abs(np.diff(reading[there], prepend=0)))  # along it a resonance gets its share
+        for i in there[np.searchsorted(way, np.linspace(*way[[0, -1]], marks + 1))] if there.size else ():
+            if (np.abs(marked - (z := reading[i])) < room).any():
                 continue
             marked, angle = np.append(marked, z), np.angle(z)
             ax.plot(angle, abs(z), MARKERS[k % len(MARKERS)], color=color, markersize=6, zorder=4)
             outwards = (20 * np.cos(angle), 11 * np.sin(angle))
-            note(ax, f"{speed:.0f}", (angle, abs(z)), outwards, ha="center", va="center", color=color,
+            note(ax, f"{omega[i] * RPM:.0f}", (angle, abs(z)), outwards, ha="center", va="center", color=color,
                  bbox=BOX)  # fmt: skip
     ax.grid(color="#d0d5dc", linewidth=0.8)
     way_round = "phase lag, degrees, against the rotation" if lag else "phase lead, degrees"

@@ -156,7 +156,7 @@ class RunReadings:
             for each in (start, rotor)
         )
         A, at = assemble(first), supported(first, self.trials.speeds)
-        pencil = one_plane(first, A, 0, dict(zip(at.nodes, at.reference.tolist(), strict=True)))
+        pencil = one_plane(first, A, 0, at.springs)
         still = pencil.rigid.shape[1]
         if self.bow > (most := finite_modes(pencil) - still):
             raise ValueError(f"the shaft has {counted(most, 'shape')} of a bow, not {self.bow}")
