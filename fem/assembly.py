@@ -27,6 +27,8 @@ Symmetric bands are kept as LAPACK does, upper form: `band[width + i - j, j]` is
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fem.elements import dense as dense
@@ -121,16 +123,6 @@ def free_motions(rotor: Rotor, held: set[int]) -> int:
     """Number of rigid-body motions, of 2, left by springs at the nodes `held` and by tilting springs."""
     tilting = any(support.tilting_stiffness > 0 for support in rotor.supports)
     return max(2 - len(held) - tilting, 0)
-
-
-def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
-    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
-    free = np.ones(band.shape[1])
-    free[unknowns] = 0.0
-    above = range(len(band) - 1, -1, -1)
-    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
-    K[-1, unknowns] = 1.0
-    return K
 
 
 def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
@@ -396,9 +388,12 @@ class WholeBand:
         self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
         self._from = np.linalg.inv(self._to)
 
-    def factor(self, value: complex, speed: float) -> Factored:
-        """LU factors of λ² M + λ D + K at one λ and speed."""
-        from scipy.linalg.lapack import zgbtrf
+    def factor(self, value: complex, speed: float) -> Callable[..., ComplexArray]:
+        """Solutions X of P X = B, P = λ² M + λ D + K at one λ and speed: of B, and whether of Pᵀ X = B.
+
+        B is of shape (size,) or (size, m), in the order of the band.
+        """
+        from scipy.linalg.lapack import zgbtrf, zgbtrs
 
         P, p, reach = self.P, self.P.planes, self.reach
         band = np.zeros((3 * reach + 1, self.size), complex, order="F")
@@ -412,7 +407,11 @@ class WholeBand:
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)
         if info > 0:  # singular to the last bit: an eigenvalue
             lu[2 * reach, info - 1] = 1e-16 * np.abs(lu).max()
-        return Factored(reach, lu, pivots)
+
+        def solve(B: ComplexArray, transposed: bool = False) -> ComplexArray:
+            return np.asarray(zgbtrs(lu, reach, reach, B, pivots, trans=int(transposed))[0])
+
+        return solve
 
     def interleaved(self, X: AnyArray) -> ComplexArray:
         """From (…, planes, size) to the order of the band, (…, planes · size)."""
@@ -422,18 +421,3 @@ class WholeBand:
         """Back to (…, planes, size)."""
         alternating = X.reshape(*X.shape[:-1], -1, self.P.planes)
         return self._to @ np.swapaxes(alternating, -1, -2)
-
-
-@holding_arrays
-class Factored:
-    """Solutions with one factored matrix."""
-
-    reach: int
-    lu: ComplexArray
-    pivots: AnyArray
-
-    def solve(self, b: ComplexArray, *, transposed: bool = False) -> ComplexArray:
-        """P⁻¹ b, or P⁻ᵀ b, for b of shape (size,) or (size, m), in the order of the band."""
-        from scipy.linalg.lapack import zgbtrs
-
-        return np.asarray(zgbtrs(self.lu, self.reach, self.reach, b, self.pivots, trans=int(transposed))[0])

@@ -138,8 +138,8 @@ def receptance_with_derivatives(
     for start in range(0, speeds.size, _CHUNK):
         part = slice(start, start + _CHUNK)
         factors = [whole.factor(1j * speed, speed) for speed in speeds[part].tolist()]
-        solved = [one.solve(f.reshape(whole.size, -1)) for one in factors]
-        adjoint = [one.solve(u.reshape(whole.size, -1), transposed=True) for one in factors]
+        solved = [one(f.reshape(whole.size, -1)) for one in factors]
+        adjoint = [one(u.reshape(whole.size, -1), transposed=True) for one in factors]
         # (S, size, 2, b) and (S, a, size, 2), forward and backward
         q, p = np.reshape(solved, (-1, *f.shape)), np.moveaxis(np.reshape(adjoint, (-1, *u.shape)), -1, 1)
         F, b = q[:, rows, 0], q[:, rows, 1]

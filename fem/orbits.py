@@ -26,9 +26,6 @@ class Orbits:
         Semi-axes, not negative, in the unit of the amplitudes.
     inclination
         Of the major axis from x, with the rotation, rad, above −π/2 up to π/2.
-    phase
-        Lead of the motion along the major axis (its positive end at `inclination`), rad, −π to π: the shaft
-        is farthest out there when ωt = −phase.
     direction
         1 forward (with the rotation), −1 backward, 0 a straight line.
     """
@@ -36,7 +33,6 @@ class Orbits:
     major: FloatArray
     minor: FloatArray
     inclination: FloatArray
-    phase: FloatArray
     direction: FloatArray
 
 
@@ -56,18 +52,14 @@ def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
     """
     forward, backward = (np.add(x, np.multiply(way, y)) / 2 for way in (1j, -1j))
     f, b = np.abs(forward), np.abs(backward)
-    a, c = np.angle(forward), np.angle(backward)
+    half = (np.angle(forward) - np.angle(backward)) / 2
     # A circle has no major axis: measure from x.
     circle = np.minimum(f, b) <= 1e-15 * np.maximum(f, b)
-    inclination = np.where(circle, 0.0, (a - c) / 2)
-    phase = np.where(circle, np.where(f >= b, a, c), (a + c) / 2)
-    turned = (inclination > np.pi / 2) | (inclination <= -np.pi / 2)
     line = np.abs(f - b) <= STRAIGHT * (f + b)
     return Orbits(
         major=f + b,
         minor=np.where(line, 0.0, np.abs(f - b)),
-        inclination=inclination - np.pi * turned * np.sign(inclination),
-        phase=np.angle(np.exp(1j * (phase + np.pi * turned))),
+        inclination=np.where(circle, 0.0, half - np.pi * np.ceil(half / np.pi - 0.5)),
         direction=np.where(line, 0.0, np.sign(f - b)),
     )
 

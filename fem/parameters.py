@@ -123,30 +123,6 @@ def as_change(rotor: Rotor, path: str) -> str:
     return f"{path}.offset" if tabled and not suffix else path
 
 
-def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
-    """Derivatives (n, n) of changes, as `with_changes` makes them of the rotor with these values, by these.
-
-    A scale s is 1 there, and multiplies what is added to the same numbers, a, too: ds' = ds / s,
-    da' = da − a ds / s.
-
-    Raises
-    ------
-    ValueError
-        For what is added to more numbers than such a scale multiplies.
-    """
-    T = np.eye(len(values))
-    numbers = [numbers_of(rotor, path) for path in values]
-    for j, (path, scale) in enumerate(values.items()):
-        if path.endswith(".scale"):
-            T[j, j] = 1 / (scale or 1.0)  # with nothing left of the numbers
-            for i, (other, added) in enumerate(values.items()):
-                if other.endswith(".offset") and numbers[i] & numbers[j]:
-                    if not numbers[i] <= numbers[j]:
-                        raise ValueError(f"{other} adds to more numbers than {path} multiplies")
-                    T[i, j] = -added * T[j, j]
-    return T
-
-
 def numbers_of(rotor: Rotor, path: str) -> frozenset[tuple[str, int, str]]:
     """Which numbers a parameter sets, scales or adds to: kind, place, name of each; none of a reading."""
     return frozenset(_parameter(rotor, path)[0])

@@ -593,7 +593,7 @@ class Receptance:
         planes, b = band.P.planes, loads.shape[1]
         rhs = np.zeros((band.size, b), dtype=complex)
         rhs[::planes] = loads  # F and b alternate
-        X = np.array([band.factor(1j * speed, speed).solve(rhs) for speed in omega.tolist()])
+        X = np.array([band.factor(1j * speed, speed)(rhs) for speed in omega.tolist()])
         X = X.reshape(-1, A.size, planes, b).swapaxes(0, 1)
         inertia = (X.conj() * multiply(A.mass, X.reshape(A.size, -1)).reshape(X.shape)).real.sum(axis=(0, 2))
         work = np.abs(np.einsum("ib,isb->sb", loads, X[:, :, 0]))

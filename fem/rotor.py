@@ -204,8 +204,6 @@ class Support:
     @cached_property
     def symmetric(self) -> bool:
         """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
-        if self.plain:
-            return True
         xx, xy, yx, yy = self.table.reshape(-1, 4).T
         stand = self.pedestal
         alike = stand is None or {type(stand.stiffness), type(stand.damping)} == {float}
@@ -284,17 +282,17 @@ class Support:
 
 def _canonical(value: Any, shape: tuple[int, ...], what: str, signed: bool = False) -> Any:  # noqa: ANN401
     """A number where it is the same in all directions, else tuples of this shape."""
-    array = np.array(value, dtype=float)
-    if not array.ndim:
-        return number(value, what, signed=signed)
-    if array.shape != shape:
+    array = np.array(value, dtype=float) + 0.0
+    if array.shape not in ((), shape):
         raise ValueError(f"{what} must be a number or of the shape {shape}, not {value!r}")
-    entries = [number(entry, what, signed=True) for entry in array.flat]
-    between = len(entries) - 1
-    first, last = (number(entry, what, signed=signed) for entry in entries[::between])
-    if first == last and not any(entries[1:between]):
+    first, *between, last = (
+        number(entry, what, signed=True) for entry in (array.flat if array.ndim else 2 * [array])
+    )
+    for entry in (first, last):
+        number(entry, what, signed=signed)
+    if first == last and not any(between):
         return first
-    return tuple(entries) if between == 1 else (tuple(entries[:2]), tuple(entries[2:]))
+    return (first, last) if array.ndim == 1 else tuple(map(tuple, array.tolist()))
 
 
 @dataclass(frozen=True)
@@ -397,12 +395,6 @@ class Calibration:
             )
 
     @property
-    def readings(self) -> dict[str, float]:
-        """Those of the parameters that are no numbers of a rotor: angles in degrees, and gains."""
-        values = zip(self.names, self.values.tolist(), strict=True)
-        return {name: value for name, value in values if is_reading(name)}
-
-    @property
     def std(self) -> FloatArray:
         """Standard deviations, shape (n,)."""
         return np.sqrt(np.abs(np.diag(self.covariance)))
@@ -421,19 +413,6 @@ class Calibration:
         values, V = np.linalg.eigh(self.correlation)
         kept = values > 1e-12 * max(values, default=0.0)
         return np.asarray(np.diag(self.std) @ V[:, kept] * np.sqrt(values[kept]))
-
-    def lack_at(self, speeds: ArrayLike, sensors: Sequence[str]) -> FloatArray:
-        """Lack of fit at other speeds, rad/s, and sensors, shape (S', C').
-
-        That of the nearest speed; of a sensor that was not compared the largest of all; 0 where nothing was.
-        """
-        omega = np.atleast_1d(speeds)
-        if not self.lack_of_fit.size:
-            return np.zeros((omega.size, len(sensors)))
-        lack = self.lack_of_fit[np.abs(omega[:, None] - self.speeds).argmin(axis=1)].T
-        columns = dict(zip(self.sensors, lack, strict=True))
-        values = [columns.get(sensor, lack.max(axis=0)) for sensor in sensors]
-        return np.reshape(values, (-1, omega.size)).T
 
 
 @holding_arrays

@@ -217,17 +217,11 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     for support in rotor.supports:
         k, c = support.at(speeds)
         tiny, slack = (_SLACK * np.abs(one).max(axis=(1, 2)) for one in (k, c))
-        stiffness, damping = map(_least, (k, c))
+        stiffness, damping = (np.linalg.eigvalsh((one + one.swapaxes(1, 2)) / 2)[:, 0] for one in (k, c))
         driving = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2
         highest = np.where(driving > tiny, driving / np.maximum(damping, _NO_DAMPING), 0.0)
         bound = np.maximum(bound, np.where((stiffness < -tiny) | (damping < -slack), np.inf, highest))
     return bound
-
-
-def _least(A: FloatArray) -> FloatArray:
-    """Least eigenvalue of the symmetric parts of matrices (S, 2, 2)."""
-    a, d = A[:, 0, 0], A[:, 1, 1]
-    return np.asarray((a + d - np.hypot(a - d, A[:, 0, 1] + A[:, 1, 0])) / 2)
 
 
 def grid_of(rotor: Rotor, speeds: FloatArray) -> FloatArray:

@@ -1,8 +1,8 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
 In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass. Of
-these a have entries in C, b have none. Each kind is solved in turn: K for b, C for a', M for the acceleration of
-what has mass. The states are q₁, q₁' and a.
+these a have entries in C, b have none. Each kind is solved in turn: K for b, C for a', M for the acceleration
+of what has mass. The states are q₁, q₁' and a.
 """
 
 from __future__ import annotations

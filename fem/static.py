@@ -172,7 +172,7 @@ def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
         if free_motions(P.rotor, set(P.rows[springs[:, plane, plane] != 0])):
             raise ValueError("a rotor that is not held has no rest: give stiffness to supports at two nodes")
     whole = WholeBand(P)
-    X = whole.planes(whole.factor(0.0, speed).solve(whole.interleaved(forces).T).T).real
+    X = whole.planes(whole.factor(0.0, speed)(whole.interleaved(forces).T).T).real
     flat, work = X.reshape(-1, P.A.size), np.abs((forces * X).sum(axis=(1, 2)))
     if not (rounding_error(P.A.shaft, flat.T, np.repeat(work, 2)) < 1e-3).all():
         raise ValueError(

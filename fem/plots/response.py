@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,13 +55,10 @@ def draw_response(
 ) -> Axes:
     """Draw amplitude over speed at some nodes: the longer half axis of their orbits.
 
-    By default at the named stations, or at the supports, and where the rotor moves most.
+    By default at the named stations, or else at the supports.
     """
     if nodes is None:
-        rotor = response.rotor
-        named: Iterable[str | int] = rotor.stations or [support.node for support in rotor.supports]
-        largest = (response.major * response.steady[:, None]).max(axis=0)
-        nodes = list(dict.fromkeys([*named, int(response.nodes[np.argmax(largest)])]))
+        nodes = [*response.rotor.stations] or [support.node for support in response.rotor.supports]
     labels = [f"node {node}" for node in nodes]
     curves = 1e6 * response.major[:, [response.column(node) for node in nodes]]
     return _amplitudes(ax, response, curves, labels, "amplitude, µm peak")
@@ -183,8 +180,8 @@ def draw_polar(
             marked, angle = np.append(marked, z), np.angle(z)
             ax.plot(angle, abs(z), MARKERS[k % len(MARKERS)], color=color, markersize=6, zorder=4)
             outwards = (20 * np.cos(angle), 11 * np.sin(angle))
-            note(ax, f"{omega[i] * RPM:.0f}", (angle, abs(z)), outwards, ha="center", va="center", color=color,
-                 bbox=BOX)  # fmt: skip
+            words = f"{omega[i] * RPM:.0f}"
+            note(ax, words, (angle, abs(z)), outwards, ha="center", va="center", color=color, bbox=BOX)
     ax.grid(color="#d0d5dc", linewidth=0.8)
     way_round = "phase lag, degrees, against the rotation" if lag else "phase lead, degrees"
     ax.set_title(f"amplitude, {unit.word}, over {way_round}; marks: speed, rpm", fontsize=TEXT)

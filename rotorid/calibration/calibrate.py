@@ -14,13 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from fem import Calibration, Rotor, is_reading
-from fem.parameters import as_they_stand, with_parameters
+from fem.parameters import with_parameters
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.calibration.calibrated_rotor import LEVEL, CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
 from rotorid.calibration.run_readings import ReadingRows, RunReadings
-from rotorid.calibration.unknowns import Unknown, check_different
+from rotorid.calibration.unknowns import Unknown, as_they_stand, check_different
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from

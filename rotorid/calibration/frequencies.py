@@ -21,9 +21,10 @@ from fem import (
     lowest_critical_speeds,
 )
 from fem.assembly import static_stiffness
-from fem.parameters import as_they_stand, typical_size, with_changes, with_parameters
+from fem.parameters import typical_size, with_changes, with_parameters
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.rpm import rpm_text
+from rotorid.calibration.unknowns import as_they_stand
 
 STEP = 1e-4
 """Of a number's typical size, for central differences."""

@@ -29,9 +29,10 @@ from fem import (
     unit_loads,
 )
 from fem.assembly import assemble, multiply, supported
-from fem.parameters import as_they_stand, typical_size, with_changes, with_parameters
+from fem.parameters import typical_size, with_changes, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
+from rotorid.calibration.unknowns import as_they_stand
 from rotorid.regression import least_squares, solution, stretch
 
 STEP = 1e-4

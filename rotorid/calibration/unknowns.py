@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fem import Rotor, is_reading
 from fem.parameters import numbers_of, parameter_value
+from rotorid.base.arrays import FloatArray
 
 _SIGNED = ("kxy", "kyx", "cxy", "cyx", "offset", "angle")
 """Last words of paths of numbers that may have either sign."""
@@ -84,3 +85,27 @@ def check_different(rotor: Rotor, paths: Sequence[str]) -> None:
             how = {ways[i], ways[k]}
             if numbers[i] & numbers[k] and ("" in how or (len(how) == 1 and numbers[i] == numbers[k])):
                 raise ValueError(f"{paths[i]} and {path} are the same number of the rotor: estimate one")
+
+
+def as_they_stand(rotor: Rotor, values: Mapping[str, float]) -> FloatArray:
+    """Derivatives (n, n) of changes, as `with_changes` makes them of the rotor with these values, by these.
+
+    A scale s is 1 there, and multiplies what is added to the same numbers, a, too: ds' = ds / s,
+    da' = da − a ds / s.
+
+    Raises
+    ------
+    ValueError
+        For what is added to more numbers than such a scale multiplies.
+    """
+    T = np.eye(len(values))
+    numbers = [numbers_of(rotor, path) for path in values]
+    for j, (path, scale) in enumerate(values.items()):
+        if path.endswith(".scale"):
+            T[j, j] = 1 / (scale or 1.0)  # with nothing left of the numbers
+            for i, (other, added) in enumerate(values.items()):
+                if other.endswith(".offset") and numbers[i] & numbers[j]:
+                    if not numbers[i] <= numbers[j]:
+                        raise ValueError(f"{other} adds to more numbers than {path} multiplies")
+                    T[i, j] = -added * T[j, j]
+    return T

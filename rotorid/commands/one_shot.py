@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing import Gaussian, Trials, reading_of, usual_run_errors, with_parameters
+from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
 from rotorid.commands.outcome import hash_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from balancing import Influence, Labels
-    from fem import Rotor
+    from fem import Calibration, Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.commands.model_places import ModelPlaces
     from rotorid.tables import Job
@@ -43,7 +44,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     W, dW = _derivatives(_runs(influence, places, job.key_phasor), job.rotor)
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
-    lack = calibration.lack_at(influence.speeds, influence.sensors)
+    lack = lack_at(calibration, influence.speeds, influence.sensors)
     none = Gaussian.none(*W.shape).noise
     errors = Gaussian(none.own[0], none.columns, influence.reading, usual_run_errors(job.trials))
     found = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
@@ -51,6 +52,19 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
         return found
     warnings = *found.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
     return replace(found, remarks=found.remarks._replace(warnings=warnings))
+
+
+def lack_at(calibration: Calibration, speeds: FloatArray, sensors: Sequence[str]) -> FloatArray:
+    """Lack of fit at other speeds, rad/s, and sensors, shape (S', C').
+
+    That of the nearest speed; of a sensor that was not compared the largest of all; 0 where nothing was.
+    """
+    if not calibration.lack_of_fit.size:
+        return np.zeros((speeds.size, len(sensors)))
+    lack = calibration.lack_of_fit[np.abs(speeds[:, None] - calibration.speeds).argmin(axis=1)].T
+    columns = dict(zip(calibration.sensors, lack, strict=True))
+    values = [columns.get(sensor, lack.max(axis=0)) for sensor in sensors]
+    return np.reshape(values, (-1, speeds.size)).T
 
 
 def counted_before(job: Job) -> bool:
@@ -92,7 +106,8 @@ def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunRe
 def _values(rotor: Rotor) -> Mapping[str, float]:
     """The calibrated numbers as they stand."""
     assert rotor.calibration is not None
-    angles = dict(rotor.calibration.readings)
+    numbers = zip(rotor.calibration.names, rotor.calibration.values.tolist(), strict=True)
+    angles = {path: value for path, value in numbers if is_reading(path)}
     paths = dict.fromkeys(as_change(rotor, path) for path in (*rotor.calibration.names, *angles))
     return {path: angles[path] if path in angles else parameter_value(rotor, path) for path in paths}
 

@@ -28,7 +28,7 @@ import numpy as np
 
 import fem
 from fem import Pencil, Spectrum, lowest_modes, whole_rotor
-from fem.assembly import assemble, held, ignored_inertia, multiply
+from fem.assembly import assemble, ignored_inertia, multiply
 from rotorid.base import registry
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
@@ -42,6 +42,7 @@ from rotorid.reduction.equivalent.equivalent_masses_formula_50 import (
 )
 from rotorid.reduction.equivalent.plane_at_rest import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.small_model_modes import like, mac, natural_frequencies
+from rotorid.reduction.equivalent.support_flexibility_formula_47 import held
 from rotorid.reduction.guyan_irs_serep_result import Method, Methods
 
 DEPENDENT = 1e-6

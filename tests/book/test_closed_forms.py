@@ -106,7 +106,7 @@ def test_the_banded_matrices_at_a_complex_frequency(planes, value):
     disc = P.A.stride
     load = np.zeros((planes, P.A.size), dtype=complex)
     load[:, disc] = [1, -1j][:planes]  # of x + iy
-    found = band.planes(band.factor(value, SPEED).solve(band.interleaved(load)))[:, disc]
+    found = band.planes(band.factor(value, SPEED)(band.interleaved(load)))[:, disc]
     support = 2 * (DIRECT + value * DAMPING)
     exact = 1 / (MASS * value**2 + 1 / (1 / shaft(value) + 1 / support))
     np.testing.assert_allclose(found, exact * np.array([1, -1j])[:planes], rtol=1e-8)

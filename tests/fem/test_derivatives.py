@@ -10,7 +10,8 @@ from fem_rotors import uniform
 import fem
 from fem import matrix_change, receptance_with_derivatives, unit_loads
 from fem.assembly import assemble
-from fem.parameters import as_they_stand, parameter_value, typical_size, with_changes, with_parameters
+from fem.parameters import parameter_value, typical_size, with_changes, with_parameters
+from rotorid.calibration.unknowns import as_they_stand
 
 ALPHA = np.array([0.0, 90.0, 37.0])
 

@@ -1,7 +1,6 @@
 """The mesh check, and cutting elements."""
 
 import json
-import math
 
 import numpy as np
 import pytest
@@ -30,14 +29,13 @@ def test_the_estimate_is_the_true_error(n, shear):
     np.testing.assert_array_equal(check.frequencies, fem.critical_speeds(rotor, 2).frequencies)
 
 
-def test_rates_and_results():
+def test_results():
     check = fem.mesh_check(rotor23(), 3)
-    np.testing.assert_allclose(check.rates, 4.0, atol=0.1)
     assert check.errors[2] == pytest.approx(7.85e-5, rel=0.01)
     document = json.loads(json.dumps(check.to_dict()))
     assert document["elements"] == 23
     assert document["relative_error"] == check.errors.tolist()
-    assert check.to_frame().shape == (3, 4)
+    assert check.to_frame().shape == (3, 3)
     assert check.summary().startswith("The mesh of 23 elements changes these speeds by at most ")
     worst = 100 * np.abs(check.errors).max()
     assert f"{worst:.2g} % (critical speed {np.argmax(np.abs(check.errors)) + 1})" in check.summary()
@@ -47,14 +45,10 @@ def test_rates_and_results():
     assert "times shorter would bring all errors below 0.1 %" in coarse.answer.judgement
 
 
-def test_rigid_motions_have_no_error_and_rounding_no_rate():
+def test_rigid_motions_have_no_error():
     check = fem.mesh_check(uniform(10), 3)
     assert check.errors[:2].tolist() == [0.0, 0.0]
     assert check.errors[2] > 0
-    fine = fem.mesh_check(uniform(150, supports=[fem.Support(1, 1e8), fem.Support(151, 1e8)]), 1)
-    assert math.isnan(fine.rates[0])
-    assert fine.to_dict()["rate"] == [None]
-    assert "rate (none: rounding)" in fine.answer.whole()
 
 
 def test_cutting_elements_moves_everything_along():

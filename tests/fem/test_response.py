@@ -328,12 +328,8 @@ def test_axes_are_those_of_the_traced_curve(x, y):
 
 
 @given(amplitudes, amplitudes)
-def test_the_shaft_is_farthest_out_at_inclination_and_phase(x, y):
+def test_the_major_axis_stands_at_its_inclination(x, y):
     found = fem.orbits(x, y)
-    at = np.exp(-1j * found.phase)
-    z = np.real(x * at) + 1j * np.real(y * at)
-    expected = found.major * np.exp(1j * found.inclination)
-    assert abs(z - expected) <= 1e-6 * max(abs(x), abs(y), 1e-300) or found.major < 1e-300
     assert -math.pi / 2 < found.inclination <= math.pi / 2
     # A probe along the major axis reads it, one across it the minor axis, a quarter turn later forward.
     along = fem.probe(x, y, found.inclination)
@@ -353,7 +349,6 @@ def test_known_ellipses():
     np.testing.assert_allclose(found.minor, [2, 1, 1, 0, 0], atol=1e-15)
     np.testing.assert_allclose(found.inclination, [0, 0, 0, math.pi / 4, math.pi / 2])
     np.testing.assert_array_equal(found.direction, [1, -1, 1, 0, 0])
-    np.testing.assert_allclose(found.phase, [0, 0, math.pi / 2, 0, 0], atol=1e-15)
 
 
 def test_turning_the_axes_turns_the_inclination():

@@ -12,6 +12,7 @@ from cases import each_of
 from fem_rotors import rotor23
 
 import fem
+from rotorid.commands.one_shot import lack_at
 
 TABLE = fem.Support(3, [1e7, ((2e7, 1e6), (-1e6, 3e7))], [0.0, 1e4], name="journal", speeds=[100.0, 300.0])
 
@@ -295,12 +296,12 @@ def test_principal_columns_give_the_covariance_in_as_many_directions_as_it_has()
 
 def test_lack_of_fit_elsewhere_is_that_of_the_nearest_speed_and_the_worst_sensor():
     np.testing.assert_array_equal(
-        FOUND.lack_at([0.0, 149.0, 151.0, 1e4], ("NDE", "top")),
+        lack_at(FOUND, np.array([0.0, 149.0, 151.0, 1e4]), ("NDE", "top")),
         [[0.02, 0.02], [0.02, 0.02], [0.03, 0.04], [0.03, 0.04]],
     )
     nothing = replace(FOUND, speeds=[], sensors=(), lack_of_fit=np.zeros((0, 0)))
-    np.testing.assert_array_equal(nothing.lack_at([5.0], ("DE", "NDE")), np.zeros((1, 2)))
-    assert FOUND.lack_at([5.0, 6.0], ()).shape == (2, 0)
+    np.testing.assert_array_equal(lack_at(nothing, np.array([5.0]), ("DE", "NDE")), np.zeros((1, 2)))
+    assert lack_at(FOUND, np.array([5.0, 6.0]), ()).shape == (2, 0)
 
 
 def test_a_rotor_keeps_its_calibration_and_stays_equal():
@@ -311,7 +312,6 @@ def test_a_rotor_keeps_its_calibration_and_stays_equal():
     for copied in (pickle.loads(pickle.dumps(calibrated)), copy.deepcopy(calibrated)):
         assert copied == rotor
         np.testing.assert_array_equal(copied.calibration.covariance, FOUND.covariance)
-        assert copied.calibration.readings == {"probe[DE].angle": 1.02}
 
 
 @pytest.mark.parametrize(

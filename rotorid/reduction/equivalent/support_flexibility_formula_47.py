@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.assembly import assemble, held, rounding_error
+from fem.assembly import assemble, rounding_error
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain
@@ -202,6 +202,16 @@ def _two_supports(rotor: fem.Rotor) -> tuple[int, int]:
             "force between the supports: use small_rotor, which keeps every support as a coordinate"
         )
     return found[0], found[1]
+
+
+def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
+    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
+    free = np.ones(band.shape[1])
+    free[unknowns] = 0.0
+    above = range(len(band) - 1, -1, -1)
+    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
+    K[-1, unknowns] = 1.0
+    return K
 
 
 def _flexibility(band: FloatArray, unknowns: IndexArray) -> FloatArray:

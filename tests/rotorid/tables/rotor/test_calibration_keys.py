@@ -63,7 +63,7 @@ def test_it_comes_back_with_all_digits(tmp_path, seed):
     back = read_rotor(tmp_path / "r.toml")
     assert back == rotor
     again = back.calibration
-    assert (again.names, again.sensors, again.readings) == (found.names, found.sensors, found.readings)
+    assert (again.names, again.sensors) == (found.names, found.sensors)
     assert again.needs_trial_run
     assert again.data == found.data
     for name in ("values", "speeds", "lack_of_fit"):
