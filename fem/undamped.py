@@ -417,25 +417,29 @@ def _gap(speed: float, rotor: Rotor, A: Matrices, k: int, sign: float = 1.0) -> 
 def _brackets(rotor: Rotor, A: Matrices, knots: FloatArray) -> tuple[float, list[tuple[float, float, int]]]:
     """Lowest natural frequency at the first knot, and every (upper end, lower end, mode) with one crossing.
 
-    Where |λ − Ω²| of a mode is least without a change of sign, its minimum tells whether there are two.
+    |λ − Ω²| of a mode is nearly convex where it is small, between knots: without a change of sign, a part of
+    this can hold two crossings only if the lines through the parts beside it fall below 0 in it.
     """
     from scipy.optimize import minimize_scalar
 
     top = (1.01 * knots[-1]) ** 2
     parts = knots[:-1, None] + np.diff(knots)[:, None] * _PARTS[:-1]
-    speeds, lists, brackets = np.append(parts, knots[-1]), [np.zeros(1)], []
+    speeds = np.append(parts, knots[-1])
+    lists = [np.zeros(1)]
     for speed in speeds:
         lists.append(_positive(whole_rotor(rotor, A, speed), lists[-1].size, top).squares)
     modes = np.array([*itertools.zip_longest(*lists[1:], fillvalue=top)])
+    brackets, steps = [], np.diff(speeds)
     if 0 < modes[0, -1] < 1e-12 * top:
         raise ValueError("masses, moments of inertia or stiffnesses differ by too many orders of size")
     for k, gaps in enumerate(modes - speeds**2):
-        signs, points = np.where(gaps > 0, 1.0, -1.0), dict(zip(speeds, gaps, strict=True))
-        for i in 1 + np.flatnonzero(np.abs(gaps[1:-1]) <= np.minimum(*np.abs((gaps[:-2], gaps[2:])))):
-            if signs[i - 1] == signs[i + 1]:
-                ends, args = speeds[[i - 1, i + 1]], (rotor, A, k, signs[i])
-                turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * ends[1]})
-                points[turn.x] = signs[i] * turn.fun
+        slopes, signs, points = np.diff(gaps) / steps, np.sign(gaps), dict(zip(speeds, gaps, strict=True))
+        right, left = gaps[1:-2] + slopes[:-2] * steps[1:-1], gaps[2:-1] - slopes[2:] * steps[1:-1]
+        inside = np.array([gaps[2:-1], -right, -left]) * signs[1:-2]
+        for i in 1 + np.flatnonzero((inside > 0).all(axis=0)):
+            ends, args = speeds[i : i + 2], (rotor, A, k, signs[i])
+            turn = minimize_scalar(_gap, bounds=ends, args=args, options={"xatol": 1e-7 * ends[1]})
+            points[turn.x] = signs[i] * turn.fun
         for (a, one), (b, other) in itertools.pairwise(sorted(points.items())):
             if (one > 0) != (other > 0):
                 brackets.append((b, a, k))

@@ -32,11 +32,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project, supported
+from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import Result, holding_arrays
-from fem.rotor import Rotor
-from fem.undamped import Spectrum, finite_modes, lowest_modes, one_plane
+from fem.rotor import Rotor, Support
+from fem.undamped import Spectrum, finite_modes, lowest_modes
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds, whole
 from rotorid.base.json import plain
@@ -247,7 +247,7 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
 
 
 def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
-    """The m lowest modes of a plane on springs like the supports at the middle speed; their scale.
+    """The m lowest modes of a plane on supports as at the middle speed, without pedestals; their scale.
 
     Parameters
     ----------
@@ -258,8 +258,13 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     -------
     The modes, and the lowest frequency that is not 0, rad/s.
     """
-    springs = supported(P.rotor, speeds[speeds.size // 2, None]).springs
-    spectrum = lowest_modes(P.rotor, P.A, m, one_plane(P.rotor, P.A, 0, springs))
+    K, _ = P.supports(speeds[speeds.size // 2, None])
+    springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
+    supports = [
+        Support(s.node, spring, tilting_stiffness=s.tilting_stiffness)
+        for s, spring in zip(P.rotor.supports, springs, strict=True)
+    ]
+    spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
     moving = spectrum.squares[spectrum.squares > 0]
     return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
 
