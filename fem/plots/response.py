@@ -174,7 +174,7 @@ def draw_polar(
         ax.plot(np.angle(reading), np.abs(reading), linewidth=1.6, label=name, **look(k))
         there, color = np.flatnonzero(~np.isnan(reading)), COLORS[k % len(COLORS)]
         way = np.cumsum(np.abs(np.diff(reading[there], prepend=0)))  # along it a resonance gets its share
-        for i in there[np.searchsorted(way, np.linspace(*way[[0, -1]], marks + 1))] if there.size else ():
+        for i in there[np.searchsorted(way, np.linspace(way[0], way[-1], marks + 1))] if there.size else ():
             if (np.abs(marked - (z := reading[i])) < room).any():
                 continue
             marked, angle = np.append(marked, z), np.angle(z)
