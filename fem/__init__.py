@@ -24,18 +24,17 @@ from fem.forces import (
 )
 from fem.orbits import DIRECTION_NAMES, Orbits, orbits, probe, whirl_direction
 from fem.peaks import (
+    CRITICALLY_DAMPED,
+    LARGEST_MARGINS,
     Peak,
     Peaks,
-    Separation,
     api617_limit,
     api_unbalance,
-    critical_peaks,
-    open_question,
     peak_columns,
     required_margin,
     resolve_peaks,
     response_peaks,
-    unsearched,
+    separation,
 )
 from fem.plots import draw_rotor
 from fem.response import (
@@ -110,9 +109,11 @@ from fem.whirl import (
 )
 
 __all__ = [
+    "CRITICALLY_DAMPED",
     "DIRECTION_NAMES",
     "GRAVITY",
     "KINDS",
+    "LARGEST_MARGINS",
     "NOT_COUNTED",
     "SHORTEST",
     "STEEL_DENSITY",
@@ -144,7 +145,6 @@ __all__ = [
     "Rotor",
     "Sensor",
     "SensorLike",
-    "Separation",
     "Spectrum",
     "SpeedMap",
     "SqueezeFilm",
@@ -164,7 +164,6 @@ __all__ = [
     "campbell",
     "checked_number",
     "compliance",
-    "critical_peaks",
     "critical_speeds",
     "critical_speeds_below",
     "critical_speeds_near",
@@ -180,7 +179,6 @@ __all__ = [
     "matrix_change",
     "mesh_check",
     "one_plane",
-    "open_question",
     "orbits",
     "peak_columns",
     "plots",
@@ -194,6 +192,7 @@ __all__ = [
     "resolve_peaks",
     "response_peaks",
     "runs_away",
+    "separation",
     "solve",
     "solve_whirl",
     "speed_map",
@@ -204,7 +203,6 @@ __all__ = [
     "too_short",
     "unbalance_response",
     "unit_loads",
-    "unsearched",
     "whirl_direction",
     "whirl_modes",
     "whole_rotor",

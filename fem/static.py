@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from fem.result import Result, holding_arrays
 from fem.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import number
-from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 
 GRAVITY = 9.80665  # m/s²
@@ -71,20 +69,6 @@ class StaticDeflection(Result):
             Column("y, N", self.reaction_y, "{:.6g}".format, "reactions.*.y_N"),
         )
         return Table("reactions", reactions), Table("deflection", nodes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        reactions = zip(self.rotor.supports, self.reaction_x, self.reaction_y, strict=True)
-        return plain(
-            {
-                "speed_rad_s": self.speed,
-                "weight_N": self.weight,
-                "positions_m": self.rotor.positions,
-                "x_m": self.x,
-                "y_m": self.y,
-                "reactions": [{"node": support.node, "x_N": x, "y_N": y} for support, x, y in reactions],
-            }
-        )
 
     def sentence(self) -> str:
         """Weight and largest deflection."""

@@ -45,10 +45,8 @@ def _rotors() -> Pictures:
     return {
         fem.Modes: plots.draw_modes,
         fem.Response: plots.draw_response,
-        fem.InfluenceCoefficients: plots.draw_influence,
         fem.Campbell: plots.draw_campbell,
         fem.SpeedMap: plots.draw_speed_map,
-        fem.StaticDeflection: plots.draw_deflection,
     }
 
 

@@ -3,7 +3,6 @@
 from fem.plots.campbell import campbell_figure, draw_campbell, draw_log_decrements, draw_speed_map
 from fem.plots.response import (
     bode_figure,
-    draw_influence,
     draw_orbits,
     draw_polar,
     draw_response,
@@ -12,15 +11,13 @@ from fem.plots.response import (
     polar_figure,
     right_angles,
 )
-from fem.plots.rotor import draw_deflected_shape, draw_deflection, draw_modes, draw_rotor, smooth_shapes
+from fem.plots.rotor import draw_deflected_shape, draw_modes, draw_rotor, smooth_shapes
 
 __all__ = [
     "bode_figure",
     "campbell_figure",
     "draw_campbell",
     "draw_deflected_shape",
-    "draw_deflection",
-    "draw_influence",
     "draw_log_decrements",
     "draw_modes",
     "draw_orbits",

@@ -64,15 +64,6 @@ def draw_response(
     return _amplitudes(ax, response, curves, labels, "amplitude, µm peak")
 
 
-def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
-    """Draw the size of each influence coefficient over speed, µm per g·mm (1 m per kg·m)."""
-    labels = [
-        f"sensor {label(sensor)}, plane {plane}" for sensor in influence.sensors for plane in influence.planes
-    ]
-    W = influence.W.reshape(-1, len(labels))
-    return _amplitudes(ax, influence, W, labels, "influence, µm per g·mm")
-
-
 def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
     """Size and phase of the influence coefficients over speed below the rotor: a row for each sensor."""
     names = [label(sensor) for sensor in influence.sensors]

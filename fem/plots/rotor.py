@@ -20,7 +20,6 @@ from rotorid.base.plot_style import (
     look,
     new_axes,
     note,
-    plain,
 )
 from rotorid.base.rpm import RPM
 
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fem.response import Response
-    from fem.static import StaticDeflection
     from fem.undamped import Modes
 
 _TIP = ((0, 0), (-0.8, -1), (0.8, -1))  # a triangle that touches the shaft from below
@@ -161,20 +159,6 @@ def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> 
     ax = _over_rotor(rotor, ax, float(size.max()), words)
     ax.plot(rotor.positions[response.nodes - 1], shape, "o-", color=COLORS[0], markersize=4, zorder=5)
     legend_above(ax, 2, marker_scale=0.6)
-    return ax
-
-
-def draw_deflection(deflection: StaticDeflection, ax: Axes | None = None) -> Axes:
-    """Draw the static deflection in x and y along the rotor; return the axes."""
-    ax = ax or new_axes((WIDTH, 3.2))
-    positions = deflection.rotor.positions
-    for k, name in enumerate("xy"):
-        values = getattr(deflection, name)
-        if values.any():
-            ax.plot(positions, 1e6 * values, label=name, **look(k, positions.size))
-    ax.set(xlabel="position, m", ylabel="static deflection, µm")
-    plain(ax)
-    legend_above(ax)
     return ax
 
 

@@ -14,6 +14,7 @@ from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, percent
 from rotorid.commands.input_checks import rotor_source
+from rotorid.commands.operating_range import Separation, unsearched
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
 
@@ -100,11 +101,11 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     log_rotor(model, speeds=len(speeds), estimated_relative_error=whirl.error)
     beside: dict[str, Any] = {}
     if operating:
-        doubt = fem.unsearched(speeds[0], speeds[-1], operating)
+        doubt = unsearched(speeds[0], speeds[-1], operating)
         doubt = doubt or ("the list may be cut, ask for more modes (-n)" if whirl.cut else "")
         rows = whirl.to_dict()["damped_critical_speeds"]
         peaks = [row["speed_rad_s"] for row in rows if not row["heavily_damped"]]
-        beside["operating"] = fem.Separation(peaks, operating, doubt)
+        beside["operating"] = Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]
     pictures: dict[str, Callable[[], Figure]] = {
         "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.text import listing
 from rotorid.commands.input_checks import rotor_source
+from rotorid.commands.operating_range import Separation, unsearched
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, band
 
@@ -89,8 +90,8 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     apart = None
     if operating:
         more = int((speeds > 0).sum()) >= (options.number or 3)
-        doubt = fem.unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
-        apart = fem.Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
+        doubt = unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
+        apart = Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
     table, shapes = modes.tables()
     beside = {"operating": apart, "mesh_check": mesh, "map": chart}
     asked = {key: result for key, result in beside.items() if result is not None}

@@ -14,6 +14,7 @@ from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, figures, listing
 from rotorid.commands.input_checks import file_of, rotor_source
+from rotorid.commands.operating_range import critical_peaks, open_question
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import (
     Band,
@@ -257,13 +258,11 @@ class Vibration:
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
-        import fem
-
         unstable = listing([window.where() for window in self.response.windows], "and")
         first = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
         low, high = self.operating or (0.0, 0.0)
         speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
-        question = fem.open_question(chief, speeds[0], speeds[-1], (low, high)) if self.operating else ""
+        question = open_question(chief, speeds[0], speeds[-1], (low, high)) if self.operating else ""
         if self.operating is None or not (chief or question):
             asked = (
                 f"at {counted(self.response.speeds.size, 'speed')} from {range_text(speeds[0], speeds[-1])}, "
@@ -460,7 +459,7 @@ def response(
         operating=operating,
     )
     at = None if options.at is None else _nearest(finer, options.at)
-    chief, every = fem.critical_peaks(result.labels, peaks), result.named()
+    chief, every = critical_peaks(result.labels, peaks), result.named()
     mounted = unbalance_table(model, coarse.unbalance)
     return Outcome(
         result=result,

@@ -5,15 +5,12 @@ import pytest
 
 import fem
 from fem import (
-    Separation,
     api617_limit,
     api_unbalance,
-    critical_peaks,
-    open_question,
     peak_columns,
     response_peaks,
-    unsearched,
 )
+from rotorid.commands.operating_range import Separation, critical_peaks, open_question, unsearched
 
 
 def jeffcott(speeds, zeta, critical=100.0):
