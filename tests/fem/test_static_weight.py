@@ -1,17 +1,14 @@
 """Static deflection under gravity, and compliance on supports of any kind."""
 
 import dataclasses
-import json
 import math
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 from fem_rotors import machines, rotor23, uniform
 from hypothesis import given, settings
 
 import fem
-from rotorid.plots import plot
 
 G = 9.80665
 
@@ -94,17 +91,10 @@ def test_a_rotor_that_is_not_held_falls():
 def test_results():
     rotor = dataclasses.replace(rotor23(), supports=[fem.Support(2, 1e8, name="left"), fem.Support(22, 1e8)])
     result = fem.static_deflection(rotor)
-    document = json.loads(json.dumps(result.to_dict()))
-    assert document["reactions"][1]["y_N"] == pytest.approx(result.reaction_y[1], rel=1e-14)
+    reactions = result.tables()[0].columns[2].values
+    assert reactions == pytest.approx(result.reaction_y, rel=1e-14)
     assert result.to_frame().shape == (24, 4)
     assert "left" in result.summary()
     assert "largest deflection 631.3 µm at node 12" in result.summary()
-    mpl.use("Agg")
-    ax = plot(result)
-    assert ax.get_ylabel() == "static deflection, µm"
-    assert len(ax.lines) == 1
-    from matplotlib import pyplot as plt
-
-    plt.close("all")
     with pytest.raises(ValueError, match="speed must be finite and not negative"):
         fem.static_deflection(rotor, -1.0)
