@@ -83,7 +83,7 @@ def readings(read: np.ndarray) -> RunReadings:
 
 def ours(rotor: fem.Rotor, data: RunReadings) -> np.ndarray:
     unknown = [Unknown(path, start=start) for path, start in zip(PATHS, START.tolist(), strict=True)]
-    return calibrate(rotor, unknown, [data], starts=1).values
+    return calibrate(rotor, unknown, [data], side_starts=False).values
 
 
 def run() -> list[Row]:

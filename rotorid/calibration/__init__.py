@@ -1,9 +1,9 @@
 """Calibration of rotor models: numbers of a rotor from what the machine itself tells."""
 
 from rotorid.calibration.calibrate import calibrate
-from rotorid.calibration.calibrated_rotor import CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
-from rotorid.calibration.run_readings import RunReadings
+from rotorid.calibration.readings import RunReadings
+from rotorid.calibration.result import CalibratedRotor
 from rotorid.calibration.unknowns import Unknown
 
 __all__ = ["CalibratedRotor", "MeasuredFrequencies", "RunReadings", "Unknown", "calibrate"]

@@ -1,9 +1,13 @@
-"""Numbers of a rotor from readings of runs, critical speeds and modes together, K θ = Y step by step.
+"""Numbers of a rotor from readings of runs, critical speeds and modes together: one least-squares fit.
 
 Rows of all data, each divided by its error, and of what is known beforehand go through the nonlinear driver
 of `rotorid.regression` with exact derivatives. χ² of data and priors together, m + p − n degrees of freedom,
-tells whether the model explains the data: a model that lacks something pulls the numbers away from what is
-known of them as well as leaving residuals.
+tells whether the model explains the data.
+
+Numbers that are taken as exact, but may be off by a standard deviation each, move the estimate: with K the
+derivatives of data and priors by the estimated numbers and H those by the exact ones, times their deviations,
+the estimate is off by −K⁺ H δ, δ ~ N(0, 1), so that its covariance is (KᵀK)⁻¹ + (K⁺H)(K⁺H)ᵀ ("consider
+covariance", Schmidt 1966).
 """
 
 from __future__ import annotations
@@ -16,23 +20,23 @@ import numpy as np
 from fem import Calibration, Rotor, is_reading
 from fem.parameters import with_parameters
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.calibration.calibrated_rotor import LEVEL, CalibratedRotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
-from rotorid.calibration.held_numbers import HeldNumbers, held_numbers
-from rotorid.calibration.run_readings import ReadingRows, RunReadings
+from rotorid.calibration.readings import ReadingRows, RunReadings
+from rotorid.calibration.result import LEVEL, CalibratedRotor
 from rotorid.calibration.unknowns import Unknown, as_they_stand, check_different
+from rotorid.regression import solution
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 from rotorid.regression.prior import Prior, effect, prior_rows
 from rotorid.regression.search import search_from
 
-SPREAD, ASIDE = 0.3, 0.7
-"""Relative, of starting values without a prior: drawn ones, and along what the data see least."""
-LIMIT, MORE = 40, 3
-"""Evaluations of a search from one of several starts, and so many times more starts until one explains."""
+ASIDE = 0.7
+"""Relative distance of the two side starts, along what the data see least."""
+LIMIT = 40
+"""Evaluations of a search from one of several starts."""
 SAME = 1e-3
 """Relative, besides three standard deviations: nearer ends of searches are one."""
 AS_WELL = 4.0
-"""Of χ²: other numbers that explain the data so nearly as well are told."""
+"""Of χ²: other numbers that explain the data so nearly as well are reported."""
 
 
 class _Equations:
@@ -49,6 +53,7 @@ class _Equations:
         self.paths = [unknown.path for unknown in unknowns]
         self.rows: list[ReadingRows] = []
         self.last: dict[int, tuple[FloatArray, ComplexArray]] = {}
+        self.size = 0
 
     def values(self, theta: FloatArray) -> dict[str, float]:
         return dict(zip(self.paths, theta.tolist(), strict=True))
@@ -71,20 +76,12 @@ class _Equations:
             parts = [rows.residual(self.coefficients(rows.data, theta))[0] for rows in self.rows]
             parts += [data.residual(self.rotor, values) for data in self.frequencies]
         except (ValueError, np.linalg.LinAlgError):
-            if not self.known:
+            if not self.size:
                 raise
-            return np.full(self.known, np.inf)  # no rotor: the search shortens its step
-        found = np.concatenate(parts)
-        self.known = found.size
-        return found
-
-    known = 0
-
-    @property
-    def besides(self) -> int:
-        """How many numbers are found besides: of unbalances, bows and scales of shapes."""
-        complex_ones = sum(len(data.unbalance) + data.bow for data in self.readings)
-        return 2 * complex_ones + sum(modes.scales for modes in self.frequencies)
+            return np.full(self.size, np.inf)  # no rotor: the search shortens its step
+        residuals = np.concatenate(parts)
+        self.size = residuals.size
+        return residuals
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         return self.by(self.paths, self.values(theta))
@@ -102,9 +99,8 @@ def calibrate(
     readings: Sequence[RunReadings] = (),
     frequencies: Sequence[MeasuredFrequencies] = (),
     *,
-    held: Sequence[Unknown] = (),
-    starts: int = 3,
-    seed: int = 0,
+    exact: Sequence[Unknown] = (),
+    side_starts: bool = True,
 ) -> CalibratedRotor:
     """Estimate numbers of a rotor, with their errors and what the data do not determine.
 
@@ -116,15 +112,12 @@ def calibrate(
         Its n unknown numbers.
     readings, frequencies
         The data, of any mixture.
-    held
-        Numbers that are taken as they stand, with priors of what they might be off by: the data are asked
-        whether they contradict that.
-    starts
-        Searches: from the starting values; from 70 % beside where that ends, to both sides, along what the
-        data see least of the numbers without a prior; from others drawn by priors (or 30 % of the value).
-        Three times as many, while no end explains the data.
-    seed
-        Of the drawn starts.
+    exact
+        Numbers that are taken as the rotor has them; the deviations of their priors widen the errors of the
+        estimate.
+    side_starts
+        Search also from 70 % beside where the first search ends, to both sides, along what the data see
+        least of the numbers without a prior.
 
     Raises
     ------
@@ -142,16 +135,16 @@ def calibrate(
     equations = _Equations(rotor, unknowns, readings, frequencies)
     names = tuple(unknown.label for unknown in unknowns)
     limits = [unknown.limits(rotor) for unknown in unknowns]
-    first = np.array([unknown.first(rotor) for unknown in unknowns])
-    first = np.clip(first, *_ends(limits))
-    known = {unknown.label: unknown.prior for unknown in unknowns if unknown.prior}
-    prior = prior_rows(names, known)
+    ends = np.array(limits, dtype=float)
+    lower, upper = (
+        np.where(np.isnan(end), fill, end) for end, fill in zip(ends.T, (-np.inf, np.inf), strict=True)
+    )
+    first = np.clip([unknown.first(rotor) for unknown in unknowns], lower, upper)
+    prior = prior_rows(names, {unknown.label: unknown.prior for unknown in unknowns if unknown.prior})
     for modes in frequencies:
         modes.check(rotor, equations.values(first), equations.paths)
     equations.weigh(first)
     equations.residual(first)
-    begin, others = _best_start(equations, unknowns, prior, first, starts, seed)
-    bounds = dict(zip(names, limits, strict=True))
 
     def solve(begin: FloatArray, *, near: bool = False) -> NonlinearEstimate:
         return nonlinear_least_squares(
@@ -160,102 +153,87 @@ def calibrate(
             begin,
             names=names,
             sigma_stated=True,
-            bounds=bounds,
+            bounds=dict(zip(names, limits, strict=True)),
             near=near,
             prior=prior,
         )
 
-    found = solve(begin)
-    equations.weigh(found.estimate.solution)
-    found = solve(found.estimate.solution, near=True)
-    return _judged(equations, unknowns, prior, held, found, others)
+    free = np.array([unknown.prior is None for unknown in unknowns]) & (first != 0)
+    searched = _searches(equations, prior, first, lower, upper, free) if side_starts and free.any() else []
+    fit = solve(searched[0] if searched else first)
+    equations.weigh(fit.estimate.solution)
+    fit = solve(fit.estimate.solution, near=True)
+    return _judged(equations, unknowns, prior, exact, fit, searched)
 
 
-def _ends(limits: Sequence[tuple[float | None, float | None]]) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper ends (n,), infinite where there is none."""
-    ends = np.array(limits, dtype=float)
-    return np.where(np.isnan(ends[:, 0]), -np.inf, ends[:, 0]), np.where(
-        np.isnan(ends[:, 1]), np.inf, ends[:, 1]
-    )
-
-
-def _best_start(
+def _searches(
     equations: _Equations,
-    unknowns: Sequence[Unknown],
     prior: Prior,
     first: FloatArray,
-    starts: int,
-    seed: int,
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Where the lowest of several short searches ends, and the ends of all that stay inside the bounds."""
-    from scipy.special import chdtrc
+    lower: FloatArray,
+    upper: FloatArray,
+    free: BoolArray,
+) -> list[FloatArray]:
+    """Ends within the bounds of three searches, the lowest first: from the start, and beside its end.
 
-    random = np.random.default_rng(seed)
+    Beside: along the relative change of the numbers without a prior that moves the rows least.
+    """
     residual, jacobian = prior.beside(equations.residual, equations.jacobian)
-    spread = np.array([unknown.prior[1] if unknown.prior else 0.0 for unknown in unknowns])
-    spread = np.where(spread > 0, spread, SPREAD * np.abs(first))
-    lower, upper = _ends([unknown.limits(equations.rotor) for unknown in unknowns])
-    free = np.array([unknown.prior is None for unknown in unknowns]) & (first != 0)
-    dof = max(residual(first).size - first.size - equations.besides, 1)
-    ends: list[tuple[float, FloatArray]] = []
-    aside: list[FloatArray] = []
-    for k in range(MORE * starts if starts > 1 else 0):
-        if k >= starts and ends and chdtrc(dof, 2 * min(cost for cost, _ in ends)) >= LEVEL:
-            break
-        begin = first + (spread * random.uniform(-1.0, 1.0, first.size) if k else 0.0)
-        if k == 1 and ends and free.any():
-            at = ends[0][1]
-            by = ASIDE * _least_seen(jacobian(at), at, free)
-            aside = [at - by, at + by]
-        begin = np.clip(aside.pop() if aside else begin, lower, upper)
-        if np.isfinite(residual(begin)).all():
-            end = search_from(residual, begin, jacobian, limit=LIMIT)
-            inside = end is not None and (lower <= end[1]).all() and (end[1] <= upper).all()
-            ends += [end] if end is not None and inside else []
-    ends.sort(key=lambda end: end[0])
-    return (ends[0][1] if ends else first), [end for _, end in ends]
 
+    def search(begin: FloatArray) -> list[tuple[float, FloatArray]]:
+        begin = np.clip(begin, lower, upper)
+        if not np.isfinite(residual(begin)).all():
+            return []
+        end = search_from(residual, begin, jacobian, limit=LIMIT)
+        inside = end is not None and (lower <= end[1]).all() and (end[1] <= upper).all()
+        return [end] if end is not None and inside else []
 
-def _least_seen(K: FloatArray, theta: FloatArray, free: BoolArray) -> FloatArray:
-    """Direction (n,) of relative changes of the free numbers that moves rows the least, in their units."""
-    weak = np.linalg.svd(K[:, free] * theta[free])[2][-1]
-    found = np.zeros(theta.size)
-    found[free] = weak / np.abs(weak).max() * theta[free]
-    return found
+    ends = search(first)
+    if ends:
+        at = ends[0][1]
+        weak = np.linalg.svd(jacobian(at)[:, free] * at[free])[2][-1]
+        step = np.zeros(at.size)
+        step[free] = ASIDE * weak / np.abs(weak).max() * at[free]
+        ends += search(at - step) + search(at + step)
+    return [end for _, end in sorted(ends, key=lambda end: end[0])]
 
 
 def _judged(
     equations: _Equations,
     unknowns: Sequence[Unknown],
     prior: Prior,
-    held: Sequence[Unknown],
-    found: NonlinearEstimate,
-    others: Sequence[FloatArray],
+    exact: Sequence[Unknown],
+    fit: NonlinearEstimate,
+    searched: Sequence[FloatArray],
 ) -> CalibratedRotor:
     """The rotor with these numbers, and whether the model explains the data."""
     from scipy.special import chdtrc
 
-    theta = found.estimate.solution
+    theta = fit.estimate.solution
     K, r = equations.jacobian(theta), equations.residual(theta)
     values = equations.values(theta)
-    besides = [
+    bare = [
         rows.bare(*rows.data.coefficients(equations.rotor, values, equations.paths))
         for rows in equations.rows
     ]
-    spent = sum(bare.rank for bare in besides) + sum(modes.scales for modes in equations.frequencies)
+    spent = sum(each.rank for each in bare) + sum(modes.scales for modes in equations.frequencies)
 
     def mismatch(theta: FloatArray) -> float:
         return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))
 
     chi_square = mismatch(theta)
-    dof = r.size + len(prior) - spent - found.estimate.rank
+    dof = r.size + len(prior) - spent - fit.estimate.rank
     chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
-    tested = _tested(equations, prior, held, theta, K, r) if held else None
-    misfit = chance < LEVEL or (tested is not None and tested.chance < LEVEL)
-    covariance = found.estimate.solution_covariance
-    covariance = np.zeros((theta.size,) * 2) if covariance is None else np.nan_to_num(covariance)
+    misfit = chance < LEVEL
     times = max(chi_square / dof, 1.0) if misfit else 1.0
-    covariance = covariance * times
+    covariance = fit.estimate.solution_covariance
+    covariance = np.zeros((theta.size,) * 2) if covariance is None else times * np.nan_to_num(covariance)
+    off = [(number.path, *number.prior) for number in exact if number.prior]
+    if off:
+        H = equations.by([path for path, *_ in off], values | {path: value for path, value, _ in off})
+        H = np.vstack((H * [std for *_, std in off], np.zeros((len(prior), len(off)))))
+        moved = solution(prior.below(K), H)
+        covariance = covariance + moved @ moved.T
     to = as_they_stand(equations.rotor, values)
     lack = _lack_of_fit(equations, theta) if misfit else {}
     speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
@@ -266,49 +244,32 @@ def _judged(
         speeds=np.array(speeds),
         sensors=tuple(sensors),
         lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),
-        needs_trial_run=misfit or not (found.converged and found.estimate.full_rank),
+        needs_trial_run=misfit or not (fit.converged and fit.estimate.full_rank),
     )
-    known = ~np.isnan(found.values)
+    determined = ~np.isnan(fit.values)
     same = 3 * np.sqrt(np.diag(covariance)) + SAME * np.abs(theta)
-    apart = [
-        end
-        for end in others
-        if (np.abs(end - theta) > same)[known].any() and mismatch(end) < chi_square + AS_WELL
-    ]
     return CalibratedRotor(
         rotor=replace(with_parameters(equations.rotor, values), calibration=calibration),
         unknowns=tuple(unknowns),
-        found=found,
+        fit=fit,
         covariance=covariance,
-        prior=effect(prior, K, r, theta, stated=True, at_bounds=found.at_bounds),
+        prior=effect(prior, K, r, theta, stated=True, at_bounds=fit.at_bounds),
         jacobian=K,
         chi_square=chi_square,
         dof=dof,
         chance=chance,
-        held=tested,
-        unbalance=tuple(bare.u for bare in besides),
-        unbalance_std=tuple(bare.std(covariance, times) for bare in besides),
+        exact=tuple(number.label for number in exact),
+        unbalance=tuple(each.u for each in bare),
+        unbalance_std=tuple(each.std(covariance, times) for each in bare),
         readings=tuple(equations.readings),
         stated=all(rows.stated for rows in equations.rows),
-        other_ends=tuple(apart),
+        searches=max(len(searched), 1),
+        other_ends=tuple(
+            end
+            for end in searched
+            if (np.abs(end - theta) > same)[determined].any() and mismatch(end) < chi_square + AS_WELL
+        ),
     )
-
-
-def _tested(
-    equations: _Equations,
-    prior: Prior,
-    held: Sequence[Unknown],
-    theta: FloatArray,
-    K: FloatArray,
-    r: FloatArray,
-) -> HeldNumbers:
-    """Whether data and priors contradict what is held."""
-    known = [(number.path, *number.prior) for number in held if number.prior]
-    values = equations.values(theta) | {path: value for path, value, _ in known}
-    H = equations.by([path for path, *_ in known], values) * np.array([std for *_, std in known])
-    H = np.vstack((H, np.zeros((len(prior), len(known)))))
-    names = [number.label for number in held if number.prior]
-    return held_numbers(names, prior.below(K), H, np.append(r, prior.residual(theta)))
 
 
 def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, str], float]:
@@ -316,18 +277,18 @@ def _lack_of_fit(equations: _Equations, theta: FloatArray) -> dict[tuple[float, 
 
     The mean over all readings of a job counts as two more rows of each speed and sensor.
     """
-    found: dict[tuple[float, str], float] = {}
+    lack: dict[tuple[float, str], float] = {}
     for rows in equations.rows:
         data, W = rows.data, equations.coefficients(rows.data, theta)
         left, u = rows.raw(W), rows.residual(W)[2]
         bare = np.einsum("scq,q->sc", W[..., len(data.nodes) :], u)
         left = left + bare[:, None]
         square = (np.abs(left) ** 2 / 2 - rows.variance.reshape(*left.shape, 2).mean(axis=3)).sum(axis=1)
-        effect = np.abs(bare[:, None] + rows.effect(W)) if data.modelled else np.abs(rows.effect(W))
-        size, share = np.maximum((effect**2).sum(axis=1), np.finfo(float).tiny), 2 / left.shape[1]
+        effects = np.abs(bare[:, None] + rows.effect(W)) if data.modelled else np.abs(rows.effect(W))
+        size, share = np.maximum((effects**2).sum(axis=1), np.finfo(float).tiny), 2 / left.shape[1]
         mean = max(float(square.sum() / size.sum()), 0.0)
         relative = np.sqrt((share * mean + np.maximum(square, 0.0) / size) / (1 + share))
         for (s, c), value in np.ndenumerate(relative):
             key = float(data.trials.speeds[s]), data.trials.sensors[c]
-            found[key] = max(found.get(key, 0.0), float(value))
-    return found
+            lack[key] = max(lack.get(key, 0.0), float(value))
+    return lack

@@ -64,7 +64,7 @@ class MeasuredFrequencies:
 
     @property
     def scales(self) -> int:
-        """How many scales of shapes are found besides."""
+        """How many scales of shapes are estimated besides."""
         return len(self.modes) if self.nodes else 0
 
     def check(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> None:
@@ -93,32 +93,32 @@ class MeasuredFrequencies:
         """
         rotor = with_parameters(start, values)
         most = int(self.modes.max())
-        found = lowest_critical_speeds(at_rest(rotor) if self.rest else rotor, most)
-        if below := next((said for said in found.warnings if NOT_COUNTED in said), ""):
+        computed = lowest_critical_speeds(at_rest(rotor) if self.rest else rotor, most)
+        if below := next((warning for warning in computed.warnings if NOT_COUNTED in warning), ""):
             raise ValueError(f"{below}: extend the tables")
-        moving = np.flatnonzero(found.frequencies > 0)
+        moving = np.flatnonzero(computed.frequencies > 0)
         if moving.size < most:
-            last = rpm_text(float(found.frequencies[-1]))
+            last = rpm_text(float(computed.frequencies[-1]))
             raise ValueError(f"the model has only {moving.size} {self.words}, up to {last}, not {most}")
         which = moving[self.modes - 1]
-        left = [(found.frequencies[which] - self.frequencies) / self.std]
+        left = [(computed.frequencies[which] - self.frequencies) / self.std]
         if self.nodes:
-            computed = found.shapes[np.array(self.nodes) - 1][:, which]
-            scale = np.einsum("km,km->m", computed, self.shapes) / np.einsum("km,km->m", computed, computed)
+            shapes = computed.shapes[np.array(self.nodes) - 1][:, which]
+            scale = np.einsum("km,km->m", shapes, self.shapes) / np.einsum("km,km->m", shapes, shapes)
             size = self.shape_std * np.abs(self.shapes).max(axis=0)
-            left.append(((computed * scale - self.shapes) / size).ravel())
+            left.append(((shapes * scale - self.shapes) / size).ravel())
         return np.concatenate(left)
 
     def jacobian(self, start: Rotor, values: Mapping[str, float], paths: Sequence[str]) -> FloatArray:
         """Derivatives (rows, n) by the numbers; frequencies over tables are followed, not searched again."""
         rotor, m = with_parameters(start, values), len(self.modes)
-        own = {path: values[path] for path in paths if not is_reading(path)}
+        of_rotor = {path: values[path] for path in paths if not is_reading(path)}
         follow = not (self.rest or self.nodes or rotor.constant)
         here = self.residual(rotor, {}) * self.std + self.frequencies if follow else None
         shapes = np.full(m * len(self.nodes), ROUNDING[1] / self.shape_std)
         tiny = np.append(ROUNDING[0] * self.frequencies / self.std, shapes)
-        K = np.zeros((tiny.size, len(own)))
-        for k, path in enumerate(own):
+        K = np.zeros((tiny.size, len(of_rotor)))
+        for k, path in enumerate(of_rotor):
             (up, one), (down, other) = _beside(start, rotor, path)
             if here is None:
                 change = self.residual(one, {}) - self.residual(other, {})
@@ -126,22 +126,23 @@ class MeasuredFrequencies:
                 change = (critical_speeds_near(one, here) - critical_speeds_near(other, here)) / self.std
             if (np.abs(change) > tiny).any():
                 K[:, k] = change / (up - down)
-        by_own = K @ as_they_stand(start, own)
-        found = np.zeros((tiny.size, len(paths)))
-        found[:, [k for k, path in enumerate(paths) if path in own]] = by_own
-        return found
+        by_all = np.zeros((tiny.size, len(paths)))
+        by_all[:, [k for k, path in enumerate(paths) if path in of_rotor]] = K @ as_they_stand(
+            start, of_rotor
+        )
+        return by_all
 
 
 def _beside(start: Rotor, rotor: Rotor, path: str) -> list[tuple[float, Rotor]]:
     """Changes of a number, and the rotors with a little more and a little less: none where that cannot be."""
     step = STEP * max(typical_size(each, path) for each in (start, rotor))  # a number near 0, too
-    found = []
+    pair = []
     for by in (step, -step):
         try:
-            found.append((by, with_changes(rotor, {path: by})))
+            pair.append((by, with_changes(rotor, {path: by})))
         except ValueError:
-            found.append((0.0, rotor))
-    return found
+            pair.append((0.0, rotor))
+    return pair
 
 
 def at_rest(rotor: Rotor) -> Rotor:

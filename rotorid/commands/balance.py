@@ -39,7 +39,6 @@ if TYPE_CHECKING:
         Verdict,
     )
     from rotorid.commands.balance_solution import JobGiven
-    from rotorid.commands.one_shot import NextTrial
     from rotorid.commands.type_coefficients import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.tables import Job
@@ -61,8 +60,6 @@ class Balance(Parts):
         itself, choices of planes; None where there is nothing.
     left
         What is left to do after the check run.
-    next_trial
-        Of a calibrated rotor: the trial run that would tell most.
     of_type
         Where the coefficients are those of a type of machines.
     """
@@ -77,7 +74,6 @@ class Balance(Parts):
     tolerance: Tolerance | None
     subsets: Subsets | None
     left: LeftToDo | None = None
-    next_trial: NextTrial | None = None
     of_type: TypeKnowledge | None = None
 
     @property
@@ -90,7 +86,6 @@ class Balance(Parts):
             "left_to_do": self.left,
             "verdict": self.verdict,
             "best_planes": self.subsets,
-            "next_trial": self.next_trial,
             "of_type": self.of_type,
         }
 
@@ -111,8 +106,6 @@ class Balance(Parts):
         chosen = [] if self.subsets is None else [self.subsets.answer]
         every = together([*judged, weights, *chosen] if sound else [weights, *judged, *chosen])
         notes = list(every.notes)
-        if self.next_trial is not None:
-            notes.insert(0, self.next_trial.words)
         if self.result.limits is not None and self.subsets:
             notes.append("the comparison of planes does not look at the limits")
         return replace(every, notes=tuple(notes))
@@ -203,7 +196,6 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     from balancing import compare_check, mount
-    from rotorid.commands.one_shot import next_trial
     from rotorid.tables.job.job_as_written import JobSource
 
     options = options or BalanceOptions()
@@ -245,7 +237,6 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         left=left,
         tolerance=tolerance,
         subsets=solved.subsets,
-        next_trial=next_trial(read, influence, result.weights, result.planes),
         of_type=of_type,
         provenance=provenance(read.files if of_type is None else (*read.files, *of_type.files), options),
     )

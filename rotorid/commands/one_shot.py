@@ -1,20 +1,17 @@
-"""Balancing with a calibrated rotor: coefficients with its errors, and the trial run that would narrow them.
+"""Balancing with a calibrated rotor: coefficients with its errors.
 
 The parameters of the rotor err by L ε with L Lᵀ their covariance and independent real ε; a coefficient by
-Σ ∂W/∂θ L ε, the same ε at all speeds and sensors, and by the lack of fit at its own speed and sensor.
-
-A trial run adds rows K to what is known of the parameters: C becomes C − C Kᵀ (1 + K C Kᵀ)⁻¹ K C, whatever
-it will read.
+Σ ∂W/∂θ L ε, the same ε at all speeds and sensors, and by the lack of fit at each speed and sensor.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Gaussian, Trials, reading_of, usual_run_errors, with_parameters
+from balancing import Gaussian, Trials, usual_run_errors, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
@@ -23,7 +20,7 @@ from rotorid.commands.outcome import hash_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from balancing import Influence, Labels
+    from balancing import Influence
     from fem import Calibration, Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.commands.model_places import ModelPlaces
@@ -117,94 +114,3 @@ def _derivatives(runs: RunReadings, rotor: Rotor) -> tuple[ComplexArray, Complex
     assert rotor.calibration is not None
     names = [as_change(rotor, path) for path in rotor.calibration.names]
     return runs.coefficients(rotor, _values(rotor), names)
-
-
-@dataclass(frozen=True)
-class NextTrial:
-    """The trial run that would tell most: its plane and weight, and the prediction's error before and after.
-
-    Errors are half widths of 95 %, root mean square over the readings, by the parameters of the model alone.
-    """
-
-    plane: str
-    weight: complex
-    before: float
-    after: float
-    labels: Labels
-
-    @property
-    def words(self) -> str:
-        """A clause."""
-        before, after = (self.labels.amplitude_words(size) for size in (self.before, self.after))
-        return (
-            f"a trial run with {self.labels.weight_at(self.weight)} in plane {self.plane!r} would narrow "
-            f"what the model leaves open most: expected ± from {before} to {after}"
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, in the job's units."""
-        scale = self.labels.vibration_scale
-        weight = self.labels.weight_entry(self.weight)
-        return {
-            "plane": self.plane,
-            **weight,
-            "error_now": self.before * scale,
-            "error_after": self.after * scale,
-        }
-
-
-def next_trial(
-    job: Job, influence: Influence, weights: ComplexArray, planes: tuple[str, ...]
-) -> NextTrial | None:
-    """Of trial runs with the correction of one plane, the one after which the correction is known best.
-
-    Parameters
-    ----------
-    job
-        With a calibrated rotor.
-    influence
-        Its computed coefficients.
-    weights, planes
-        The correction.
-    """
-    from rotorid.commands.model_places import model_places
-
-    rotor = job.rotor
-    if rotor is None or rotor.calibration is None or influence is job.influence:
-        return None
-    if job.trials.weights.any() or not weights.any():
-        return None
-    runs = _runs(influence, model_places(job), job.key_phasor)
-    W, dW = _derivatives(runs, rotor)
-    D = np.zeros(len(influence.planes), dtype=complex)
-    D[[influence.planes.index(plane) for plane in planes]] = weights
-    moved = np.einsum("nscp,p->nsc", dW, D).reshape(len(dW), -1)
-
-    def error(C: FloatArray) -> float:
-        square = np.einsum("ni,nm,mi->", moved, C, moved.conj()).real
-        return float(1.96 * np.sqrt(square / (2 * moved.shape[1])))
-
-    C = np.asarray(rotor.calibration.covariance)
-    bare = job.trials.mean[0]
-    found = []
-    for p in np.flatnonzero(D):
-        one = np.zeros_like(D)
-        one[p] = D[p]
-        two = Trials(
-            ("bare", "trial"),
-            influence.speeds,
-            influence.sensors,
-            influence.planes,
-            np.stack((bare, bare + W @ one)),
-            np.stack((0 * one, one)),
-            errors=influence.reading.errors or reading_of(job.trials).errors,
-            run_errors=job.trials.run_errors,
-        )
-        rows = replace(runs, trials=two).rows(W)
-        K = rows.jacobian(W, dW)
-        CK = C @ K.T
-        after = C - CK @ np.linalg.solve(np.eye(len(K)) + K @ CK, CK.T)
-        found.append(
-            NextTrial(influence.planes[p], complex(one[p]), error(C), error(after), job.trials.labels)
-        )
-    return min(found, key=lambda trial: trial.after)

@@ -25,8 +25,8 @@ from rotorid.commands import (
     trial_weight,
     unbalance,
 )
+from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.outcome import Delivered
-from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add

@@ -30,10 +30,10 @@ from fem.assembly import assemble, multiply
 from fem.parameters import with_parameters
 from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
+from rotorid.commands.unknown_numbers import unknowns
 from rotorid.regression import stretch
 from rotorid.tables import Conventions, Job
 from rotorid.workflows import Balance, balance
-from rotorid.workflows.calibration.unknown_options import unknowns
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
@@ -270,9 +270,7 @@ def one_machine(
     )
     numbers = machine.unknowns(exact=exact)
     held = [one for one in machine.unknowns() if exact and one.beside]
-    found = calibrate(machine.rotor, numbers, [data], held=held, starts=1)
-    if not found.explained:  # else more starts, as the program makes them, end where one does
-        found = calibrate(machine.rotor, numbers, [data], held=held)
+    found = calibrate(machine.rotor, numbers, [data], exact=held, side_starts=False)
     try:
         return shot(random, machine, truth, found)
     except UndeterminedError as error:  # which leaves the machine as it is
@@ -304,7 +302,7 @@ def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor)
     U = UNBALANCE * np.sqrt(2.5) * normal(random, 2)
     other = corrected(machine, found.rotor, truth.speeds, read(random, (truth.W @ U)[None])).result
     true = np.array([truth.numbers[unknown.path] for unknown in found.unknowns])
-    d = found.found.estimate.solution - true
+    d = found.fit.estimate.solution - true
     free = found.std > 0
 
     def left(W: ComplexArray) -> float:

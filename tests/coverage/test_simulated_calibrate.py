@@ -24,7 +24,9 @@ def test_chi_square_and_errors_of_simulated_readings():
         noise = 1 + ERRORS.amplitude * rng.standard_normal(exact.shape)
         turned = np.exp(1j * ERRORS.phase * rng.standard_normal(exact.shape))
         found.append(
-            calibrate(machine(), unknowns, [runs.data(exact * noise * turned, errors=ERRORS)], starts=1)
+            calibrate(
+                machine(), unknowns, [runs.data(exact * noise * turned, errors=ERRORS)], side_starts=False
+            )
         )
     dof = 2 * 2 * 4 * 3 - 2 * 2 - 3
     assert {each.dof for each in found} == {dof}

@@ -109,7 +109,6 @@ motion-from-rest            motion sample_data/motion/small.toml --run-up 0:3000
 periodic-jumps              periodic sample_data/motion/damper.toml --speeds 1000:5000rpm --plot jumps.png
 calibrate                   {CALIBRATE} --plot calibration.png
 calibrate-table             {CALIBRATE} --exact --table --output numbers.csv --verbose
-calibrate-design            {CALIBRATE} --design 4 --speeds 2000:7000:500rpm
 calibrate-critical          {SUPPORTS} "bearing[*].stiffness" --prior "bearing[*].stiffness=30%"
 calibrate-unexplained       {SUPPORTS} bearing.stiffness --prior bearing.stiffness=30%
 calibrate-no-bearing        {SUPPORTS} "bearing[3].stiffness"
@@ -525,7 +524,6 @@ STORED = (
     "bearings",
     "bearings-linear",
     "calibrate-critical",
-    "calibrate-design",
     "calibrate-rk4",
     "campbell-compressor-coarse",
     "campbell-model-job",

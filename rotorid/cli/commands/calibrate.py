@@ -9,14 +9,11 @@ from typing import Annotated
 import typer
 
 from rotorid.commands.app import TABLES, Destination, RotorArgument, command
-from rotorid.workflows.calibration.calibrate import CalibrateOptions
-from rotorid.workflows.calibration.calibrate import calibrate as work
+from rotorid.commands.calibrate import CalibrateOptions
+from rotorid.commands.calibrate import calibrate as work
 
 
-@command(
-    CalibrateOptions,
-    panels={"How to search, or what to measure": "starts design speeds"},
-)
+@command(CalibrateOptions)
 def calibrate(
     rotor: RotorArgument,
     data: Annotated[
@@ -36,12 +33,9 @@ def calibrate(
 
     Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
     --estimate "bearing[*].*" --prior "bearing[*].*=20%" --output calibrated.toml
-
-    Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
-    --estimate "bearing[*].*" --prior "bearing[*].*=20%" --design 4 --speeds 2000:7000:500rpm
     """
     dataclasses.replace(to, output=None).deliver(
         "calibration",
         lambda: dataclasses.replace(work(rotor, data, options), written=to.output),
-        more=((to.output, (*TABLES, ".toml"), lambda found: found.files(to.output or Path())),),
+        more=((to.output, (*TABLES, ".toml"), lambda result: result.files(to.output or Path())),),
     )

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.calibration.calibrate import SPREAD, calibrate
+from rotorid.calibration import calibrate
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from rotorid.base.arrays import FloatArray
-    from rotorid.workflows.calibration.calibrate import Prepared
+    from rotorid.commands.calibrate import Prepared
 
+SPREAD = 0.3
+"""Relative, of drawn starting values without a prior."""
 SAME = 1e-3
 """Relative: ends of searches whose numbers and χ² (besides 0.01) differ by less are one."""
 
@@ -27,9 +29,9 @@ def draw_start(given: Prepared, rng: np.random.Generator) -> dict[str, Any]:
         first = unknown.first(given.rotor)
         spread = unknown.prior[1] if unknown.prior else SPREAD * abs(first)
         begun.append(replace(unknown, start=first + spread * rng.uniform(-1.0, 1.0)))
-    end = calibrate(given.rotor, begun, given.readings, given.frequencies, starts=1)
-    numbers = dict(zip(end.found.names, end.found.estimate.solution.tolist(), strict=True))
-    return {"converged": end.found.converged, "chi_square": end.chi_square, **numbers}
+    end = calibrate(given.rotor, begun, given.readings, given.frequencies, side_starts=False)
+    numbers = dict(zip(end.fit.names, end.fit.estimate.solution.tolist(), strict=True))
+    return {"converged": end.fit.converged, "chi_square": end.chi_square, **numbers}
 
 
 def count_minima(parts: Iterable[pd.DataFrame], names: tuple[str, ...]) -> dict[str, Any]:

@@ -116,7 +116,7 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
         coefficients, words = nominal(read.machine)
         machine = read.machine, coefficients
         return Task(draw_machine, machine, seed, columns, MACHINES), [*read.files], words
-    from rotorid.workflows.calibration.calibrate import CalibrateOptions, prepared
+    from rotorid.commands.calibrate import CalibrateOptions, prepared
     from rotorid.workflows.studies.calibration_starts import draw_start
 
     said = dict(read.calibrate)

@@ -100,7 +100,7 @@ def test_exact_data_give_the_numbers_back(rotor, values, more):
     readings = truth_of(runs, values).readings(truth)
     data = runs.data(np.stack((readings, readings)), errors=ERRORS)  # repeats
     found = calibrate(rotor, off(rotor, values), [data])
-    assert found.found.converged
+    assert found.fit.converged
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
     assert found.chi_square < 1e-6
     if data.modelled:
@@ -116,8 +116,7 @@ def test_an_unknown_bow():
     data = runs.data(runs.readings(truth, bow), errors=ReadingErrors(0.01, 0.01))
     unknowns = off(machine(), values, 0.05)
     without, found = (
-        calibrate(machine(), unknowns, [replace(data, bow=shapes)], starts=3 if FULL else 1)
-        for shapes in (0, 3)
+        calibrate(machine(), unknowns, [replace(data, bow=shapes)], side_starts=FULL) for shapes in (0, 3)
     )
     assert not without.explained
     assert found.explained
@@ -199,7 +198,7 @@ def test_two_stiffnesses_from_three_rounded_critical_speeds():
     rng, inside = np.random.default_rng(3), []
     for truth in [(7e7, 1.4e8), *(10 ** rng.uniform(7.6, 8.4, (7, 2)))]:
         found = calibrate(rotor23(), unknowns, frequencies=[rounded(on_stiffnesses(*truth))])
-        assert found.found.converged
+        assert found.fit.converged
         assert found.explained
         z = np.array([abs(each - truth) / found.std for each in (found.values, *found.other_ends)])
         if found.other_ends:
@@ -257,7 +256,7 @@ def test_natural_frequencies_and_shapes_at_rest():
             frequencies=data.frequencies + data.std * rng.standard_normal(3),
             shapes=shapes + size * rng.standard_normal(shapes.shape),
         )
-        chi.append(calibrate(truth, unknowns, frequencies=[read], starts=1).chi_square)
+        chi.append(calibrate(truth, unknowns, frequencies=[read], side_starts=False).chi_square)
     assert np.mean(chi) == pytest.approx(found.dof, abs=4 * np.sqrt(2 * found.dof / 16))
 
 
@@ -277,14 +276,14 @@ def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
     assert np.isnan(found.std).all()
     told = found.to_dict()["parameters"]
     assert [told[unknown.path]["value"] for unknown in unknowns] == [None, None]
-    assert "bearing[1].stiffness" in found.not_found
-    (k, p) = found.found.estimate.solution
+    assert "bearing[1].stiffness" in found.undetermined
+    (k, p) = found.fit.estimate.solution
     assert k * p / (k + p) == pytest.approx(4e7 * 1e8 / 1.4e8, rel=1e-5)
     known = calibrate(rotor, [unknowns[0], replace(unknowns[1], prior=(1e8, 1e6))], [data])
     assert known.values == pytest.approx([4e7, 1e8], rel=1e-4)
     assert known.std[1] == pytest.approx(1e6, rel=1e-3)
     assert known.std[0] > 1e6 * (4e7 / 1e8) ** 2  # what the pedestal leaves open, and the data's own
-    assert known.not_found == ""
+    assert known.undetermined == ""
 
 
 def test_what_the_sensors_do_not_see_has_no_number():
@@ -292,7 +291,9 @@ def test_what_the_sensors_do_not_see_has_no_number():
     rotor = uniform(10, supports=[fem.Support(n, ((4e7, 0.0), (0.0, 6e7)), 1e3) for n in (1, 11)])
     runs = Runs(sensors={"x": (4, 0.0)}, unbalance={})
     data = runs.data(runs.readings(rotor), errors=ERRORS)
-    found = calibrate(rotor, [Unknown("bearing[1].kxx"), Unknown("bearing[1].kyy")], [data], starts=1)
+    found = calibrate(
+        rotor, [Unknown("bearing[1].kxx"), Unknown("bearing[1].kyy")], [data], side_starts=False
+    )
     assert found.values[0] == pytest.approx(4e7, rel=1e-6)
     assert np.isnan(found.values[1])
     assert np.isnan(found.std[1])
@@ -319,7 +320,7 @@ def test_numbers_that_may_be_negative_are_not_stopped_at_zero():
     data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
     found = calibrate(rotor, [Unknown(path) for path in values], [data])
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
-    assert found.found.at_bounds == ()
+    assert found.fit.at_bounds == ()
 
 
 def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypatch):
@@ -329,11 +330,11 @@ def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypa
     runs = Runs()
     data = runs.data(runs.readings(machine()), errors=ERRORS)
     far = [Unknown("bearing[1].kxx", start=1e7), Unknown("bearing[2].kyy", start=1e8)]
-    found = calibrate(machine(), far, [data], starts=1)
-    assert not found.found.converged
+    found = calibrate(machine(), far, [data], side_starts=False)
+    assert not found.fit.converged
     assert np.isnan(found.std).all()
     assert found.warnings[0].startswith("not converged after 1 evaluation")
-    assert found.not_found == found.warnings[0]
+    assert found.undetermined == found.warnings[0]
     assert found.rotor.calibration.needs_trial_run
 
 
@@ -352,7 +353,7 @@ def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
     assert found.rotor.calibration.lack_of_fit.shape == (3, 4)
     assert found.std[0] > 3 * honest.std[0]
     assert found.std[0] ** 2 == pytest.approx(
-        found.found.estimate.solution_covariance[0, 0] * found.chi_square / found.dof
+        found.fit.estimate.solution_covariance[0, 0] * found.chi_square / found.dof
     )
 
 
@@ -384,9 +385,9 @@ def test_covariance_stands_as_the_rotor_does():
     truth = with_parameters(tabled(), values)
     runs = Runs(speeds=(150.0, 250.0, 400.0))
     data = runs.data(runs.readings(truth), errors=ERRORS)
-    found = calibrate(tabled(), [Unknown(p, start=v) for p, v in values.items()], [data], starts=1)
+    found = calibrate(tabled(), [Unknown(p, start=v) for p, v in values.items()], [data], side_starts=False)
     # the same data about the rotor that was found: its own numbers err as these say
-    again = calibrate(found.rotor, [Unknown(path) for path in values], [data], starts=1)
+    again = calibrate(found.rotor, [Unknown(path) for path in values], [data], side_starts=False)
     assert found.rotor.calibration.covariance == pytest.approx(again.covariance, rel=1e-4)
     assert found.covariance != pytest.approx(again.covariance, rel=1e-2)
 
@@ -396,7 +397,7 @@ def test_unbalances_that_the_readings_do_not_tell_apart_have_no_number():
     runs = Runs(speeds=(250.0,), sensors={"a": (2, 0.0), "b": (10, 90.0)}, free=False)
     runs.unbalance = {3: 1e-3, 6: 2e-3j, 9: -1e-3}
     data = runs.data(runs.readings(machine()), errors=ERRORS)
-    found = calibrate(machine(), [Unknown("bearing[1].kxx", prior=(4e7, 1e6))], [data], starts=1)
+    found = calibrate(machine(), [Unknown("bearing[1].kxx", prior=(4e7, 1e6))], [data], side_starts=False)
     assert np.isnan(found.unbalance[0]).all()
     assert np.isnan(found.unbalance_std[0]).all()
     assert found.dof == 2 * 2 * 3 + 1 - 4 - 1
@@ -413,3 +414,22 @@ def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
     data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
     found = calibrate(rotor, [Unknown(path) for path in values], [data])
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
+
+
+def test_errors_count_what_numbers_taken_as_exact_may_be_off():
+    """Density off by 1 %: the stiffness moves by as much as the difference of two fits says."""
+    runs = Runs()
+    data = runs.data(runs.readings(machine()), errors=ERRORS)
+    unknown = [Unknown("bearing[1].kxx"), Unknown("bearing[1].cxx")]
+    exact = Unknown("disc[1].scale", prior=(1.0, 0.01))
+    plain, wide = (calibrate(machine(), unknown, [data], exact=each) for each in ((), (exact,)))
+    ends = [
+        calibrate(with_parameters(machine(), {exact.path: 1.0 + by}), unknown, [data]).values
+        for by in (0.001, -0.001)
+    ]
+    moved = (ends[0] - ends[1]) / 0.002 * 0.01
+    assert wide.values == pytest.approx(plain.values, rel=1e-6)
+    expected = plain.covariance + np.outer(moved, moved)
+    assert wide.covariance == pytest.approx(expected, rel=1e-2, abs=1e-3 * np.abs(expected).max())
+    assert (wide.std > 1.1 * plain.std).any()
+    assert "± count what 1 number taken as exact may be off" in wide.answer.notes

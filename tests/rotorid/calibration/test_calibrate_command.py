@@ -105,7 +105,7 @@ def test_the_sample_finds_the_machine_it_was_made_of(cli):
 def test_what_is_not_determined_is_null_and_no_rotor_is_written(cli, folder):
     """One critical speed does not tell two stiffnesses."""
     (folder / "one.csv").write_text("mode,critical_speed_rpm\n1,1290\n")
-    args = "calibrate", ROTOR23, "one.csv", "--estimate", TWO, "--exact", "--starts", "1"
+    args = "calibrate", ROTOR23, "one.csv", "--estimate", TWO, "--exact"
     told = cli(*args, "--json")
     assert told.code == 0
     assert [told.json["parameters"][path]["value"] for path in TWO.split(",")] == [None, None]
@@ -147,17 +147,8 @@ def job(folder, *, rotor="rotor.csv", runs=("base", "trial"), weights="trial,P,1
         (("", ""), ("--unbalance-at", ""), "--unbalance-at takes nodes"),
         (("", ""), ("--unbalance-at", "9,9"), "--unbalance-at: one of its nodes stands twice"),
         (("", ""), ("--unbalance-at", "44"), "node 44 does not exist"),
-        (("", ""), ("--starts", "0"), "--starts one from 1"),
-        (("", ""), ("--speeds", "1000rpm"), "--speeds are candidates for --design"),
+        (("", ""), ("--bow", "-1"), "--bow takes a number from 0"),
         (("", ""), ("job.toml",), "is given twice"),
-        (("", ""), ("--design", "0"), "--design 0: from 1 to 1 of the 1 candidate"),
-        (("", ""), ("--design", "9"), "--design 9: from 1 to 1"),
-        (("", ""), ("--design", "1"), "--design has no picture"),
-        (
-            ("", ""),
-            ("--design", "1", "--speeds", "0:100:50rpm"),
-            "speeds must be finite and greater than zero",
-        ),
         (("", ""), ("--prior", "bearing[2].stiffness=5%"), "nothing that is estimated is called"),
         (("", ""), ("--bounds", "bearing[1].stiffness=5:1"), "LOWEST:HIGHEST is needed"),
         (("", ""), ("--bounds", "bearing[1].stiffness=-5:-1"), "must be finite and not negative"),
@@ -187,7 +178,7 @@ def test_runs_that_say_nothing_and_another_rotor(cli, folder):
     told = cli("calibrate", COMPRESSOR, job(folder), "--estimate", "bearing[1].kxx.scale")
     assert told.code == 2
     assert "job.toml: the job names a rotor of 24 nodes, this one has 25" in told.err
-    told = cli("calibrate", ROTOR23, job(folder), *args, "--exact", "--starts", "1")
+    told = cli("calibrate", ROTOR23, job(folder), *args, "--exact")
     assert told.code == 0, told.err
 
 
@@ -229,11 +220,3 @@ def test_critical_speeds_and_an_estimate_that_doubles_them(cli, folder):
     told = cli("calibrate", ROTOR23, critical(folder), "--estimate", "bearing[*].kxx")
     assert told.code == 2
     assert "bearing[1].kxx alone makes supports differ in x and y" in told.err
-
-
-def test_a_design_writes_no_rotor(cli, folder):
-    args = "calibrate", COMPRESSOR, TRIAL, "--estimate", "bearing[*].kxx", "--prior", "bearing[*].kxx=20%"
-    refused = cli(*args, "--estimate", "bearing[*].kxx.scale", "--design", "2", "--output", "new.toml")
-    assert refused.code == 2
-    assert "new.toml: --design finds no rotor; a table of the runs is .csv or .xlsx" in refused.err
-    assert list(folder.iterdir()) == []

@@ -7,9 +7,9 @@ from fem_rotors import rotor23
 from helpers.calibration.jobs import machine
 
 import fem
+from rotorid.commands.unknown_numbers import unknowns
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
-from rotorid.workflows.calibration.unknown_options import unknowns
 
 COEFFICIENTS = ("kxx", "kxy", "kyx", "kyy", "cxx", "cyy")
 

@@ -162,7 +162,7 @@ def test_starts_end_where_calibrate_does():
     rotor, data = sample_data() / "rotor23.csv", sample_data() / "calibration" / "critical.csv"
     known = calibrate(rotor, data, options).found
     assert found.found.tolist() == [6]
-    assert found.ends[0] == pytest.approx(known.found.estimate.solution, rel=1e-4)
+    assert found.ends[0] == pytest.approx(known.fit.estimate.solution, rel=1e-4)
     assert found.chi_square[0] == pytest.approx(known.chi_square, rel=1e-3)
     document = found.to_dict()
     assert (document["probability"], document["not_converged"]) == (1.0, 0)

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.calibration.calibrated_rotor import CalibratedRotor
+    from rotorid.calibration.result import CalibratedRotor
 
 _ROW = 0.24
 """Height of a row, in."""
@@ -19,7 +19,7 @@ def calibration_figure(result: CalibratedRotor) -> Figure:
     """95 % intervals before and after, in standard deviations of what was known, else of the estimate."""
     from rotorid.base.plot_style import legend_above, new_figure, plain
 
-    values, std = result.found.estimate.solution, np.nan_to_num(result.std)
+    values, std = result.fit.estimate.solution, np.nan_to_num(result.std)
     prior = [unknown.prior for unknown in result.unknowns]
     known = np.array([p is not None for p in prior])
     middle = np.array([p[0] if p else v for p, v in zip(prior, values, strict=True)])

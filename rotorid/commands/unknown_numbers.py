@@ -34,8 +34,8 @@ def unknowns(
     rotor: Rotor,
     probes: Sequence[str],
     estimate: str | Sequence[str],
-    prior: str | Mapping[str, str],
-    bounds: str | Mapping[str, str],
+    prior: str | Mapping[str, str] = "",
+    bounds: str | Mapping[str, str] = "",
     *,
     exact: bool,
 ) -> list[Unknown]:
@@ -46,30 +46,31 @@ def unknowns(
     ValueError
         For what cannot be read, and numbers that the rotor does not have.
     """
-    found: dict[str, Unknown] = {}
+    numbers: dict[str, Unknown] = {}
     parts = re.split(_COMMA, estimate) if isinstance(estimate, str) else estimate
     for part in parts:
         name, _, path = (piece.strip() for piece in part.rpartition("="))
         paths = list(_expanded(rotor, path, probes))
         if name and len(paths) != 1:
             raise ValueError(f"--estimate {part.strip()}: one name for {counted(len(paths), 'number')}")
-        if twice := next((each for each in paths if each in found), None):
+        if twice := next((each for each in paths if each in numbers), None):
             raise ValueError(f"--estimate: {twice} stands twice")
-        found |= {each: Unknown(each, name) for each in paths}
-    if not found:
+        numbers |= {each: Unknown(each, name) for each in paths}
+    if not numbers:
         raise ValueError("--estimate: all coefficients of these supports are 0; name those that are not")
-    check_different(rotor, list(found))
-    labels = [unknown.label for unknown in found.values()]
+    check_different(rotor, list(numbers))
+    labels = [unknown.label for unknown in numbers.values()]
     if twice := next((label for label in labels if labels.count(label) > 1), None):
         raise ValueError(f"--estimate: two numbers are called {twice}")
-    named = {number for path in found for number in numbers_of(rotor, path)}
+    named = {number for path in numbers for number in numbers_of(rotor, path)}
     for pattern, std in () if exact else KNOWN:
         for path in _there(rotor, pattern, probes):
             if not numbers_of(rotor, path) & named:
-                found.setdefault(path, Unknown(path, prior=(_value(rotor, path), std), beside=True))
-    _apply(rotor, found, prior, "--prior", probes)
-    _apply(rotor, found, bounds, "--bounds", probes)
-    return list(found.values())
+                value = parameter_value(rotor, path)
+                numbers.setdefault(path, Unknown(path, prior=(value, std), beside=True))
+    _apply(rotor, numbers, prior, "--prior")
+    _apply(rotor, numbers, bounds, "--bounds")
+    return list(numbers.values())
 
 
 def _there(rotor: Rotor, pattern: str, probes: Sequence[str]) -> tuple[str, ...]:
@@ -87,42 +88,32 @@ def _expanded(rotor: Rotor, path: str, probes: Sequence[str]) -> Iterator[str]:
         yield from expand(rotor, path, probes)
         return
     for each in expand(rotor, f"{head}.kxx", probes):
-        own = [rotor.supports[place] for _, place, _ in numbers_of(rotor, each)]
-        tables = [np.stack(support.at(np.array(support.speeds or (0.0,)))) for support in own]
+        supports = [rotor.supports[place] for _, place, _ in numbers_of(rotor, each)]
+        tables = [np.stack(support.at(np.array(support.speeds or (0.0,)))) for support in supports]
         for name, (quantity, i, j) in ENTRIES.items():
             values = np.concatenate([table[quantity, :, i, j] for table in tables])
             if values.any():
-                scaled = np.ptp(values) > 0 or any(support.speeds for support in own)
+                scaled = np.ptp(values) > 0 or any(support.speeds for support in supports)
                 yield f"{each.removesuffix('kxx')}{name}{'.scale' if scaled else ''}"
 
 
-def _value(rotor: Rotor, path: str) -> float:
-    return parameter_value(rotor, path)
-
-
-def _apply(
-    rotor: Rotor,
-    found: dict[str, Unknown],
-    given: str | Mapping[str, str],
-    what: str,
-    probes: Sequence[str],
-) -> None:
+def _apply(rotor: Rotor, numbers: dict[str, Unknown], given: str | Mapping[str, str], what: str) -> None:
     """Priors or bounds of the numbers that a name, a path or a pattern with `*` stands for."""
     if isinstance(given, str):
         parts = re.split(_COMMA, given) if given else []
         given = pairs(parts, what, lambda _, text: text, _EXAMPLE)
     for pattern, text in given.items():
         literal = re.sub(r"\[(?!\*\])([^\]]*)\]", r"[[]\1]", pattern).replace("[*]", "[[]*]")
-        hit = [p for p, u in found.items() if pattern in (p, u.name) or fnmatchcase(p, literal)]
-        hit = hit or [p for p, u in found.items() if fnmatchcase(p, f"{literal}.scale")]
+        hit = [p for p, u in numbers.items() if pattern in (p, u.name) or fnmatchcase(p, literal)]
+        hit = hit or [p for p, u in numbers.items() if fnmatchcase(p, f"{literal}.scale")]
         if not hit:
-            raise ValueError(f"{what}: nothing that is estimated is called {pattern!r}: {', '.join(found)}")
+            raise ValueError(f"{what}: nothing that is estimated is called {pattern!r}: {', '.join(numbers)}")
         for path in hit:
-            value = _value(rotor, path)
             if what == "--prior":
-                found[path] = replace(found[path], prior=_prior(str(text), value, pattern))
+                prior = _prior(str(text), parameter_value(rotor, path), pattern)
+                numbers[path] = replace(numbers[path], prior=prior)
             else:
-                found[path] = replace(found[path], bounds=_bounds(str(text), pattern))
+                numbers[path] = replace(numbers[path], bounds=_bounds(str(text), pattern))
 
 
 def _prior(text: str, value: float, pattern: str) -> tuple[float, float]:

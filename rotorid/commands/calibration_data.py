@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def read_data(
-    files: Sequence[Path], rotor: Rotor, unbalance: Sequence[int], bow: int, *, candidates: bool = False
+    files: Sequence[Path], rotor: Rotor, unbalance: Sequence[int], bow: int
 ) -> tuple[list[RunReadings], list[MeasuredFrequencies], list[Path], list[str]]:
     """Readings and frequencies of these files, all files that were read, and what was assumed.
 
@@ -30,32 +30,28 @@ def read_data(
         Knows the nodes.
     unbalance, bow
         As `RunReadings`, of all jobs.
-    candidates
-        The runs of jobs need not say anything: only their places count.
     """
     from rotorid.tables import read_job
     from rotorid.tables.data.frequency_table import is_job, read_frequencies
 
-    readings, frequencies, read, said = [], [], list[Path](), list[str]()
+    readings, frequencies, read, assumed = [], [], list[Path](), list[str]()
     for file in files:
         if is_job(file):
             job = read_job(file)
             try:
-                readings.append(run_readings(job, rotor, unbalance, bow, candidates=candidates))
+                readings.append(run_readings(job, rotor, unbalance, bow))
             except ValueError as error:
                 raise ValueError(f"{file.name}: {error}") from None
             read += job.files
         else:
-            found = read_frequencies(file, rotor)
-            frequencies.append(found.data)
+            table = read_frequencies(file, rotor)
+            frequencies.append(table.data)
             read.append(file)
-            said += [f"{file.name}: {assumed}" for assumed in found.assumed]
-    return readings, frequencies, read, said
+            assumed += [f"{file.name}: {each}" for each in table.assumed]
+    return readings, frequencies, read, assumed
 
 
-def run_readings(
-    job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0, *, candidates: bool = False
-) -> RunReadings:
+def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0) -> RunReadings:
     """The runs of a job at their places in the model.
 
     Raises
@@ -71,7 +67,7 @@ def run_readings(
             "its planes and sensors would be elsewhere"
         )
     changed = bool((trials.weights != trials.weights[0]).any())
-    if not (candidates or unbalance or bow or changed):
+    if not (unbalance or bow or changed):
         raise ValueError(
             "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
             "are needed, or nodes at which the unbalance may stand (--unbalance-at)"

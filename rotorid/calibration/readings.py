@@ -116,9 +116,9 @@ class RunReadings:
             step = STEP * size(path)
             return matrix_change(lambda by: with_changes(rotor, {path: by}), 0.0, step, speeds)
 
-        own = [path for path in derivatives if not is_reading(path)]
-        found = receptance_with_derivatives(
-            rotor, np.hstack(loads), rows, angles, speeds, [change(path) for path in own]
+        of_rotor = [path for path in derivatives if not is_reading(path)]
+        receptance = receptance_with_derivatives(
+            rotor, np.hstack(loads), rows, angles, speeds, [change(path) for path in of_rotor]
         )
         clock = np.exp(1j * np.radians(self.key_phasor + values.get("key_phasor.angle", 0.0)))
         factor = np.ones((speeds.size, loads[0].shape[1] + self.bow), dtype=complex)
@@ -127,21 +127,21 @@ class RunReadings:
         factor *= clock * ((1j * speeds) ** self.derivative)[:, None]
         gains = np.array([values.get(f"probe[{name}].gain", 1.0) for name in self.trials.sensors])
         factor = factor[:, None] * gains[:, None]  # (S, C, P + q)
-        W = found.H * factor
+        W = receptance.H * factor
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
-        to = as_they_stand(start, {path: values[path] for path in own})
-        for k, path in enumerate(own):  # what rounding leaves of a number that does nothing
-            seen = np.abs(found.by_number[k]).max() * size(path)
-            found.by_number[k] *= seen > UNSEEN * np.abs(found.H).max()
-        by_number = np.tensordot(to.T, found.by_number, 1)
+        to = as_they_stand(start, {path: values[path] for path in of_rotor})
+        for k, path in enumerate(of_rotor):  # what rounding leaves of a number that does nothing
+            seen = np.abs(receptance.by_number[k]).max() * size(path)
+            receptance.by_number[k] *= seen > UNSEEN * np.abs(receptance.H).max()
+        by_number = np.tensordot(to.T, receptance.by_number, 1)
         for k, path in enumerate(derivatives):
-            if path in own:
-                out[k] = by_number[own.index(path)] * factor
+            if path in of_rotor:
+                out[k] = by_number[of_rotor.index(path)] * factor
             elif path == "key_phasor.angle":
                 out[k] = W * 1j * np.radians(1.0)
             elif path in names:
                 c = names.index(path)
-                out[k, :, c] = found.by_angle[:, c] * factor[:, c] * np.radians(1.0)
+                out[k, :, c] = receptance.by_angle[:, c] * factor[:, c] * np.radians(1.0)
             else:
                 c = self.trials.sensors.index(path.removeprefix("probe[").removesuffix("].gain"))
                 out[k, :, c] = W[:, c] / gains[c]
@@ -182,13 +182,13 @@ class Bare(NamedTuple):
     """
 
     u: ComplexArray
-    own: FloatArray
+    covariance: FloatArray
     by: FloatArray
     rank: int
 
     def std(self, covariance: FloatArray, times: float) -> FloatArray:
         """One standard deviation in each direction (q,), with the covariance of the numbers (n, n)."""
-        parts = np.diag(times * self.own + self.by @ covariance @ self.by.T).reshape(-1, 2)
+        parts = np.diag(times * self.covariance + self.by @ covariance @ self.by.T).reshape(-1, 2)
         return np.asarray(np.where(np.isnan(self.u), np.nan, np.sqrt(parts.mean(axis=1))))
 
 
@@ -205,7 +205,7 @@ class ReadingRows:
     white
         Divides vectors (S, 2 x C, j) by the root of their covariance.
     variance
-        Of single rows by errors of their own, (S, 2 x C).
+        Of single rows by errors that no other row shares, (S, 2 x C).
     stated
         Whether the errors are stated or measured, not assumed.
     """
@@ -240,7 +240,7 @@ class ReadingRows:
         return np.asarray(J - basis @ solution(basis, J))
 
     def bare(self, W: ComplexArray, dW: ComplexArray) -> Bare:
-        """What was found of the bare rotor besides."""
+        """What the rows say of the bare rotor besides."""
         _, basis, u = self.residual(W)
         if not u.size:
             return Bare(u, np.zeros((0, 0)), np.zeros((0, len(dW))), 0)

@@ -1,0 +1,180 @@
+"""`calibrate`: numbers of a rotor file from trial runs, critical speeds and modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rotorid.base.answer import Answer
+from rotorid.commands.input_checks import file_of, rotor_source
+from rotorid.commands.outcome import Found, command, log_rotor, phase, provenance
+from rotorid.commands.quantities import Names, Nodes, nodes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fem import Rotor
+    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
+
+    DataFiles = Path | str | Sequence[Path | str]
+    """Jobs, tables of critical speeds or natural frequencies, tables of modes."""
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Options of `calibrate`.
+
+    Attributes
+    ----------
+    estimate : LIST
+        Unknown numbers: "bearing[1].kxx, k2 = bearing[2].kxx", `bearing[*].*` is every coefficient of every
+        bearing (of tables over speed their scales), `bearing.kxx` one value for all.
+    prior : LIST
+        What is known of them: bearing[*].*=20%, bearing[1].kxx=7e7+-1e7.
+    bounds : LIST
+        Lowest and largest value: bearing[1].kxx=1e6:1e9.
+    exact
+        Modulus (1 %), discs (1 %), pedestals (10 %) and angles of probes (2°) are not estimated; ± count that
+        they may be off by so much. Else they are unknown, too, with these standard deviations.
+    unbalance_at : LIST
+        Nodes where the rotor's own unbalance may stand: the readings of the bare rotor count, too.
+    bow : N
+        Shapes of an unknown bow, modes of the free shaft; with --unbalance-at.
+    """
+
+    estimate: Names
+    prior: str | Mapping[str, str] = ""
+    bounds: str | Mapping[str, str] = ""
+    exact: bool = False
+    unbalance_at: Nodes | None = None
+    bow: int = 0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Calibrated(Found):
+    """The calibrated rotor, and what was assumed of the data."""
+
+    assumed: tuple[str, ...] = ()
+    written: Path | None = None
+
+    @property
+    def answer(self) -> Answer:
+        """With what was assumed."""
+        answer: Answer = self.found.answer
+        return replace(answer, notes=(*answer.notes, *self.assumed))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, with the rotor file that is written."""
+        return {**super().to_dict(), "rotor": self.written and str(self.written)}
+
+    def files(self, path: Path) -> Mapping[Path, bytes]:
+        """The calibrated rotor as a rotor file, .toml, with its tables; or the table of numbers.
+
+        Raises
+        ------
+        ValueError
+            For a rotor file of numbers that the data do not determine.
+        """
+        from rotorid.tables.reader.table_writing import table_bytes
+        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
+
+        if path.suffix.lower() != ".toml":
+            return {path: table_bytes(path, self.to_frame())}
+        if why := self.found.undetermined:
+            raise ValueError(f"{path}: no rotor file can be written, {why}")
+        return rotor_file_bytes(path, self.found.rotor)
+
+    def figure(self) -> Figure:
+        """The numbers with what was known of them."""
+        from rotorid.calibration.plots import calibration_figure
+
+        return calibration_figure(self.found)
+
+
+class Prepared(NamedTuple):
+    """What is calibrated: the rotor, unknown numbers, data; files of both; what was assumed."""
+
+    rotor: Rotor
+    numbers: list[Unknown]
+    readings: list[RunReadings]
+    frequencies: list[MeasuredFrequencies]
+    rotor_files: tuple[Path, ...]
+    data_files: list[Path]
+    assumed: list[str]
+
+    @property
+    def probes(self) -> list[str]:
+        """Names of all sensors, each once."""
+        return list(dict.fromkeys(sensor for data in self.readings for sensor in data.trials.sensors))
+
+
+@command
+def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Calibrated:
+    """Estimate numbers of a rotor from data of any mixture, with errors, and what the data do not determine.
+
+    Parameters
+    ----------
+    rotor
+        As it is believed to be: a rotor, or its file.
+    data
+        Jobs with trial runs (or with readings of the bare rotor), tables of critical speeds, natural
+        frequencies or modes.
+    options
+        What is unknown, and what is known of it.
+
+    Raises
+    ------
+    ValueError
+        For files or options that cannot be, and for data that say nothing of the rotor.
+    """
+    from rotorid import calibration
+    from rotorid.commands.unknown_numbers import unknowns
+
+    given = prepared(rotor, data, options)
+    log_rotor(given.rotor, unknowns=len(given.numbers))
+    origin = provenance([*given.rotor_files, *given.data_files], options)
+    paths = {number.path for number in given.numbers}
+    beside = unknowns(given.rotor, given.probes, options.estimate, exact=False) if options.exact else []
+    exact = [number for number in beside if number.path not in paths]
+    with phase("calibration"):
+        result = calibration.calibrate(*given[:4], exact=exact)
+    of_rotor = {one["sha256"] for one in origin["inputs"][: len(given.rotor_files)]}  # which jobs name, too
+    made_from = [one for one in origin["inputs"] if one["sha256"] not in of_rotor]
+    hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
+    numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
+    result = replace(result, rotor=replace(result.rotor, calibration=numbers))
+    return Calibrated(found=result, assumed=tuple(given.assumed), provenance=origin)
+
+
+def prepared(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Prepared:
+    """Read what is calibrated.
+
+    Raises
+    ------
+    ValueError
+        As `calibrate`.
+    """
+    from rotorid.commands.calibration_data import read_data
+    from rotorid.commands.unknown_numbers import unknowns
+
+    model, files = rotor_source(rotor)
+    given = [data] if isinstance(data, Path | str) else list(data)
+    if len({*map(str, given)}) < len(given):
+        raise ValueError("one of the data files is given twice: it would count twice")
+    named = [] if options.unbalance_at is None else nodes(options.unbalance_at, "--unbalance-at")
+    places = [model.node(node) for node in named]
+    if len({*places}) < len(places):
+        raise ValueError("--unbalance-at: one of its nodes stands twice")
+    if options.bow < 0:
+        raise ValueError("--bow takes a number from 0")
+    if options.bow and not places:
+        raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
+    sources = [file_of(file, "data") for file in given]
+    readings, frequencies, read, assumed = read_data(sources, model, places, options.bow)
+    without = Prepared(model, [], readings, frequencies, files, read, assumed)
+    numbers = unknowns(
+        model, without.probes, options.estimate, options.prior, options.bounds, exact=options.exact
+    )
+    return without._replace(numbers=numbers)
