@@ -25,32 +25,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, chance
 from balancing.conventions import Labels
-from balancing.errors import Reading, RunErrors, mean_variance, reading_of, usual_run_errors
+from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.influence import (
-    SPEED_TOLERANCE,
-    Errors,
-    Gaussian,
     Influence,
-    Mounted,
-    Noise,
     Remarks,
     estimate_influence,
     local_runs,
-    run_noise,
+    nearest_speed,
 )
+from balancing.noise import KNOWN, Errors, Gaussian, Mounted, Noise, Whitening, kind_sizes, run_noise
 from balancing.regions import real_parts
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.rpm import rpm_text
-from rotorid.base.suggestions import did_you_mean
-from rotorid.regression import covariance_root, unstretch
+from rotorid.regression import covariance_root, stretch, unstretch
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
@@ -112,8 +107,6 @@ def model_influence(  # noqa: PLR0913
     """
     from fem import influence
 
-    if not (np.isfinite(relative_error) and relative_error >= 0):
-        raise ValueError(f"the relative error of the model must be a finite number ≥ 0, not {relative_error}")
     if quantity not in DERIVATIVES:
         raise ValueError(f"quantity must be one of {', '.join(DERIVATIVES)}, not {quantity!r}")
     if not np.isfinite(key_phasor):
@@ -176,14 +169,11 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
 def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -> FloatArray:
     if radii is None:
         return np.ones(len(planes))
-    unknown = [name for name in radii if name not in planes]
-    lacking = [name for name in planes if name not in radii]
-    if unknown or lacking:
-        hint = did_you_mean(unknown[0], lacking) if len(unknown) == 1 else ""
+    wrong = sorted(set(radii) ^ set(planes))
+    if wrong:
         raise ValueError(
-            f"give the radius of every plane and of no other one: "
-            f"{'there is no plane' if unknown else 'lacking is that of'} "
-            f"{', '.join(map(repr, unknown or lacking))}{hint}"
+            f"give the radius of every plane and of no other one: {', '.join(map(repr, wrong))} "
+            "has a radius and is no plane, or is a plane without one"
         )
     out = np.array([radii[name] for name in planes], dtype=np.float64)
     if not (np.isfinite(out) & (out > 0)).all():
@@ -220,54 +210,45 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     runs = local_runs(expected, trials)
     R, (S, C, P) = len(runs.runs), expected.W.shape
     reading, run = _shown(runs)
-    unit = np.broadcast_to(np.eye(R, dtype=complex), (S, C, R, R))
-    noise = run_noise(runs, expected.W, unit, reading, run)
-    sizes = np.array([1.0, *run.typical, 1.0])
-    own = np.tensordot(sizes[:2] ** 2, noise.own, axes=1)  # (S, C, 2R, 2R)
-    own += 1e-12 * (np.trace(own, axis1=-2, axis2=-1).max() or 1.0) * np.eye(2 * R)
+    noise = run_noise(runs, expected.W, np.eye(R, dtype=complex), reading, run)
+    columns, m = expected.columns(), len(expected.columns())
     change = np.column_stack((np.ones(R), runs.weights))
-    columns = expected.columns()
-    unknown = np.concatenate((columns @ change.T, noise.columns * sizes[noise.kind][:, None, None, None]))
-    root = np.linalg.cholesky(own)
-    K = np.linalg.solve(root, np.moveaxis(real_parts(unknown), 0, -1)).reshape(S * C, 2 * R, -1)
-    free = np.linalg.solve(root, np.tile(np.eye(2), (R, 1))[None, None]).reshape(S * C, 2 * R, 2)
+    prior = Noise(0 * noise.own, columns @ change.T, np.full(m, KNOWN))
+    whitening = Whitening(noise.plus(prior), kind_sizes(run))
+    bare = stretch(np.kron(np.eye(S * C), np.ones((R, 1))).astype(complex)).reshape(S, C, 2 * R, -1)
     difference = np.moveaxis(runs.mean, 0, -1) - expected.W @ runs.weights.T
-    y = np.linalg.solve(root, real_parts(difference)[..., None]).reshape(-1, 2 * R)
-    N, M = 2 * S * C, len(unknown)
-    A = np.zeros((S * C, 2 * R, N + M))
-    for k in range(S * C):
-        A[k, :, 2 * k : 2 * k + 2] = free[k]
-    A[..., N:] = K
-    rows = np.vstack((A.reshape(-1, N + M), np.eye(N + M)[N:]))
-    right = np.append(y, np.zeros(M))
-    values, *_ = np.linalg.lstsq(rows, right, rcond=None)
-    covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
-    m = len(columns)
-    moved = np.tensordot(values[N : N + m], columns, 1)
-    baseline = (values[:N:2] + 1j * values[1:N:2]).reshape(S, C) + moved[..., 0]
+    parts = (bare, np.moveaxis(real_parts(prior.columns), 0, -1), real_parts(difference)[..., None])
+    A, K, y = (whitening.white(part) for part in parts)
+    basis, root = np.linalg.qr(A)
+    inverse = np.linalg.inv(root)
+    along, left = inverse @ basis.T @ y, y - basis @ (basis.T @ y)
+    rest = K - basis @ (basis.T @ K)
+    cross = -inverse @ basis.T @ K
+    joint = np.block([[inverse @ inverse.T, cross], [cross.T, np.eye(m) - rest.T @ rest]])
+    moved = np.tensordot((rest.T @ left)[:, 0], columns, 1)
     # what a channel's readings tell of its Y₀ alone, all else given, is its own; the rest is in common
     alone = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    alone[..., :2, :2] = np.linalg.inv(np.einsum("kij,kil->kjl", free, free)).reshape(S, C, 2, 2)
-    joint = covariance[: N + m, : N + m].copy()
+    ones = np.tile(np.eye(2), (R, 1))
+    alone[..., :2, :2] = np.linalg.inv(ones.T @ np.linalg.solve(whitening.own, ones))
+    N = 2 * S * C
+    variance = np.diag(joint).copy()
     for k, block in enumerate(alone[..., :2, :2].reshape(-1, 2, 2)):
         joint[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] -= block
-    factors = covariance_root(joint, np.diag(covariance)[: N + m]).T
-    Y = unstretch(factors[:, :N]).reshape(-1, S, C, 1)
-    both = np.tensordot(factors[:, N:], columns, 1)
-    both[..., :1] += Y
+    factors = covariance_root(joint, variance).T
+    common = np.tensordot(factors[:, N:], columns, 1)
+    common[..., 0] += unstretch(factors[:, :N]).reshape(-1, S, C)
     mounted = Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
-    spare = len(right) - N - M - (N + M - np.linalg.matrix_rank(rows))
-    left = float(np.sum((rows @ values - right) ** 2))
     warnings = dict.fromkeys((*expected.remarks.warnings, *trials.warnings, *reading.warnings))
     result = replace(
         expected,
         W=expected.W + moved[..., 1:],
-        baseline=baseline,
-        errors=Gaussian(alone, both, reading, run, mounted),
+        baseline=unstretch(along[:, 0]).reshape(S, C) + moved[..., 0],
+        errors=Gaussian(alone, common, reading, run, mounted),
         labels=trials.labels,
         remarks=Remarks(tuple(warnings)),
     )
-    return result, chance(left, spare) if spare > 0 else 1.0
+    spare = N * (R - 1)
+    return result, chance(float(np.sum(left**2)), spare) if spare else 1.0
 
 
 def _shown(runs: Trials) -> tuple[Reading, RunErrors]:
@@ -308,136 +289,87 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     ):
         if not side.known_errors:
             raise ValueError(f"coefficients can be combined only by their errors, and those of the {words}")
-    _check_kinds(measured, computed)
-    speeds, *places = _speeds(measured, computed)
+    kinds = ["unbalance" if side.labels.unbalances else "mass" for side in (measured, computed)]
+    if kinds[0] != kinds[1]:
+        remedy = "give the radii of the planes, to compute them per mass"
+        if kinds[0] == "unbalance":
+            remedy = "compute them per unbalance, without radii"
+        raise ValueError(
+            f"the measured coefficients are per {kinds[0]} ({measured.labels.weight_unit}) and the computed "
+            f"ones per {kinds[1]} ({computed.labels.weight_unit}): {remedy}"
+        )
+    more = [v for v in computed.speeds if nearest_speed(v, measured.speeds) == len(measured.speeds)]
+    speeds = np.sort(np.append(measured.speeds, more))
     sensors = tuple(dict.fromkeys((*measured.sensors, *computed.sensors)))
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
-    first, second = (
-        _spread(side, at, sensors, planes) for side, at in zip((measured, computed), places, strict=True)
-    )
-    lacking = np.argwhere(np.isnan(first.W) & np.isnan(second.W))
+    (first, one), (second, other) = (_placed(side, speeds, sensors, planes) for side in (measured, computed))
+    W, model = first[..., 1:], second[..., 1:]
+    lacking = np.argwhere(np.isnan(W) & np.isnan(model))
     if len(lacking):
         s, c, p = lacking[0]
         raise ValueError(
             f"there is neither a measured nor a computed coefficient of plane {planes[p]!r} at sensor "
             f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
         )
-    both = ~(np.isnan(first.W) | np.isnan(second.W))
-    sum_ = first.variance + second.variance
-    share = np.where(np.isnan(second.W), 1.0, 0.0)
-    share[both] = np.where(
-        sum_[both] > 0, second.variance[both] / np.where(sum_[both] > 0, sum_[both], 1), 0.5
+    v, u = (
+        np.einsum("scii->sci", noise.covariance(side.errors.sizes)).reshape(*W.shape[:2], -1, 2).mean(axis=-1)
+        for noise, side in ((one, measured), (other, computed))
     )
-    W = np.nan_to_num(first.W) * share + np.nan_to_num(second.W) * (1 - share)
-    one = np.ones((*share.shape[:2], 1))
-    noises = (
-        side.noise.scaled(np.concatenate(parts, axis=-1))
-        for side, parts in ((first, (one, share)), (second, (0 * one, 1 - share)))
-    )
-    one_side, other = noises
-    noise = Noise(
-        one_side.own + other.own,
-        np.concatenate((one_side.columns, other.columns)),
-        np.concatenate((one_side.kind, other.kind)),
-    )
-    by_name = dict(zip(measured.planes, measured.mounted.weights, strict=True))
-    mounted = np.array([by_name.get(plane, 0.0) for plane in planes], dtype=complex)
-    errors = Errors(
-        noise,
-        measured.reading,
-        measured.run_errors,
-        Mounted(measured.mounted.run, planes, mounted),
-        measured.trials,
-    )
-    chi = np.where(both, np.abs(np.nan_to_num(first.W - second.W)) ** 2 / np.where(sum_ > 0, sum_, np.inf), 0)
-    remarks = Remarks(
-        (
-            *measured.remarks.warnings,
-            *computed.remarks.warnings,
-            *_contradictions(chi, int(both.sum()), planes, sensors, speeds),
-        ),
-        measured.remarks.notes,
-        measured.remarks.contradictions,
-    )
-    return Influence(speeds, sensors, planes, W, first.baseline, errors, measured.labels, remarks)
-
-
-class _Side(NamedTuple):
-    """One side at the speeds, sensors and planes of both: NaN where it has nothing."""
-
-    W: ComplexArray
-    baseline: ComplexArray
-    variance: FloatArray
-    noise: Noise
-
-
-def _spread(
-    side: Influence, at: Sequence[int | None], sensors: Sequence[str], planes: Sequence[str]
-) -> _Side:
-    """Put the coefficients of a side in their places among those of both."""
-    S, C, P = len(at), len(sensors), len(planes)
-    rows = [s for s, i in enumerate(at) if i is not None]
-    source = [i for i in at if i is not None]
-    columns = [sensors.index(name) for name in side.sensors]
-    chosen = [planes.index(name) for name in side.planes]
-    part = side.part(source)
-    W = np.full((S, C, P), np.nan, dtype=complex)
-    W[np.ix_(rows, columns, chosen)] = part.W
-    baseline = np.full((S, C), np.nan, dtype=complex)
-    baseline[np.ix_(rows, columns)] = part.baseline
-    variance = np.zeros((S, C, P))
-    blocks = part.channels()[..., 2:, 2:]
-    n = len(chosen)
-    each = np.einsum("scpipj->scpij", blocks.reshape(*blocks.shape[:2], n, 2, n, 2))
-    variance[np.ix_(rows, columns, chosen)] = mean_variance(each)
-    return _Side(W, baseline, variance, part.errors.noise.spread((S, C, P), rows, columns, chosen))
-
-
-def _contradictions(
-    chi: FloatArray, n: int, planes: Sequence[str], sensors: Sequence[str], speeds: FloatArray
-) -> tuple[str, ...]:
-    """χ² (S, C, P) of differences, two degrees of freedom each, that n chances do not explain."""
+    total = (v + u)[..., 1:]
+    safe = np.where(total > 0, total, np.inf)
+    share = np.where(total > 0, u[..., 1:] / safe, 0.5)
+    share = np.where(np.isnan(W), 0.0, np.where(np.isnan(model), 1.0, share))
+    baseline = np.ones((*share.shape[:2], 1))
+    shares = np.concatenate((baseline, share), axis=-1)[..., None] * np.eye(len(planes) + 1, dtype=complex)
+    rest = np.eye(len(planes) + 1) - shares
+    chi = np.nan_to_num(np.abs(W - model) ** 2 / safe)
+    warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))
-    if n * chance(float(chi[s, c, p]), 2) >= 1 - LEVEL:
-        return ()
-    return (
-        f"measured and computed coefficient of plane {planes[p]!r} at sensor {sensors[c]!r}, "
-        f"{rpm_text(speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: the model, "
-        "the trial runs or the stated errors are wrong",
+    both = ~np.isnan(W - model)
+    # each two degrees of freedom, and so many chances
+    if np.count_nonzero(both) * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
+        warnings += (
+            f"measured and computed coefficient of plane {planes[p]!r} at sensor {sensors[c]!r}, "
+            f"{rpm_text(speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: the "
+            "model, the trial runs or the stated errors are wrong",
+        )
+    last = dict(zip(measured.planes, measured.mounted.weights, strict=True))
+    mounted = np.array([last.get(plane, 0.0) for plane in planes], dtype=complex)
+    return Influence(
+        speeds,
+        sensors,
+        planes,
+        np.nan_to_num(W) * share + np.nan_to_num(model) * (1 - share),
+        first[..., 0],
+        Errors(
+            one.changed(shares).plus(other.changed(rest)),
+            measured.reading,
+            measured.run_errors,
+            Mounted(measured.mounted.run, planes, mounted),
+            measured.trials,
+        ),
+        measured.labels,
+        measured.remarks._replace(warnings=warnings),
     )
 
 
-def _check_kinds(measured: Influence, computed: Influence) -> None:
-    kinds = ["unbalance" if "_" in side.labels.weight_unit else "mass" for side in (measured, computed)]
-    if kinds[0] != kinds[1]:
-        units = measured.labels.weight_unit, computed.labels.weight_unit
-        remedy = "give the radii of the planes, to compute them per mass"
-        if kinds[0] == "unbalance":
-            remedy = "compute them per unbalance, without radii"
-        raise ValueError(
-            f"the measured coefficients are per {kinds[0]} ({units[0]}) and the computed ones per {kinds[1]} "
-            f"({units[1]}): {remedy}"
-        )
+def _placed(
+    side: Influence, speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
+) -> tuple[ComplexArray, Noise]:
+    """(Y₀, W) of a side in their places among those of both, NaN where it has nothing, and how they err."""
 
+    def places(names: Sequence[str], known: Sequence[str]) -> list[int]:
+        return [known.index(name) if name in known else len(known) for name in names]
 
-def _speeds(
-    measured: Influence, computed: Influence
-) -> tuple[FloatArray, list[int | None], list[int | None]]:
-    """All speeds, ascending, and where each stands on either side (None: nowhere)."""
-    pairs: dict[int, int] = {}
-    for j, speed in enumerate(computed.speeds):
-        i = int(np.argmin(np.abs(measured.speeds - speed)))
-        if abs(measured.speeds[i] - speed) <= SPEED_TOLERANCE * measured.speeds[i]:
-            if i in pairs:
-                two = f"{rpm_text(computed.speeds[pairs[i]])} and {rpm_text(speed)}"
-                raise ValueError(
-                    f"two computed speeds, {two}, fit the measured {rpm_text(measured.speeds[i])}: "
-                    "leave one out"
-                )
-            pairs[i] = j
-    rows: list[tuple[float, int | None, int | None]] = [
-        (float(speed), i, pairs.get(i)) for i, speed in enumerate(measured.speeds)
-    ]
-    rows += [(float(speed), None, j) for j, speed in enumerate(computed.speeds) if j not in pairs.values()]
-    rows.sort(key=lambda row: row[0])
-    return np.array([r[0] for r in rows]), [r[1] for r in rows], [r[2] for r in rows]
+    at = [nearest_speed(v, side.speeds) for v in speeds]
+    among, chosen = places(sensors, side.sensors), places(planes, side.planes)
+    one = (0, 1)
+    theta = np.concatenate((side.baseline[..., None], side.W), axis=-1)
+    theta = np.pad(theta, (one, one, one), constant_values=np.nan)
+    noise = side.errors.noise
+    padded = Noise(
+        np.pad(noise.own, ((0, 0), one, one, (0, 2), (0, 2))),
+        np.pad(noise.columns, ((0, 0), one, one, one)),
+        noise.kind,
+    )
+    return theta[np.ix_(at, among, [0, *(1 + p for p in chosen)])], padded.part(at, among, chosen)
