@@ -38,7 +38,7 @@ from balancing.influence import (
     Remarks,
     estimate_influence,
     local_runs,
-    nearest_speed,
+    match_speeds,
 )
 from balancing.noise import KNOWN, Errors, Gaussian, Mounted, Noise, Whitening, kind_sizes, run_noise
 from balancing.regions import real_parts
@@ -269,19 +269,19 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         Coefficients with errors, from `estimate_influence`, or stored ones.
     computed
         Of the same kind (per mass or per unbalance) with errors, from `model_influence` with a
-        `relative_error`. Speeds within 0.5 % of a measured one count as that.
+        `relative_error`; at every speed (within 0.5 %) and sensor of the measurement.
 
     Returns
     -------
     Influence
-        At all speeds, sensors and planes of either; coefficients that only one of them has are taken from it.
-        Baseline, errors of further readings, labels and what is mounted are those of the measurement; the
-        baseline is NaN where nothing was measured. Contradictions are warnings.
+        At the speeds and sensors of the measurement and the planes of either; the coefficients of a plane
+        that only one of them has are taken from it. Baseline, errors of further readings, labels and what is
+        mounted are those of the measurement. Contradictions are warnings.
 
     Raises
     ------
     ValueError
-        If one side has no errors, both are not of the same kind, or a coefficient is on neither side.
+        If one side has no errors, both are not of the same kind, or a speed or sensor is not computed.
     """
     for side, words in (
         (measured, "measured coefficients are not known: state the errors of a reading, or repeat readings"),
@@ -298,19 +298,14 @@ def combine(measured: Influence, computed: Influence) -> Influence:
             f"the measured coefficients are per {kinds[0]} ({measured.labels.weight_unit}) and the computed "
             f"ones per {kinds[1]} ({computed.labels.weight_unit}): {remedy}"
         )
-    more = [v for v in computed.speeds if nearest_speed(v, measured.speeds) == len(measured.speeds)]
-    speeds = np.sort(np.append(measured.speeds, more))
-    sensors = tuple(dict.fromkeys((*measured.sensors, *computed.sensors)))
+    at = match_speeds(measured.speeds, computed.speeds, "computed coefficients")
+    lacking = [name for name in measured.sensors if name not in computed.sensors]
+    if lacking:
+        raise ValueError(f"there are no computed coefficients of sensor {', '.join(map(repr, lacking))}")
+    computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
+    speeds, sensors = measured.speeds, measured.sensors
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
-    (first, one), (second, other) = (_placed(side, speeds, sensors, planes) for side in (measured, computed))
-    W, model = first[..., 1:], second[..., 1:]
-    lacking = np.argwhere(np.isnan(W) & np.isnan(model))
-    if len(lacking):
-        s, c, p = lacking[0]
-        raise ValueError(
-            f"there is neither a measured nor a computed coefficient of plane {planes[p]!r} at sensor "
-            f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
-        )
+    (W, one), (model, other) = (_placed(side, planes) for side in (measured, computed))
     v, u = (
         np.einsum("scii->sci", noise.covariance(side.errors.sizes)).reshape(*W.shape[:2], -1, 2).mean(axis=-1)
         for noise, side in ((one, measured), (other, computed))
@@ -340,7 +335,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         sensors,
         planes,
         np.nan_to_num(W) * share + np.nan_to_num(model) * (1 - share),
-        first[..., 0],
+        measured.baseline,
         Errors(
             one.changed(shares).plus(other.changed(rest)),
             measured.reading,
@@ -353,23 +348,12 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     )
 
 
-def _placed(
-    side: Influence, speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
-) -> tuple[ComplexArray, Noise]:
-    """(Y₀, W) of a side in their places among those of both, NaN where it has nothing, and how they err."""
-
-    def places(names: Sequence[str], known: Sequence[str]) -> list[int]:
-        return [known.index(name) if name in known else len(known) for name in names]
-
-    at = [nearest_speed(v, side.speeds) for v in speeds]
-    among, chosen = places(sensors, side.sensors), places(planes, side.planes)
-    one = (0, 1)
-    theta = np.concatenate((side.baseline[..., None], side.W), axis=-1)
-    theta = np.pad(theta, (one, one, one), constant_values=np.nan)
-    noise = side.errors.noise
-    padded = Noise(
-        np.pad(noise.own, ((0, 0), one, one, (0, 2), (0, 2))),
-        np.pad(noise.columns, ((0, 0), one, one, one)),
-        noise.kind,
-    )
-    return theta[np.ix_(at, among, [0, *(1 + p for p in chosen)])], padded.part(at, among, chosen)
+def _placed(side: Influence, planes: Sequence[str]) -> tuple[ComplexArray, Noise]:
+    """W of a side in these planes, NaN where it has nothing, and how (Y₀, W) errs."""
+    W = np.full((*side.W.shape[:2], len(planes)), np.nan, dtype=complex)
+    change = np.eye(len(planes) + 1, len(side.planes) + 1, dtype=complex)
+    change[1:] = 0
+    for p, name in enumerate(side.planes):
+        W[..., planes.index(name)] = side.W[..., p]
+        change[1 + planes.index(name), 1 + p] = 1
+    return W, side.errors.noise.changed(change)

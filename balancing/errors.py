@@ -35,7 +35,7 @@ as large ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -43,8 +43,8 @@ from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
 from balancing.trials import ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import gain
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.regression import gain, stretch
 
 Source = Literal[
     "stated", "repeats", "stated, enlarged by repeats", "measured", "residuals", "assumed", "unknown"
@@ -126,23 +126,15 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
-    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
-    parts = ((radial, along), (tangential, across))
-    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
+    axes = stretch(np.exp(1j * np.angle(z))[..., None, None])
+    return np.asarray(
+        axes * np.stack((radial, tangential), axis=-1)[..., None, :] @ np.swapaxes(axes, -1, -2)
+    )
 
 
 def mean_variance(covariance: FloatArray) -> FloatArray:
     """Mean variance of both directions, (…), of covariances (…, 2, 2)."""
     return np.asarray(np.trace(covariance, axis1=-2, axis2=-1) / 2)
-
-
-def hermitian(covariance: FloatArray) -> ComplexArray:
-    """S[p, q] = E[dz_p conj(dz_q)] / 2 from covariances (N, 2P, 2P); half: the variance in one direction."""
-    N, n, _ = covariance.shape
-    C = covariance.reshape(N, n // 2, 2, n // 2, 2)
-    real = C[:, :, 0, :, 0] + C[:, :, 1, :, 1]
-    return np.asarray((real + 1j * (C[:, :, 1, :, 0] - C[:, :, 0, :, 1])) / 2)
 
 
 def reading_of(trials: Trials) -> Reading:
@@ -155,34 +147,34 @@ def reading_of(trials: Trials) -> Reading:
     """
     stated, scatter = trials.errors, _scatter(trials)
     ratio, dof = _against_repeats(trials)
-    known = stated is not None or trials.covariance is not None
-    if not known:
-        return _from_repeats(scatter)
     if stated is None:
+        found = _from_repeats(scatter)
+        if trials.covariance is None:
+            return found
         if ratio == 1.0:
-            variance = np.nanmean(np.asarray(trials.covariance)[[0, 1], [0, 1]])
+            variance = np.nanmean(trials.covariance[[0, 1], [0, 1]])
             return Reading(ReadingErrors(floor=float(np.sqrt(variance))), "measured")
         words = f"repeated readings scatter {ratio:.2g} times as much as the measured standard deviations: "
-        found = _from_repeats(scatter)
         return found._replace(warnings=(words + "their scatter was added", *found.warnings))
-    errors, warnings, degrees = stated, [], np.inf
+    sizes = {"amplitude": stated.amplitude * ratio, "phase": stated.phase * ratio}
+    warnings: list[str] = []
     if ratio > 1.0:
-        errors = ReadingErrors(stated.amplitude * ratio, stated.phase * ratio, stated.floor * ratio)
-        degrees = dof
         warnings.append(
             f"repeated readings scatter {ratio:.2g} times as much as the stated errors: "
             "the errors were enlarged accordingly"
         )
+    degrees = dof if ratio > 1.0 else np.inf
     if scatter is not None and stated.floor == 0:
         # an error that was left out is not zero if the repeats show it
-        for kind, size in (("amplitude", scatter[0]), ("phase", scatter[1])):
-            if getattr(stated, kind) == 0 and size > ROUNDING:
-                errors, degrees = replace(errors, **{kind: size}), min(scatter[2], degrees)
+        for kind, size in zip(sizes, scatter, strict=False):
+            if not sizes[kind] and size > ROUNDING:
+                sizes[kind], degrees = size, min(scatter[2], degrees)
                 shown = f"{100 * size:.2g} %" if kind == "amplitude" else f"{np.degrees(size):.2g}°"
                 warnings.append(
                     f"no {kind} error is stated; repeated readings scatter by {shown}, which is used"
                 )
     source: Source = "stated" if degrees == np.inf else "stated, enlarged by repeats"
+    errors = ReadingErrors(**sizes, floor=stated.floor * ratio)
     return Reading(errors, source, tuple(warnings), degrees)
 
 
@@ -216,22 +208,17 @@ def _scatter(trials: Trials) -> tuple[float, float, int] | None:
 
 def _against_repeats(trials: Trials) -> tuple[float, int]:
     """How many times more repeats scatter than stated and measured errors explain; degrees of freedom."""
-    from scipy.special import chdtri
-
     many = trials.repeats > 1
-    mean, count = trials.mean[many], trials.repeats[many]
+    count = trials.repeats[many]
     of_means = Reading(trials.errors, "stated").covariance(trials, digits=False)[many]
-    covariance = of_means * count[:, None, None]
-    values, axes = np.linalg.eigh(covariance)
-    deviation = trials.readings[:, many] - mean
-    parts = np.stack((deviation.real, deviation.imag), axis=-1)
-    along = np.nansum(np.einsum("gij,kgi->kgj", axes, parts) ** 2, axis=0)
-    known = values > 1e-9 * values.max(axis=-1, initial=0.0, keepdims=True)
-    chi_square = float(np.sum(along[known] / values[known]))
-    dof = int(np.sum((count[:, None] - 1) * known))
-    if dof == 0 or chi_square <= float(chdtri(dof, 1 - CONTRADICTION)):
-        return 1.0, dof
-    return float(np.sqrt(chi_square / dof)), dof
+    V = of_means * count[:, None, None]
+    inverse = np.linalg.pinv(V, 1e-9, hermitian=True)  # what has no error is not compared
+    off = np.nan_to_num(trials.readings[:, many] - trials.mean[many])
+    parts = np.stack((off.real, off.imag), axis=-1)
+    chi_square = float(np.einsum("kgi,gij,kgj->", parts, inverse, parts))
+    dof = round(np.einsum("g,gij,gji->", count - 1, inverse, V))
+    contradicted = dof > 0 and chance(chi_square, dof) < 1 - CONTRADICTION
+    return (float(np.sqrt(chi_square / dof)) if contradicted else 1.0), dof
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,17 +269,12 @@ class RunErrors:
         return float(low), float(high)
 
 
-def fixed(sizes: Sequence[float], origin: Origin) -> RunErrors:
-    """Errors of one size of each part."""
-    return RunErrors(np.array([sizes], dtype=np.float64), np.ones(1), origin)
+NO_RUN_ERRORS = RunErrors(np.zeros((1, 4)), np.ones(1), "none")
 
 
-NO_RUN_ERRORS = fixed((0.0, 0.0, 0.0, 0.0), "none")
-
-
-def rms(readings: ComplexArray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(np.abs(readings) ** 2)))
+def rms(values: ArrayLike) -> float:
+    """Root mean square of real or complex numbers."""
+    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
@@ -312,19 +294,14 @@ def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
 
     A weight that stays in its plane from one run to the next has one error in both.
     """
-    R = len(trials.runs)
-    out = []
-    for p in range(len(trials.planes)):
-        weights = trials.weights[:, p]
-        starts = np.flatnonzero((weights != 0) & (weights != np.concatenate(([0], weights[:-1]))))
-        for start in starts:
-            same = np.cumprod(weights[start:] == weights[start]).astype(bool)
-            there = np.zeros(R, dtype=complex)
-            there[start:][same] = weights[start]
-            effect = there[:, None, None] * W[..., p]
+    out: list[ComplexArray] = []
+    for p, weights in enumerate(trials.weights.T):
+        stays = np.cumsum(weights != np.append(0, weights[:-1]))
+        for k in np.unique(stays[weights != 0]):
+            effect = np.where(stays == k, weights, 0)[:, None, None] * W[..., p]
             out += [size * effect for size in (trials.placement.mass, 1j * trials.placement.angle) if size]
     if trials.drift:
-        course = trials.drift * np.linspace(0.0, 1.0, R)[:, None, None] * trials.mean
+        course = trials.drift * np.linspace(0.0, 1.0, len(trials.runs))[:, None, None] * trials.mean
         out += [course, 1j * course]
     return np.array(out).reshape(len(out), *trials.mean.shape)
 
@@ -374,43 +351,48 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Block
         Of the readings, by their errors alone, (R, S, C, 2, 2).
     """
     A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
-    (R, n), (S, C) = A.shape, theta.shape[:2]
-    at = np.linspace(0, S * C - 1, min(S * C, MOST)).round().astype(np.int64)
-    Y, W = trials.mean.reshape(R, -1)[:, at], theta[..., 1:]
-    c = unbalances(W, rms(trials.mean)).reshape(S * C, -1)[at].T
-    variance = mean_variance(covariance).reshape(R, -1)[:, at]
-    others = job_columns(trials, W).reshape(-1, R, S * C)[..., at]
+    (R, n), N = A.shape, theta[..., 0].size
+    at = np.linspace(0, N - 1, min(N, MOST)).round().astype(np.int64)
+
+    def taken(values: AnyArray, *first: int) -> AnyArray:
+        return values.reshape(*first, N)[..., at]
+
+    Y, W = taken(trials.mean, R), theta.reshape(N, n)[at, 1:]
+    further = unbalances(theta[..., 1:], rms(trials.mean)).reshape(N, -1)[at].T
+    variance = taken(mean_variance(covariance), R)
+    columns = job_columns(trials, theta[..., 1:])
+    others = taken(columns, len(columns), R)
     # as the coefficients say: what each run errs by would explain itself
     whole = np.einsum("rp,scp->rsc", A, theta)
-    each = (whole, own_variance(whole, 1.0), own_variance(whole, 0.0), whole - theta[..., 0])
-    fitted, even, own, effect = (part.reshape(R, -1)[:, at] for part in each)
+    fitted, even, own, effect = (
+        taken(part, R)
+        for part in (whole, own_variance(whole, 1.0), own_variance(whole, 0.0), whole - theta[..., 0])
+    )
+
+    def alike(rows: ComplexArray) -> ComplexArray:
+        return np.asarray(rows.T @ rows.conj())
 
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2
-        moved = m[:, None] * fitted
-        alone = [np.diag(share @ part) for part in (even, own)]
-        loads = m[:, None] * effect
-        parts = [*alone, moved.T @ moved.conj(), loads.T @ loads.conj(), share.sum() * c.T @ c.conj()]
-        along = np.einsum("r,mrn->mn", m, others)
-        known = np.diag(share @ variance) + along.T @ along.conj() / 2
+        moved, loads = (alike(m[:, None] * part) for part in (fitted, effect))
+        parts = [np.diag(share @ even), np.diag(share @ own), moved, loads, share.sum() * alike(further)]
+        known = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
         keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
         inside = keep @ np.array([*parts, known]) @ keep.conj().T
         return Block(keep @ (m @ Y), inside[:5], inside[5])
 
     # combinations whose errors are independent
-    basis, size = (
-        np.linalg.svd(A)[0][:, n:],
-        np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=1),
-    )
+    basis = np.linalg.svd(A)[0][:, n:]
+    size = np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=1)
     basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] * basis))[1]
     # a rotor at rest repeats itself to the last digit
     moving = [m for m in basis.T if np.max(np.abs(m) @ np.abs(fitted)) > ROUNDING * np.abs(fitted).max()]
-    spare = tuple(block(m.conj(), W.reshape(S * C, -1)[at, :0]) for m in moving)
+    spare = tuple(block(m.conj(), W[:, :0]) for m in moving)
     if len(at) < n or not theta[..., 0].any():
         return Blocks(spare, ())
-    flat = theta.reshape(-1, n)
+    flat = theta.reshape(N, n)
     m = np.concatenate(([1.0], -gain(flat[:, 1:]) @ flat[:, 0])) @ gain(A)
-    row = block(m, flat[at, 1:])
+    row = block(m, W)
     # what is common to a run leaves other weights, not a rest
     return Blocks(spare, (row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]),))
 
@@ -441,7 +423,7 @@ def _sized(found: Blocks, trials: Trials, reading: Reading) -> RunErrors:
         return _estimated(found, level)
     if reading.source == "stated":
         return NO_RUN_ERRORS
-    return replace(fixed((ASSUMED_RUN, ASSUMED_RUN, 0.0, ASSUMED_RUN), "assumed"), level=level)
+    return RunErrors(ASSUMED_RUN * np.array([[1.0, 1.0, 0.0, 1.0]]), np.ones(1), "assumed", level)
 
 
 def usual_run_errors(trials: Trials) -> RunErrors:

@@ -350,12 +350,6 @@ def local_runs(influence: Influence, trials: Trials) -> Trials:
     )
 
 
-def nearest_speed(speed: float, known: FloatArray) -> int:
-    """Index of the known speed that is equal within 0.5 %; their number where none is."""
-    i = int(np.argmin(np.abs(known - speed)))
-    return i if abs(known[i] - speed) <= SPEED_TOLERANCE * known[i] else len(known)
-
-
 def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients") -> list[int]:
     """Indices of known speeds (rad/s) equal to the wanted ones within 0.5 %.
 
@@ -364,12 +358,13 @@ def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients
     ValueError
         For a speed that is not among the known ones.
     """
-    speeds = np.atleast_1d(np.asarray(wanted, dtype=np.float64))
-    out = [nearest_speed(speed, known) for speed in speeds]
-    if len(known) in out:
-        rpm = ", ".join(f"{v * RPM:.6g}" for v in known)
-        lacking = rpm_text(speeds[out.index(len(known))])
-        raise ValueError(f"there are no {what} at {lacking}; there are some at {rpm} rpm")
+    out = []
+    for speed in np.atleast_1d(np.asarray(wanted, dtype=np.float64)):
+        i = int(np.argmin(np.abs(known - speed)))
+        if not abs(known[i] - speed) <= SPEED_TOLERANCE * known[i]:
+            rpm = ", ".join(f"{v * RPM:.6g}" for v in known)
+            raise ValueError(f"there are no {what} at {rpm_text(speed)}; there are some at {rpm} rpm")
+        out.append(i)
     if len(set(out)) < len(out):
         raise ValueError("a speed is given twice")
     return out

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
 from balancing.errors import Reading, RunErrors
+from balancing.errors import rms as rms
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import RPM, rpm
@@ -27,11 +28,6 @@ _LARGEST = 3
 def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:
     """The values, or NaN where nothing is known."""
     return np.full(shape, np.nan) if values is None else values
-
-
-def rms(values: ArrayLike) -> float:
-    """Root mean square of real or complex numbers."""
-    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def degrees(angle: float, places: int = 1) -> str:
@@ -58,12 +54,6 @@ def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) ->
 def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> list[dict[str, Any]]:
     """The same as JSON rows."""
     return rows(weight_columns(labels, planes, weights))
-
-
-def mounted_rows(labels: Labels, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
-    """JSON rows of the planes in which there is something."""
-    there = np.flatnonzero(weights).tolist()
-    return weight_rows(labels, [planes[p] for p in there], weights[there])
 
 
 def reading_columns(labels: Labels, speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
@@ -158,34 +148,26 @@ _SOURCES = {
 
 def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     """Errors of a reading and between runs in one or two sentences."""
-    e, parts = reading.errors, []
+    e = reading.errors
+    parts = []
     if e is not None:
-        parts = [f"{100 * e.amplitude:.3g} % of the amplitude"] if e.amplitude else []
-        parts += [f"{np.degrees(e.phase):.3g}°"] if e.phase else []
-        parts += [labels.amplitude_words(e.floor)] if e.floor else []
-    words = (
-        f"One standard deviation of a reading: {', '.join(parts) or 'not known'} ({_SOURCES[reading.source]})"
-    )
-    sizes = run.typical
-    if sizes.any():
-        what = (
-            "of each sensor alone",
-            "common to the run",
-            "of what the weights do",
-            "as further unbalance",
-        )
-        shown = [f"{100 * size:.2g} % {of}" for size, of in zip(sizes, what, strict=True) if size > SMALL]
-        words += f"; from run to run: {', '.join(shown)} ({run.origin})"
-    few = f" Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ""
-    return f"{words}.{few}"
+        shown = (f"{100 * e.amplitude:.3g} % of the amplitude", f"{np.degrees(e.phase):.3g}°")
+        each = zip((e.amplitude, e.phase, e.floor), (*shown, labels.amplitude_words(e.floor)), strict=True)
+        parts = [words for size, words in each if size]
+    known = ", ".join(parts) or "not known"
+    out = f"One standard deviation of a reading: {known} ({_SOURCES[reading.source]})"
+    what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
+    sizes = zip(run.typical, what, strict=True)
+    between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > SMALL)
+    out += f"; from run to run: {between} ({run.origin})" if between else ""
+    return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
 
 
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
     """The same in numbers; amplitudes in the job's unit."""
     e, scale = reading.errors, labels.vibration_scale
     alone, common, effect, further = run.typical
-    whole = float(np.linalg.norm(run.typical))
-    level = run.level * scale
+    whole, level = float(np.linalg.norm(run.typical)), run.level * scale
     return {
         "source": reading.source,
         "amplitude_percent": None if e is None else 100 * e.amplitude,

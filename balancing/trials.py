@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from balancing.conventions import Labels
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import off_axis as off_axis
 from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
 
 Arc = tuple[float, float]
 """First angle and width, rad, with the rotation; 0 < width ≤ 2π."""
@@ -80,6 +79,7 @@ class Placement(NamedTuple):
 
 
 _EXACT = Placement()
+_NOTHING: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,35 +154,25 @@ class Trials:
             )
         self._check_readings(readings)
         weights = np.array(self.weights, dtype=complex)
-        if weights.shape != (R, P):
-            raise ValueError(f"weights must have shape ({R} runs, {P} planes); got {weights.shape}")
-        if not np.isfinite(weights).all():
-            r, p = np.argwhere(~np.isfinite(weights))[0]
-            raise ValueError(
-                f"the weight in plane {self.planes[p]!r} of run {self.runs[r]!r} is not a finite number"
-            )
-        self._freeze("readings", readings)
-        self._freeze("weights", weights)
+        if weights.shape != (R, P) or not np.isfinite(weights).all():
+            raise ValueError(f"weights must be finite, of shape ({R} runs, {P} planes); got {weights.shape}")
+        arrays: dict[str, AnyArray] = {"readings": readings, "weights": weights}
         missing = np.isnan(readings)
-        if self.steps is not None:
-            steps = np.array(self.steps, dtype=np.float64)
-            self._freeze("steps", steps[:, None] if steps.ndim == 4 else steps, (2, *readings.shape), missing)
-            if (np.nan_to_num(self.steps) < 0).any():
-                raise ValueError("the step in which a reading is written must be a finite number ≥ 0")
-        if self.covariance is not None:
-            covariance = np.array(self.covariance, dtype=np.float64)
-            self._freeze("covariance", covariance, (2, 2, *readings.shape), missing)
-
-    def _freeze(
-        self, name: str, array: AnyArray, shape: tuple[int, ...] = (), missing: BoolArray | None = None
-    ) -> None:
-        """Keep an array, read-only; NaN where the readings have none, else finite."""
-        if missing is not None:
-            if array.shape != shape or not (missing | np.isfinite(array)).all():
+        for name, axes in (("steps", (2,)), ("covariance", (2, 2))):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            array = np.array(given, dtype=np.float64)
+            if array.ndim == len(axes) + 3:
+                array = np.expand_dims(array, len(axes))
+            if array.shape != (*axes, *readings.shape) or not (missing | np.isfinite(array)).all():
+                shape = (*axes, *readings.shape)
                 raise ValueError(f"{name} must be finite, of shape {shape}, or None; got {array.shape}")
             array[..., missing] = np.nan
-        array.flags.writeable = False
-        object.__setattr__(self, name, array)
+            arrays[name] = array
+        for name, array in arrays.items():
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
 
     def _check_readings(self, readings: ComplexArray) -> None:
         missing = np.isnan(readings)
@@ -208,8 +198,6 @@ class Trials:
     @property
     def mean(self) -> ComplexArray:
         """Mean of the repeated readings, shape (R, S, C)."""
-        if len(self.readings) == 1:
-            return np.asarray(self.readings[0])
         return np.asarray(np.nansum(self.readings, axis=0) / self.repeats)
 
 
@@ -239,16 +227,18 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("max_weight", "residual"):
             array = np.array(getattr(self, name), dtype=np.float64)
-            if np.isnan(array).any() or (array < 0).any():
+            if not (array >= 0).all():
                 raise ValueError(f"the limits {name} must be numbers ≥ 0 (infinite for none)")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
+        start, width = arcs.T
         if len(self.forbidden) != len(self.max_weight):
             raise ValueError("there must be arcs, or none, for every plane")
-        for arcs in self.forbidden:
-            for start, width in arcs:
-                if not (np.isfinite(start) and 0 < width <= 2 * np.pi):
-                    raise ValueError(f"an arc of {width} rad from {start} rad is none")
+        if not (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all():
+            raise ValueError(
+                f"there are arcs from no angle, or wider than 2π or than none: {arcs.tolist()} rad"
+            )
 
     @classmethod
     def none(cls, S: int, C: int, P: int) -> Limits:
@@ -262,20 +252,22 @@ class Limits:
         sensors: Sequence[str],
         planes: Sequence[str],
         *,
-        max_weight: Mapping[str, float] | None = None,
-        residual: Mapping[str, float | FloatArray] | None = None,
-        forbidden: Mapping[str, Sequence[Arc]] | None = None,
+        max_weight: Mapping[str, float] = _NOTHING,
+        residual: Mapping[str, float | FloatArray] = _NOTHING,
+        forbidden: Mapping[str, Sequence[Arc]] = _NOTHING,
     ) -> Limits:
         """Limits by name of plane and sensor; a sensor's limit is a number, or one per speed (S,)."""
-        weight, amplitude = np.full(len(planes), np.inf), np.full((speeds, len(sensors)), np.inf)
-        arcs: list[tuple[Arc, ...]] = [() for _ in planes]
-        for name, value in (max_weight or {}).items():
-            weight[_place(name, planes, "plane")] = value
-        for name, size in (residual or {}).items():
-            amplitude[:, _place(name, sensors, "sensor")] = size
-        for name, own in (forbidden or {}).items():
-            arcs[_place(name, planes, "plane")] = tuple(own)
-        return cls(weight, amplitude, tuple(arcs))
+        unknown = {*max_weight, *forbidden} - {*planes} | {*residual} - {*sensors}
+        if unknown:
+            raise ValueError(
+                f"there is no {' and no '.join(map(repr, sorted(unknown)))} among the planes "
+                f"{', '.join(map(repr, planes))} and the sensors {', '.join(map(repr, sensors))}"
+            )
+        return cls(
+            np.array([max_weight.get(name, np.inf) for name in planes]),
+            np.column_stack([np.broadcast_to(residual.get(name, np.inf), speeds) for name in sensors]),
+            tuple(tuple(forbidden.get(name, ())) for name in planes),
+        )
 
     @property
     def any(self) -> bool:
@@ -327,10 +319,3 @@ def check_speeds(speeds: FloatArray) -> FloatArray:
         raise ValueError(f"every speed may stand only once; got {out.tolist()} rad/s")
     out.flags.writeable = False
     return out
-
-
-def _place(name: str, names: Sequence[str], what: str) -> int:
-    if name not in names:
-        hint = did_you_mean(str(name), names)
-        raise ValueError(f"there is no {what} {name!r}{hint}; there are {', '.join(map(repr, names))}")
-    return list(names).index(name)
