@@ -107,10 +107,6 @@ def model_influence(  # noqa: PLR0913
     """
     from fem import influence
 
-    if quantity not in DERIVATIVES:
-        raise ValueError(f"quantity must be one of {', '.join(DERIVATIVES)}, not {quantity!r}")
-    if not np.isfinite(key_phasor):
-        raise ValueError(f"the angle of the key phasor must be finite, not {key_phasor}")
     model = influence(rotor, list(planes.values()), list(sensors.values()), speeds)
     W = np.asarray(model.W) * np.exp(1j * np.radians(key_phasor))
     W = W * ((1j * model.speeds) ** DERIVATIVES[quantity])[:, None, None] * _radii(planes, radii)
@@ -169,15 +165,12 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
 def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -> FloatArray:
     if radii is None:
         return np.ones(len(planes))
-    wrong = sorted(set(radii) ^ set(planes))
-    if wrong:
+    out = np.array([radii.get(name, np.nan) for name in planes])
+    if set(radii) != set(planes) or not (np.isfinite(out) & (out > 0)).all():
         raise ValueError(
-            f"give the radius of every plane and of no other one: {', '.join(map(repr, wrong))} "
-            "has a radius and is no plane, or is a plane without one"
+            f"give the radius of every plane ({', '.join(planes)}) and of no other one, a finite number > 0 m"
+            f"; got {dict(radii)}"
         )
-    out = np.array([radii[name] for name in planes], dtype=np.float64)
-    if not (np.isfinite(out) & (out > 0)).all():
-        raise ValueError(f"the radius of a plane must be a finite number > 0 m; got {out.tolist()}")
     return out
 
 
@@ -291,12 +284,10 @@ def combine(measured: Influence, computed: Influence) -> Influence:
             raise ValueError(f"coefficients can be combined only by their errors, and those of the {words}")
     kinds = ["unbalance" if side.labels.unbalances else "mass" for side in (measured, computed)]
     if kinds[0] != kinds[1]:
-        remedy = "give the radii of the planes, to compute them per mass"
-        if kinds[0] == "unbalance":
-            remedy = "compute them per unbalance, without radii"
         raise ValueError(
             f"the measured coefficients are per {kinds[0]} ({measured.labels.weight_unit}) and the computed "
-            f"ones per {kinds[1]} ({computed.labels.weight_unit}): {remedy}"
+            f"ones per {kinds[1]} ({computed.labels.weight_unit}): compute them with the radii of the "
+            "planes, per mass, or without, per unbalance"
         )
     at = match_speeds(measured.speeds, computed.speeds, "computed coefficients")
     lacking = [name for name in measured.sensors if name not in computed.sensors]

@@ -148,7 +148,7 @@ def reading_of(trials: Trials) -> Reading:
     stated, scatter = trials.errors, _scatter(trials)
     ratio, dof = _against_repeats(trials)
     if stated is None:
-        found = _from_repeats(scatter)
+        found = _from_repeats(*scatter)
         if trials.covariance is None:
             return found
         if ratio == 1.0:
@@ -164,45 +164,33 @@ def reading_of(trials: Trials) -> Reading:
             "the errors were enlarged accordingly"
         )
     degrees = dof if ratio > 1.0 else np.inf
-    if scatter is not None and stated.floor == 0:
+    if stated.floor == 0:
         # an error that was left out is not zero if the repeats show it
         for kind, size in zip(sizes, scatter, strict=False):
             if not sizes[kind] and size > ROUNDING:
                 sizes[kind], degrees = size, min(scatter[2], degrees)
-                shown = f"{100 * size:.2g} %" if kind == "amplitude" else f"{np.degrees(size):.2g}°"
-                warnings.append(
-                    f"no {kind} error is stated; repeated readings scatter by {shown}, which is used"
-                )
     source: Source = "stated" if degrees == np.inf else "stated, enlarged by repeats"
     errors = ReadingErrors(**sizes, floor=stated.floor * ratio)
     return Reading(errors, source, tuple(warnings), degrees)
 
 
-def _from_repeats(scatter: tuple[float, float, int] | None) -> Reading:
-    if scatter is None:
-        return Reading(ASSUMED, "assumed")
-    radial, tangential, dof = scatter
+def _from_repeats(radial: float, tangential: float, dof: int) -> Reading:
     if max(radial, tangential) < ROUNDING:
         words = "all repeated readings are equal to the last digit: they say nothing about the errors"
-        return Reading(ASSUMED, "assumed", (words,))
-    warnings: tuple[str, ...] = ()
+        return Reading(ASSUMED, "assumed", (words,) if dof else ())
     if min(radial, tangential) < ROUNDING:  # read in whole degrees, say
-        equal, other = ("amplitudes", "phases") if radial < ROUNDING else ("phases", "amplitudes")
-        warnings = (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
         radial = tangential = max(radial, tangential)
-    return Reading(ReadingErrors(amplitude=radial, phase=tangential), "repeats", warnings, dof)
+    return Reading(ReadingErrors(radial, tangential), "repeats", (), dof)
 
 
-def _scatter(trials: Trials) -> tuple[float, float, int] | None:
+def _scatter(trials: Trials) -> tuple[float, float, int]:
     """Pooled relative radial and tangential standard deviation and their degrees of freedom."""
     mean, count = trials.mean, trials.repeats
     used = (count > 1) & (mean != 0)
     dof = int(np.sum(count[used] - 1))
-    if dof == 0:
-        return None
     relative = trials.readings[:, used] / mean[used] - 1
     squares = (np.nansum(part**2) for part in (relative.real, relative.imag))
-    radial, tangential = (float(np.sqrt(square / dof)) for square in squares)
+    radial, tangential = (float(np.sqrt(square / max(dof, 1))) for square in squares)
     return radial, tangential, dof
 
 
@@ -325,10 +313,8 @@ class Block(NamedTuple):
         n = len(self.e)
         least = 1e-9 * np.trace(V, axis1=1, axis2=2).real + 1e-12 * np.trace(self.parts[0]).real
         V += (least / n)[:, None, None] * np.eye(n)
-        L = np.linalg.cholesky(V)
-        white = np.linalg.solve(L, np.broadcast_to(self.e[:, None], (len(V), n, 1)))
-        log = 2 * np.log(np.einsum("gii->gi", L).real).sum(axis=1)
-        return log, np.sum(np.abs(white) ** 2, axis=(1, 2)) / 2
+        white = np.linalg.solve(V, np.broadcast_to(self.e[:, None], (len(V), n, 1)))[..., 0]
+        return np.linalg.slogdet(V)[1], (white @ self.e.conj()).real / 2
 
 
 class Blocks(NamedTuple):
@@ -397,20 +383,19 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Block
     return Blocks(spare, (row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]),))
 
 
-def run_errors(trials: Trials, theta: ComplexArray, covariance: FloatArray, reading: Reading) -> RunErrors:
+def run_errors(
+    trials: Trials, theta: ComplexArray | None, covariance: FloatArray, reading: Reading
+) -> RunErrors:
     """Stated, estimated by spare runs, none beside stated errors of a reading, or assumed.
 
     Parameters
     ----------
     trials, theta, covariance
-        As `blocks`.
+        As `blocks`; None: no spare run tells of them.
     reading
         Where these come from.
     """
-    return _sized(blocks(trials, theta, covariance), trials, reading)
-
-
-def _sized(found: Blocks, trials: Trials, reading: Reading) -> RunErrors:
+    found = Blocks((), ()) if theta is None else blocks(trials, theta, covariance)
     level = rms(trials.mean)
     if trials.run_errors is not None:
         relative, floor = trials.run_errors[0] ** 2, (trials.run_errors[1] / (level or 1.0)) ** 2
@@ -434,7 +419,7 @@ def usual_run_errors(trials: Trials) -> RunErrors:
     trials
         The runs, whose statement counts; none beside stated errors of a reading, else they are assumed.
     """
-    return _sized(Blocks((), ()), trials, reading_of(trials))
+    return run_errors(trials, None, np.zeros(0), reading_of(trials))
 
 
 def _estimated(found: Blocks, level: float) -> RunErrors:
@@ -444,18 +429,16 @@ def _estimated(found: Blocks, level: float) -> RunErrors:
     seen, loaded = (sum(np.trace(block.parts[k]).real for block in found.spare) for k in (2, 3))
     # runs without weights tell nothing of what goes with the weights
     splits = SPLITS if loaded > 0.03 * seen else SPLITS[SPLITS[:, 1] == 0]
-    log = [
-        -np.sum([block.at(_grid(own, common, splits), evenly) for block in each], axis=(0, 1))
-        for evenly in EVENLY
-    ]
+    sizes = _grid(own, common, splits)
+    log = [-np.sum([block.at(sizes, evenly) for block in each], axis=(0, 1)) for evenly in EVENLY]
     evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
     for _ in range(REFINED):
-        chance = _posterior(found, _grid(own, common, splits), evenly).reshape(len(own), len(common), -1)
+        chance = _posterior(found, sizes, evenly).reshape(len(own), len(common), -1)
         own, common = (
             _finer(values, chance.sum(axis=axes), count)
             for values, axes, count in ((own, (1, 2), 5), (common, (0, 2), 6))
         )
-    sizes = _grid(own, common, splits)
+        sizes = _grid(own, common, splits)
     return RunErrors(sizes, _posterior(found, sizes, evenly), "estimated", level, evenly)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,11 +35,7 @@ from balancing.noise import Whitening as Whitening
 from balancing.trials import Placement, Trials, check_names, check_speeds
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.tables import Column, Table, frame
 from rotorid.regression import gain
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SPEED_TOLERANCE = 0.005
 """Speeds that differ by less, relatively, count as one."""
@@ -93,10 +89,9 @@ class Influence:
         S, C, P = len(self.speeds), len(self.sensors), len(self.planes)
         for name, shape in (("W", (S, C, P)), ("baseline", (S, C))):
             array: NDArray[np.complex128] = np.array(getattr(self, name), dtype=complex)
-            if array.shape != shape:
-                raise ValueError(f"{name} must have shape {shape}; got {array.shape}")
-            if not np.isfinite(array).all() and (name == "W" or np.isinf(array).any()):
-                raise ValueError(f"{name} of the influence coefficients must be finite")
+            wrong = np.isinf(array) | (np.isnan(array) & (name == "W"))
+            if array.shape != shape or wrong.any():
+                raise ValueError(f"{name} must be finite, of shape {shape}; got shape {array.shape}")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
@@ -238,23 +233,6 @@ class Influence:
             baseline=self.baseline[at],
             errors=Errors(noise, self.reading, self.run_errors, mounted, self.trials),
         )
-
-    def table(self) -> Table:
-        """One row per speed, sensor and plane; the phase is the lead of the vibration by a weight at 0°."""
-        scale = self.labels.vibration_scale / self.labels.weight_scale
-        S, C, P = self.W.shape
-        columns = (
-            Column("speed_rpm", np.repeat(np.round(self.speeds * RPM, 9), C * P)),
-            Column("sensor", np.tile(np.repeat(self.sensors, P), S)),
-            Column("plane", np.tile(self.planes, S * C)),
-            Column("influence", np.abs(self.W).ravel() * scale),
-            Column("phase_deg", np.mod(np.degrees(np.angle(self.W)).ravel(), 360.0)),
-        )
-        return Table("influence coefficients", columns)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The table."""
-        return frame(self.table())
 
     def rebased(self, baseline: Trials | ArrayLike) -> Influence:
         """The same coefficients with today's vibration as baseline.

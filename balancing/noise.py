@@ -209,15 +209,14 @@ def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading
 
 def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray]:
     """Errors (B, S, C, P + 1), block by block, at sizes (n, 6) of the draws; the same whatever the blocks."""
-    shape = noise.columns.shape[1:]
-    step = max(1, BLOCK // (shape[0] * shape[1]))
+    S, C = noise.own.shape[1:3]
+    step = max(1, BLOCK // (S * C))
     rngs = [np.random.default_rng([seed, part]) for part in (1, 2, 3)]
     roots = [covariance_root(part, np.einsum("...ii->...i", part)) for part in noise.own]
-    columns = noise.columns.reshape(len(noise.columns), -1 if len(noise.columns) else np.prod(shape))
     for start in range(0, len(factors), step):
         f = factors[start : start + step]
-        z = rngs[2].standard_normal((len(f), len(columns))) * f[:, noise.kind]
-        error = (z @ columns).reshape(len(f), *shape)
+        z = rngs[2].standard_normal((len(f), len(noise.kind))) * f[:, noise.kind]
+        error = np.tensordot(z, noise.columns, 1)
         for kind in (READING, OWN):
             if roots[kind].any() and factors[:, kind].any():
                 z = rngs[kind].standard_normal((len(f), *roots[kind].shape[:-1], 1))

@@ -25,11 +25,6 @@ INVISIBLE = 1e-9
 _LARGEST = 3
 
 
-def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:
-    """The values, or NaN where nothing is known."""
-    return np.full(shape, np.nan) if values is None else values
-
-
 def degrees(angle: float, places: int = 1) -> str:
     """An angle as text, 0 ≤ angle < 360."""
     return f"{round(angle, places) % 360:.{places}f}°"
@@ -79,7 +74,7 @@ def largest_readings(
     left, the three largest of these.
     """
     old, new = (labels.vibration(readings)[0] for readings in (before, after))
-    reach = known(within, old.shape)
+    reach = np.full(old.shape, np.nan) if within is None else within
     size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
     share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
     words = []

@@ -59,7 +59,7 @@ SHARE = 0.40
 DAMPING = 0.05
 """Damping ratio of the critical speed if nobody says."""
 
-_LAGS = {"below": (0.0, 45.0, 90.0), "at": (90.0, 90.0, 90.0), "above": (90.0, 135.0, 180.0)}
+_LAGS = {"below": (45.0, 45.0), "at": (90.0, 0.0), "above": (135.0, 45.0)}
 _LEAD = {"displacement": 0.0, "velocity": math.pi / 2, "acceleration": math.pi}
 
 
@@ -69,15 +69,14 @@ class Lag:
 
     Attributes
     ----------
-    expected, low, high
-        rad: expected, least and largest.
+    expected, reach
+        rad, and how far it may be from that, either side.
     words
         Why.
     """
 
     expected: float
-    low: float
-    high: float
+    reach: float
     words: str
 
 
@@ -232,13 +231,15 @@ def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int
             "the mass of the rotor and the load of the bearing are two ways to the same load: "
             "choose one of them"
         )
-    positive("number of planes", planes)
-    if rotor_mass is not None:
-        positive("mass of the rotor", rotor_mass)
-        return rotor_mass * GRAVITY / planes
-    if bearing_load is not None:
-        positive("load of the bearing", bearing_load)
-    return bearing_load
+    given = {
+        "number of planes": planes,
+        "mass of the rotor": rotor_mass,
+        "load of the bearing": bearing_load,
+    }
+    for what, value in given.items():
+        if value is not None:
+            positive(what, value)
+    return bearing_load if rotor_mass is None else rotor_mass * GRAVITY / planes
 
 
 def trial_from_force(  # noqa: PLR0913
@@ -303,8 +304,7 @@ def trial_from_force(  # noqa: PLR0913
         angle = opposing_angle(
             phase, lag.expected, sensor_angle=sensor_angle, key_phasor=key_phasor, quantity=quantity
         )
-        reach = max(lag.high - lag.expected, lag.expected - lag.low)
-        degrees = math.degrees(lag.expected)
+        reach, degrees = lag.reach, math.degrees(lag.expected)
         words += f"; angle opposite to the heavy spot with a lag of {degrees:.3g}° ({lag.words})"
     warnings = _force_warning(fraction)
     return TrialWeight(
@@ -476,20 +476,20 @@ def expected_lag(
     if where is not None:
         if where not in _LAGS:
             raise ValueError(f"the speed is below, at or above the critical speed, not {where!r}")
-        low, lag, high = (math.radians(x) for x in _LAGS[where])
-        return Lag(lag, low, high, f"{where} the critical speed")
+        lag, reach = map(math.radians, _LAGS[where])
+        return Lag(lag, reach, f"{where} the critical speed")
     if degrees is not None:
         if not 0 <= degrees <= 360:
             raise ValueError(f"a lag is from 0 to 360 degrees, not {degrees:g}")
-        lag = math.radians(degrees)
-        return Lag(lag, lag, lag, f"{degrees:g}°, as stated")
+        return Lag(math.radians(degrees), 0.0, f"{degrees:g}°, as stated")
     if ratio is None:
         raise ValueError("give one of: below, at or above the critical speed; a lag; the critical speed")
     positive("ratio of the speed to the critical speed", ratio)
     positive("damping ratio", damping)
-    low, high = (0.0, math.pi / 2) if ratio < 1 else (math.pi / 2, math.pi)
+    lag = math.atan2(2 * damping * ratio, 1 - ratio**2)
+    middle = (0.25 if ratio < 1 else 0.75) * math.pi
     words = f"one mode at {ratio:.3g} times the critical speed, damping {damping:g}"
-    return Lag(math.atan2(2 * damping * ratio, 1 - ratio**2), low, high, words)
+    return Lag(lag, abs(lag - middle) + math.pi / 4, words)
 
 
 def opposing_angle(

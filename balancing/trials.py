@@ -41,14 +41,11 @@ class ReadingErrors:
     floor: float = 0.0
 
     def __post_init__(self) -> None:
-        values = {"amplitude": self.amplitude, "phase": self.phase, "floor": self.floor}
-        for name, value in values.items():
-            if not np.isfinite(value) or value < 0:
-                raise ValueError(f"the {name} error of a reading must be a finite number ≥ 0, not {value}")
-        if not any(values.values()):
+        values = self.amplitude, self.phase, self.floor
+        if not (all(0 <= value < np.inf for value in values) and any(values)):
             raise ValueError(
-                "the stated errors of a reading are all zero, and no instrument is that good: "
-                "state amplitude, phase or floor, or state no errors at all"
+                f"the errors of a reading must be finite numbers ≥ 0, not {values}, and not all zero, which "
+                "no instrument is: state amplitude, phase or floor, or state no errors at all"
             )
 
 
@@ -311,11 +308,10 @@ def check_speeds(speeds: FloatArray) -> FloatArray:
         For a wrong shape, no speed, speeds that are not finite or not positive, and repeated speeds.
     """
     out = np.array(speeds, dtype=np.float64)
-    if out.ndim != 1 or not len(out):
-        raise ValueError(f"speeds must have shape (S,), at least one; got {out.shape}")
-    if not (np.isfinite(out) & (out > 0)).all():
-        raise ValueError(f"speeds must be finite and greater than zero; got {out.tolist()} rad/s")
-    if len(set(out.tolist())) < len(out):
-        raise ValueError(f"every speed may stand only once; got {out.tolist()} rad/s")
+    each = set(out.ravel().tolist())
+    if out.shape != (len(each),) or not each or not all(0 < speed < np.inf for speed in each):
+        raise ValueError(
+            f"speeds must be different, finite and greater than zero, of shape (S,); got {out.tolist()} rad/s"
+        )
     out.flags.writeable = False
     return out

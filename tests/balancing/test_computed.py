@@ -107,11 +107,9 @@ def test_the_error_of_the_model_goes_into_that_of_the_weights(rotor):
 BAD = [
     ({"relative_error": -0.1}, "relative errors .* must be finite numbers"),
     ({"relative_error": np.nan}, "relative errors"),
-    ({"quantity": "speed"}, "displacement, velocity, acceleration, not 'speed'"),
-    ({"key_phasor": np.inf}, "key phasor must be finite"),
-    ({"radii": {"left": 0.2}}, "radius of every plane and of no other one: 'right'"),
-    ({"radii": {"left": 0.2, "right": 0.2, "mid": 1.0}}, "of no other one: 'mid'"),
-    ({"radii": {"left": 0.2, "right": 0.0}}, "radius of a plane must be a finite number > 0 m"),
+    ({"radii": {"left": 0.2}}, r"radius of every plane \(left, right\)"),
+    ({"radii": {"left": 0.2, "right": 0.2, "mid": 1.0}}, "and of no other one"),
+    ({"radii": {"left": 0.2, "right": 0.0}}, "a finite number > 0 m"),
     ({"speeds": [0.0]}, "greater than zero"),
     ({"planes": {"left": 99}}, "99"),
     ({"sensors": {"A": "nowhere"}}, "nowhere"),
@@ -206,10 +204,10 @@ def test_what_cannot_be_combined():
         combine(stored(W), computed)
     with pytest.raises(ValueError, match="state the relative error of the model"):
         combine(measured, stored(W))
-    with pytest.raises(ValueError, match=r"per mass \(g\) and .* per unbalance \(kg_m\): give the radii"):
+    with pytest.raises(ValueError, match=r"per mass \(g\) and .* per unbalance \(kg_m\): .* with the radii"):
         combine(measured, model(W, 0.1, unit="kg_m"))
     per_unbalance = replace(measured, labels=replace(measured.labels, weight_unit="g_mm"))
-    with pytest.raises(ValueError, match="per unbalance, without radii"):
+    with pytest.raises(ValueError, match="per unbalance"):
         combine(per_unbalance, computed)
     with pytest.raises(ValueError, match="no computed coefficients of sensor 's3'"):
         combine(measured, model(W[:, :3], 0.1, sensors=("s0", "s1", "s2")))

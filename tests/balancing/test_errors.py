@@ -72,7 +72,7 @@ def test_an_error_that_was_not_stated_is_taken_from_the_repeats():
     reading = reading_of(many(0.01, ReadingErrors(amplitude=0.01), 9, across=0.02))
     assert reading.errors.amplitude == 0.01
     assert reading.errors.phase == pytest.approx(0.02, rel=0.1)
-    assert "no phase error is stated" in reading.warnings[0]
+    assert reading.source == "stated, enlarged by repeats"
 
 
 def test_equal_repeats_say_nothing_about_the_errors():

@@ -19,10 +19,7 @@ STATED = ReadingErrors(0.01, 0.02)
 def test_coefficients_by_hand():
     influence = estimate_influence(bruel_kjaer(labels=Labels("mm_s", 1e3, "g", 1e3)))
     by_hand = (polar(4.9, 114) - polar(7.2, 238)) / 2.5
-    row = influence.to_frame().iloc[0]
-    assert influence.unit == "mm_s/g"
-    assert row["influence"] == pytest.approx(1000 * abs(by_hand))
-    assert row["phase_deg"] == pytest.approx(np.degrees(np.angle(by_hand)) % 360)
+    assert influence.W[0, 0, 0] == pytest.approx(1000 * by_hand)
     # left in: the second weight alone made the change from the second run
     left = estimate_influence(feese_grazier())
     change = (polar(0.54, 9) - polar(1.31, 1)) / polar(3.7e-3, 135)

@@ -95,11 +95,14 @@ def test_angle_is_opposite_to_the_heavy_spot_in_a_simulation(quantity, eta):
 
 def test_lags():
     below, at, above = (expected_lag(word) for word in ("below", "at", "above"))
-    assert [degrees(x.low) for x in (below, at, above)] == pytest.approx([0, 90, 90])
-    assert [degrees(x.high) for x in (below, at, above)] == pytest.approx([90, 90, 180])
+    assert [degrees(x.reach) for x in (below, at, above)] == pytest.approx([45, 0, 45])
     assert [degrees(x.expected) for x in (below, at, above)] == pytest.approx([45, 90, 135])
     assert degrees(expected_lag(degrees=37).expected) == pytest.approx(37)
     assert degrees(expected_lag(ratio=1.0).expected) == pytest.approx(90)
+    for ratio, low, high in ((0.5, 0, 90), (0.97, 0, 90), (1.03, 90, 180), (3.0, 90, 180)):
+        lag = expected_lag(ratio=ratio)
+        ends = lag.expected - radians(low), radians(high) - lag.expected
+        assert lag.reach == pytest.approx(max(ends))
     # 2·0.05·0.5 / (1 − 0.25) = 0.0666…
     assert np.tan(expected_lag(ratio=0.5).expected) == pytest.approx(0.05 / 0.75)
     assert degrees(expected_lag(ratio=20.0).expected) == pytest.approx(180, abs=0.5)
