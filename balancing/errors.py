@@ -297,10 +297,12 @@ def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
 class Block(NamedTuple):
     """A combination of runs that holds no coefficient: residuals (n,), and variances of either direction.
 
+    `spare`: of spare runs, or of the corrected reading;
     `parts` (5, n, n): by the parts at size 1, the first alike at all sensors and in proportion;
     `known` (n, n): by all that is known.
     """
 
+    spare: bool
     e: ComplexArray
     parts: ComplexArray
     known: ComplexArray
@@ -317,15 +319,8 @@ class Block(NamedTuple):
         return np.linalg.slogdet(V)[1], (white @ self.e.conj()).real / 2
 
 
-class Blocks(NamedTuple):
-    """Of spare runs, and of the corrected reading (at most one)."""
-
-    spare: tuple[Block, ...]
-    corrected: tuple[Block, ...]
-
-
-def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Blocks:
-    """What runs tell of their errors.
+def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[Block]:
+    """What runs tell of their errors: those of spare runs, and that of the corrected reading at the end.
 
     Parameters
     ----------
@@ -365,7 +360,7 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Block
         known = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
         keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
         inside = keep @ np.array([*parts, known]) @ keep.conj().T
-        return Block(keep @ (m @ Y), inside[:5], inside[5])
+        return Block(not free.size, keep @ (m @ Y), inside[:5], inside[5])
 
     # combinations whose errors are independent
     basis = np.linalg.svd(A)[0][:, n:]
@@ -373,14 +368,14 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Block
     basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] * basis))[1]
     # a rotor at rest repeats itself to the last digit
     moving = [m for m in basis.T if np.max(np.abs(m) @ np.abs(fitted)) > ROUNDING * np.abs(fitted).max()]
-    spare = tuple(block(m.conj(), W[:, :0]) for m in moving)
-    if len(at) < n or not theta[..., 0].any():
-        return Blocks(spare, ())
-    flat = theta.reshape(N, n)
-    m = np.concatenate(([1.0], -gain(flat[:, 1:]) @ flat[:, 0])) @ gain(A)
-    row = block(m, W)
-    # what is common to a run leaves other weights, not a rest
-    return Blocks(spare, (row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]),))
+    out = [block(m.conj(), W[:, :0]) for m in moving]
+    if len(at) >= n and theta[..., 0].any():
+        flat = theta.reshape(N, n)
+        m = np.concatenate(([1.0], -gain(flat[:, 1:]) @ flat[:, 0])) @ gain(A)
+        row = block(m, W)
+        # what is common to a run leaves other weights, not a rest
+        out.append(row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]))
+    return out
 
 
 def run_errors(
@@ -395,17 +390,18 @@ def run_errors(
     reading
         Where these come from.
     """
-    found = Blocks((), ()) if theta is None else blocks(trials, theta, covariance)
+    all_ = [] if theta is None else blocks(trials, theta, covariance)
+    spare = [block for block in all_ if block.spare]
     level = rms(trials.mean)
     if trials.run_errors is not None:
         relative, floor = trials.run_errors[0] ** 2, (trials.run_errors[1] / (level or 1.0)) ** 2
-        own = OWN_SHARES[: 4 if found.spare else 3, None]
-        sizes = np.sqrt(np.hstack((own * (relative + floor), (1 - own) * (relative, 0.0, floor))))
+        share = OWN_SHARES[: 4 if spare else 3, None]
+        sizes = np.sqrt(np.hstack((share * (relative + floor), (1 - share) * (relative, 0.0, floor))))
         evenly = floor / ((relative + floor) or 1.0)
-        if not sizes.any() or not found.spare or tail(found.spare, sizes, evenly) > 1 - CONTRADICTION:
-            return RunErrors(sizes, _posterior(found, sizes, evenly), "stated", level, evenly)
-    if found.spare:
-        return _estimated(found, level)
+        if not sizes.any() or not spare or tail(spare, sizes, evenly) > 1 - CONTRADICTION:
+            return RunErrors(sizes, _posterior(all_, sizes, evenly), "stated", level, evenly)
+    if spare:
+        return _estimated(all_, level)
     if reading.source == "stated":
         return NO_RUN_ERRORS
     return RunErrors(ASSUMED_RUN * np.array([[1.0, 1.0, 0.0, 1.0]]), np.ones(1), "assumed", level)
@@ -422,24 +418,23 @@ def usual_run_errors(trials: Trials) -> RunErrors:
     return run_errors(trials, None, np.zeros(0), reading_of(trials))
 
 
-def _estimated(found: Blocks, level: float) -> RunErrors:
+def _estimated(each: Sequence[Block], level: float) -> RunErrors:
     """The grid, drawn closer around what data do not exclude; own parts as they fit best."""
     own = common = SIZES
-    each = (*found.spare, *found.corrected)
-    seen, loaded = (sum(np.trace(block.parts[k]).real for block in found.spare) for k in (2, 3))
+    seen, loaded = (sum(np.trace(block.parts[k]).real for block in each) for k in (2, 3))
     # runs without weights tell nothing of what goes with the weights
     splits = SPLITS if loaded > 0.03 * seen else SPLITS[SPLITS[:, 1] == 0]
     sizes = _grid(own, common, splits)
     log = [-np.sum([block.at(sizes, evenly) for block in each], axis=(0, 1)) for evenly in EVENLY]
     evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
     for _ in range(REFINED):
-        chance = _posterior(found, sizes, evenly).reshape(len(own), len(common), -1)
+        chance = _posterior(each, sizes, evenly).reshape(len(own), len(common), -1)
         own, common = (
             _finer(values, chance.sum(axis=axes), count)
             for values, axes, count in ((own, (1, 2), 5), (common, (0, 2), 6))
         )
         sizes = _grid(own, common, splits)
-    return RunErrors(sizes, _posterior(found, sizes, evenly), "estimated", level, evenly)
+    return RunErrors(sizes, _posterior(each, sizes, evenly), "estimated", level, evenly)
 
 
 def _grid(own: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray:
@@ -465,13 +460,12 @@ def tail(used: Sequence[Block], sizes: FloatArray, evenly: float) -> float:
     return chance(2 * likely.min(), 2 * n)
 
 
-def _posterior(found: Blocks, sizes: FloatArray, evenly: float) -> FloatArray:
+def _posterior(each: Sequence[Block], sizes: FloatArray, evenly: float) -> FloatArray:
     """Probability of every point; the corrected reading takes part unless unbalance elsewhere shows in it."""
     weight = np.zeros(len(sizes))
-    for block in found.spare:
-        weight -= np.sum(block.at(sizes, evenly), axis=0)
-    for block in found.corrected:
-        if len(block.e) and tail([block], sizes[weight > weight.max() - 3.0], evenly) > EXPLAINED:
+    for block in each:
+        likely = sizes[weight > weight.max() - 3.0]
+        if block.spare or (len(block.e) and tail([block], likely, evenly) > EXPLAINED):
             weight -= np.sum(block.at(sizes, evenly), axis=0)
     probability = np.exp(weight - weight.max())
     return np.asarray(probability / probability.sum())

@@ -219,8 +219,8 @@ class Influence:
         self, speeds: Sequence[int], sensors: Sequence[int] | None = None, planes: Sequence[int] | None = None
     ) -> Influence:
         """Those of some speeds, sensors and planes, by their indices; None: of all."""
-        sensors = list(range(len(self.sensors))) if sensors is None else sensors
-        planes = list(range(len(self.planes))) if planes is None else planes
+        sensors = range(len(self.sensors)) if sensors is None else sensors
+        planes = list(range(len(self.planes)) if planes is None else planes)
         at, chosen = np.ix_(speeds, sensors), tuple(self.planes[p] for p in planes)
         mounted = Mounted(self.mounted.run, chosen, self.mounted.weights[planes])
         noise = self.errors.noise.part(speeds, sensors, planes)
@@ -231,7 +231,7 @@ class Influence:
             planes=chosen,
             W=self.W[at][..., planes],
             baseline=self.baseline[at],
-            errors=Errors(noise, self.reading, self.run_errors, mounted, self.trials),
+            errors=self.errors._replace(noise=noise, mounted=mounted),
         )
 
     def rebased(self, baseline: Trials | ArrayLike) -> Influence:
@@ -257,38 +257,38 @@ class Influence:
         bare = local.mean - np.einsum("scp,rp->rsc", self.W, weights)
         mean, largest = bare.mean(axis=0), np.abs(bare).max()
         apart = float(np.abs(bare - bare[0]).max() / (largest or 1.0))
-        today, reading, noise = reading_of(local), self.reading, self.errors.noise
-        warnings = [*self.remarks.warnings, *baseline.warnings, *today.warnings]
+        today, errors = (
+            reading_of(local),
+            self.errors._replace(mounted=Mounted(baseline.runs[-1], self.planes, weights[-1])),
+        )
         contradictions = self.remarks.contradictions
         if apart > NOTICEABLE:
             words = (
                 f"runs imply vibrations of the bare rotor that differ by {100 * apart:.2g} % of the largest "
-                "one: "
+                "one"
             )
             if not weights.any():
                 raise UndeterminedError(
-                    f"{words}if they are trial runs, give the weights table or keep only the baseline run"
+                    f"{words}: if they are trial runs, give the weights table or keep only the baseline run"
                 )
-            warnings.append(f"{words}check the weights table and the stored coefficients")
-            contradictions = (*contradictions, warnings[-1])
-        told = today.source != "assumed"
-        if told and not self.known_errors:
-            warnings.append(
+            contradictions += (f"{words}: check the weights table and the stored coefficients",)
+        warnings = (*self.remarks.warnings, *baseline.warnings, *today.warnings, *contradictions)
+        measured = today.source != "assumed"
+        if measured and not self.known_errors:
+            warnings += (
                 "the errors of the influence coefficients are not known: ± are those of the vibration to "
-                "correct alone, and too small"
+                "correct alone, and too small",
             )
-        read_again = R == 1 and baseline.errors in (None, reading.errors)
-        if (told or self.known_errors) and not (
-            read_again and np.abs(mean - self.baseline).max() <= SAME * largest
-        ):
-            if told or reading.errors is None:
+        again = R == 1 and baseline.errors in (None, self.reading.errors)
+        again = again and bool(np.abs(mean - self.baseline).max() <= SAME * largest)
+        if (measured or self.known_errors) and not again:
+            reading = self.reading
+            if measured or reading.errors is None:
                 reading = today._replace(dof=min(today.dof, reading.dof))
             change, G = np.eye(P + 1, dtype=complex), np.zeros((P + 1, R))
-            change[0] = [0.0, *-weights.mean(axis=0)]
-            G[0] = 1 / R
-            noise = noise.changed(change).plus(self._of_runs(local, G, reading))
-        last = Mounted(baseline.runs[-1], self.planes, weights[-1])
-        errors = Errors(noise, reading, self.run_errors, last, self.trials)
+            change[0, 0], change[0, 1:], G[0] = 0, -weights.mean(axis=0), 1 / R
+            noise = errors.noise.changed(change).plus(self._of_runs(local, G, reading))
+            errors = errors._replace(noise=noise, reading=reading)
         remarks = Remarks(tuple(dict.fromkeys(warnings)), self.remarks.notes, contradictions)
         return replace(self, baseline=mean, errors=errors, labels=baseline.labels, remarks=remarks)
 
@@ -444,4 +444,5 @@ def change_of_run(influence: Influence, run: Trials) -> Influence:
     P = len(influence.planes)
     flip, first = np.diag([-1.0, *np.ones(P)]).astype(complex), np.eye(P + 1, 1)
     noise = influence.errors.noise.changed(flip).plus(influence._of_runs(run, first))
-    return replace(influence, baseline=run.mean[0] - influence.baseline, errors=influence.errors.of(noise))
+    errors = influence.errors._replace(noise=noise)
+    return replace(influence, baseline=run.mean[0] - influence.baseline, errors=errors)

@@ -12,7 +12,6 @@ each kind (readings, own part of a run, what is common to it, further unbalance,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -95,8 +94,7 @@ class Mounted(NamedTuple):
     weights: ComplexArray
 
 
-@dataclass(frozen=True, eq=False)
-class Errors:
+class Errors(NamedTuple):
     """Where (Y₀, W) come from, and how they err.
 
     Attributes
@@ -128,10 +126,6 @@ class Errors:
         scales = self.reading.scales(rng, count)
         return np.column_stack((scales, self.run.draw(rng, count), np.ones(count)))
 
-    def of(self, noise: Noise) -> Errors:
-        """Of other combinations of the same runs."""
-        return Errors(noise, self.reading, self.run, self.mounted, self.trials)
-
 
 class Gaussian(Errors):
     """Errors of stored, computed or combined coefficients: normal, as they are.
@@ -154,17 +148,18 @@ class Gaussian(Errors):
         How (Y₀, W) err; None: there are no runs.
     """
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         own: FloatArray,
         columns: ComplexArray,
         reading: Reading,
         run: RunErrors,
         mounted: Mounted | None = None,
-    ) -> None:
-        noise = Noise(np.stack((own, np.zeros_like(own))), columns, np.full(len(columns), KNOWN))
+    ) -> Gaussian:
+        """Normal errors of this covariance."""
+        noise = Noise(np.stack((own, 0 * own)), columns, np.full(len(columns), KNOWN))
         nothing = Mounted("", (), np.zeros(columns.shape[-1] - 1, dtype=complex))
-        super().__init__(noise, reading, run, mounted or nothing)
+        return super().__new__(cls, noise, reading, run, mounted or nothing)
 
     @classmethod
     def none(cls, S: int, C: int, P: int) -> Gaussian:
@@ -253,19 +248,9 @@ class Whitening:
         return float(np.sum(self.white(real_parts(difference)[..., None]) ** 2))
 
 
-class WhiteRows(NamedTuple):
-    """How rows of readings are divided by their errors.
-
-    `white` makes vectors (S, 2 X C, j) independent and of variance 1, flat; `variance` (S, 2 X C) is that of
-    each by itself; `stated` says whether none of the errors are assumed.
-    """
-
-    white: Callable[[FloatArray], FloatArray]
-    variance: FloatArray
-    stated: bool
-
-
-def white_rows(trials: Trials, W: ComplexArray, take: FloatArray, least: float = 0.0) -> WhiteRows:
+def white_rows(
+    trials: Trials, W: ComplexArray, take: FloatArray, least: float = 0.0
+) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, bool]:
     """Joint errors, of readings and between runs, of rows that combine the runs' mean readings.
 
     Parameters
@@ -278,6 +263,11 @@ def white_rows(trials: Trials, W: ComplexArray, take: FloatArray, least: float =
         Rows (X, R) as combinations of runs, real.
     least
         Error of a reading, in its unit, that is added in either direction.
+
+    Returns
+    -------
+    What makes vectors (S, 2 X C, j) independent and of variance 1, flat; the variance (S, 2 X C) of each by
+    itself; whether none of the errors are assumed.
     """
     reading, run = reading_of(trials), usual_run_errors(trials)
     (S, C), X = W.shape[:2], len(take)
@@ -291,4 +281,4 @@ def white_rows(trials: Trials, W: ComplexArray, take: FloatArray, least: float =
 
     alone = np.einsum("scii->sci", noise.at(sizes)[0])
     variance = alone.reshape(S, C, X, 2).swapaxes(1, 2).reshape(S, -1)
-    return WhiteRows(white, variance, "assumed" not in (reading.source, run.origin))
+    return white, variance, "assumed" not in (reading.source, run.origin)
