@@ -23,7 +23,7 @@ errs by; the baseline is the measured one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -40,12 +40,12 @@ from balancing.influence import (
     local_runs,
     match_speeds,
 )
-from balancing.noise import KNOWN, Errors, Gaussian, Mounted, Noise, Whitening, kind_sizes, run_noise
+from balancing.noise import Errors, Gaussian, Mounted, Whitening, kind_sizes, run_noise
 from balancing.regions import real_parts
 from balancing.trials import Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import rpm_text
-from rotorid.regression import covariance_root, stretch, unstretch
+from rotorid.regression import covariance_root, solution, stretch, unstretch
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
@@ -204,27 +204,23 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     R, (S, C, P) = len(runs.runs), expected.W.shape
     reading, run = _shown(runs)
     noise = run_noise(runs, expected.W, np.eye(R, dtype=complex), reading, run)
-    columns, m = expected.columns(), len(expected.columns())
-    change = np.column_stack((np.ones(R), runs.weights))
-    prior = Noise(0 * noise.own, columns @ change.T, np.full(m, KNOWN))
-    whitening = Whitening(noise.plus(prior), kind_sizes(run))
-    bare = stretch(np.kron(np.eye(S * C), np.ones((R, 1))).astype(complex)).reshape(S, C, 2 * R, -1)
+    whitening = Whitening(noise, kind_sizes(run))
+    white = whitening.white
+    columns, N, ones = expected.columns(), 2 * S * C, np.ones((R, 1))
+    m = len(columns)
+    bare = stretch(np.kron(np.eye(S * C), ones).astype(complex)).reshape(S, C, 2 * R, N)
+    shift = np.moveaxis(real_parts(columns @ np.column_stack((ones, runs.weights)).T), 0, -1)
     difference = np.moveaxis(runs.mean, 0, -1) - expected.W @ runs.weights.T
-    parts = (bare, np.moveaxis(real_parts(prior.columns), 0, -1), real_parts(difference)[..., None])
-    A, K, y = (whitening.white(part) for part in parts)
-    basis, root = np.linalg.qr(A)
-    inverse = np.linalg.inv(root)
-    along, left = inverse @ basis.T @ y, y - basis @ (basis.T @ y)
-    rest = K - basis @ (basis.T @ K)
-    cross = -inverse @ basis.T @ K
-    joint = np.block([[inverse @ inverse.T, cross], [cross.T, np.eye(m) - rest.T @ rest]])
-    moved = np.tensordot((rest.T @ left)[:, 0], columns, 1)
+    A = np.vstack((np.hstack((white(bare), white(shift))), np.eye(N + m)[N:]))
+    y = np.append(white(real_parts(difference)[..., None]), np.zeros(m))
+    values = solution(A, y)
+    joint = np.asarray(np.linalg.pinv(A.T @ A, hermitian=True), dtype=np.float64)
+    variance = np.diag(joint).copy()
+    moved = np.tensordot(values[N:], columns, 1)
     # what a channel's readings tell of its Y₀ alone, all else given, is its own; the rest is in common
     alone = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    ones = np.tile(np.eye(2), (R, 1))
-    alone[..., :2, :2] = np.linalg.inv(ones.T @ np.linalg.solve(whitening.own, ones))
-    N = 2 * S * C
-    variance = np.diag(joint).copy()
+    pairs = np.tile(np.eye(2), (R, 1))
+    alone[..., :2, :2] = np.linalg.inv(pairs.T @ np.linalg.solve(whitening.own, pairs))
     for k, block in enumerate(alone[..., :2, :2].reshape(-1, 2, 2)):
         joint[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] -= block
     factors = covariance_root(joint, variance).T
@@ -235,13 +231,13 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     result = replace(
         expected,
         W=expected.W + moved[..., 1:],
-        baseline=unstretch(along[:, 0]).reshape(S, C) + moved[..., 0],
+        baseline=unstretch(values[:N]).reshape(S, C) + moved[..., 0],
         errors=Gaussian(alone, common, reading, run, mounted),
         labels=trials.labels,
         remarks=Remarks(tuple(warnings)),
     )
     spare = N * (R - 1)
-    return result, chance(float(np.sum(left**2)), spare) if spare else 1.0
+    return result, chance(float(np.sum((A @ values - y) ** 2)), spare) if spare else 1.0
 
 
 def _shown(runs: Trials) -> tuple[Reading, RunErrors]:
@@ -276,12 +272,11 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     ValueError
         If one side has no errors, both are not of the same kind, or a speed or sensor is not computed.
     """
-    for side, words in (
-        (measured, "measured coefficients are not known: state the errors of a reading, or repeat readings"),
-        (computed, "computed coefficients are not known: state the relative error of the model"),
-    ):
-        if not side.known_errors:
-            raise ValueError(f"coefficients can be combined only by their errors, and those of the {words}")
+    if not (measured.known_errors and computed.known_errors):
+        raise ValueError(
+            "coefficients are combined by their errors: state those of a reading, or repeat readings, and "
+            "state the relative error of the model"
+        )
     kinds = ["unbalance" if side.labels.unbalances else "mass" for side in (measured, computed)]
     if kinds[0] != kinds[1]:
         raise ValueError(
@@ -296,22 +291,23 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
     speeds, sensors = measured.speeds, measured.sensors
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
-    (W, one), (model, other) = (_placed(side, planes) for side in (measured, computed))
-    v, u = (
-        np.einsum("scii->sci", noise.covariance(side.errors.sizes)).reshape(*W.shape[:2], -1, 2).mean(axis=-1)
-        for noise, side in ((one, measured), (other, computed))
-    )
-    total = (v + u)[..., 1:]
-    safe = np.where(total > 0, total, np.inf)
-    share = np.where(total > 0, u[..., 1:] / safe, 0.5)
-    share = np.where(np.isnan(W), 0.0, np.where(np.isnan(model), 1.0, share))
-    baseline = np.ones((*share.shape[:2], 1))
-    shares = np.concatenate((baseline, share), axis=-1)[..., None] * np.eye(len(planes) + 1, dtype=complex)
-    rest = np.eye(len(planes) + 1) - shares
-    chi = np.nan_to_num(np.abs(W - model) ** 2 / safe)
+    sides = []
+    for side in (measured, computed):
+        change = np.zeros((len(planes) + 1, len(side.planes) + 1), dtype=complex)
+        change[[0, *(1 + planes.index(name) for name in side.planes)], range(len(side.planes) + 1)] = 1
+        noise = side.errors.noise.changed(change)
+        parts = np.einsum("scii->sci", noise.covariance(side.errors.sizes))[..., 2:]
+        variance = parts.reshape(*parts.shape[:2], -1, 2).mean(axis=-1)
+        precision = change[1:, 1:].any(axis=1) / np.maximum(variance, 1e-300)
+        sides.append((side.W @ change[1:, 1:].T, noise, variance, precision))
+    (W, one, v, first), (model, other, u, second) = sides
+    share = first / (first + second)
+    whole = np.concatenate((np.ones((*share.shape[:2], 1)), share), axis=-1)
+    shares = whole[..., None] * np.eye(len(planes) + 1, dtype=complex)
+    both = (first > 0) & (second > 0)
+    chi = both * np.abs(W - model) ** 2 / np.maximum(v + u, 1e-300)
     warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))
-    both = ~np.isnan(W - model)
     # each two degrees of freedom, and so many chances
     if np.count_nonzero(both) * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
         warnings += (
@@ -325,10 +321,10 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         speeds,
         sensors,
         planes,
-        np.nan_to_num(W) * share + np.nan_to_num(model) * (1 - share),
+        W * share + model * (1 - share),
         measured.baseline,
         Errors(
-            one.changed(shares).plus(other.changed(rest)),
+            one.changed(shares).plus(other.changed(np.eye(len(planes) + 1) - shares)),
             measured.reading,
             measured.run_errors,
             Mounted(measured.mounted.run, planes, mounted),
@@ -337,14 +333,3 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         measured.labels,
         measured.remarks._replace(warnings=warnings),
     )
-
-
-def _placed(side: Influence, planes: Sequence[str]) -> tuple[ComplexArray, Noise]:
-    """W of a side in these planes, NaN where it has nothing, and how (Y₀, W) errs."""
-    W = np.full((*side.W.shape[:2], len(planes)), np.nan, dtype=complex)
-    change = np.eye(len(planes) + 1, len(side.planes) + 1, dtype=complex)
-    change[1:] = 0
-    for p, name in enumerate(side.planes):
-        W[..., planes.index(name)] = side.W[..., p]
-        change[1 + planes.index(name), 1 + p] = 1
-    return W, side.errors.noise.changed(change)

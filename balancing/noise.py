@@ -236,7 +236,8 @@ class Whitening:
         self._less = 1 - 1 / np.hypot(1, size)
 
     def _alone(self, columns: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.solve(self._root, columns)).reshape(-1, columns.shape[-1])
+        white = np.asarray(np.linalg.solve(self._root, columns))
+        return white.reshape(self._root[..., 0].size, columns.shape[-1])
 
     def white(self, columns: FloatArray) -> FloatArray:
         """Columns (S, C, n, k) with V⁻¹ = wᵀ w, (S C n, k)."""

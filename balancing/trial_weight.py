@@ -40,7 +40,6 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import rpm
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.words import Quantity as Quantity
 
 if TYPE_CHECKING:
@@ -323,7 +322,6 @@ def trial_from_coefficients(  # noqa: PLR0913
     radius: float | None = None,
     trial_radius: float | None = None,
     load: float | None = None,
-    labels: Labels | None = None,
 ) -> TrialWeight:
     """Trial weight of one plane from stored or computed coefficients.
 
@@ -349,8 +347,6 @@ def trial_from_coefficients(  # noqa: PLR0913
         m, where the trial weight will be mounted: `amount` and the result are masses there. None: `radius`.
     load
         N, that the plane carries, to compare the force with.
-    labels
-        Units and conventions to print in; None: those of the coefficients.
 
     Raises
     ------
@@ -359,15 +355,14 @@ def trial_from_coefficients(  # noqa: PLR0913
         larger than the limit.
     """
     if plane not in influence.planes:
-        hint = did_you_mean(str(plane), influence.planes)
         raise ValueError(
-            f"there is no plane {plane!r}{hint}; the planes are {', '.join(map(repr, influence.planes))}"
+            f"there is no plane {plane!r}; the planes are {', '.join(map(repr, influence.planes))}"
         )
     Y = np.asarray(readings, dtype=complex)
     w = influence.W[..., influence.planes.index(plane)]
     if Y.shape != w.shape:
         raise ValueError(f"the initial readings must have shape {w.shape} (speeds, sensors); got {Y.shape}")
-    made = labels or influence.labels
+    labels = influence.labels
     # masses at the trial radius per mass at the radius of the coefficients
     scale = 1.0
     if trial_radius is not None:
@@ -386,7 +381,7 @@ def trial_from_coefficients(  # noqa: PLR0913
         positive("share of the largest reading", share)
         s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
         amount = share * size / float(abs(w[s, c])) * scale
-        reading = f"sensor {influence.sensors[c]!r} at {influence.labels.speed_words(influence.speeds[s])}"
+        reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
         basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
         if amount > limit * scale:
             amount, basis = limit * scale, "the largest weight of the plane"
@@ -394,7 +389,7 @@ def trial_from_coefficients(  # noqa: PLR0913
                 f"a change by {100 * share:.3g} % of the largest reading would need more than the largest "
                 f"weight of plane {plane!r}: that is proposed"
             )
-    _check_limit(plane, amount, limit * scale, made, "choose a smaller one")
+    _check_limit(plane, amount, limit * scale, labels, "choose a smaller one")
     positive("trial weight", amount)
     angle = float(np.angle(-np.vdot(w, Y))) % (2 * math.pi)
     expected = Y + w * (amount / scale * np.exp(1j * angle))
@@ -425,7 +420,7 @@ def trial_from_coefficients(  # noqa: PLR0913
         sensors=influence.sensors,
         before=Y,
         expected=expected,
-        labels=made,
+        labels=labels,
     )
     force = () if load is None or weight.force is None else _force_warning(weight.force / load)
     return replace(weight, warnings=(*warnings, *force))

@@ -45,7 +45,7 @@ def main() -> dict[str, float]:
         job.rotor, job.plane_nodes, job.sensor_places, job.trials.speeds, labels=job.trials.labels
     )
     baseline = job.trials.readings[0, 0]  # of the only run, (speeds, sensors)
-    modelled = balancing.trial_from_coefficients(influence, baseline, "left", labels=job.trials.labels)
+    modelled = balancing.trial_from_coefficients(influence, baseline, "left")
     print(modelled.summary(), end="\n\n")
 
     # What such a weight would leave, from the same coefficients.

@@ -200,7 +200,7 @@ def test_what_only_the_model_has_of_sensors_and_speeds_stays_out():
 def test_what_cannot_be_combined():
     made, W, _ = synthetic(np.random.default_rng(6), errors=ERRORS)
     measured, computed = estimate_influence(made), model(W, 0.1)
-    with pytest.raises(ValueError, match="measured coefficients are not known: state the errors"):
+    with pytest.raises(ValueError, match="combined by their errors: state those of a reading"):
         combine(stored(W), computed)
     with pytest.raises(ValueError, match="state the relative error of the model"):
         combine(measured, stored(W))
