@@ -298,18 +298,17 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         noise = side.errors.noise.changed(change)
         parts = np.einsum("scii->sci", noise.covariance(side.errors.sizes))[..., 2:]
         variance = parts.reshape(*parts.shape[:2], -1, 2).mean(axis=-1)
-        precision = change[1:, 1:].any(axis=1) / np.maximum(variance, 1e-300)
-        sides.append((side.W @ change[1:, 1:].T, noise, variance, precision))
+        sides.append((side.W @ change[1:, 1:].T, noise, variance, change[1:, 1:].any(axis=1)))
     (W, one, v, first), (model, other, u, second) = sides
-    share = first / (first + second)
+    both, total = first & second, np.maximum(v + u, 1e-300)
+    share = np.where(both, u / total, first)
     whole = np.concatenate((np.ones((*share.shape[:2], 1)), share), axis=-1)
     shares = whole[..., None] * np.eye(len(planes) + 1, dtype=complex)
-    both = (first > 0) & (second > 0)
-    chi = both * np.abs(W - model) ** 2 / np.maximum(v + u, 1e-300)
+    chi = both * np.abs(W - model) ** 2 / total
     warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))
     # each two degrees of freedom, and so many chances
-    if np.count_nonzero(both) * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
+    if both.sum() * W[..., 0].size * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
         warnings += (
             f"measured and computed coefficient of plane {planes[p]!r} at sensor {sensors[c]!r}, "
             f"{rpm_text(speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: the "

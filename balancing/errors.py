@@ -44,7 +44,7 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import chance
 from balancing.trials import ReadingErrors, Trials
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
-from rotorid.regression import gain, stretch
+from rotorid.regression import gain
 
 Source = Literal[
     "stated", "repeats", "stated, enlarged by repeats", "measured", "residuals", "assumed", "unknown"
@@ -126,10 +126,10 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    axes = stretch(np.exp(1j * np.angle(z))[..., None, None])
-    return np.asarray(
-        axes * np.stack((radial, tangential), axis=-1)[..., None, :] @ np.swapaxes(axes, -1, -2)
-    )
+    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
+    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
+    parts = ((radial, along), (tangential, across))
+    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
 
 
 def mean_variance(covariance: FloatArray) -> FloatArray:
@@ -315,8 +315,10 @@ class Block(NamedTuple):
         n = len(self.e)
         least = 1e-9 * np.trace(V, axis1=1, axis2=2).real + 1e-12 * np.trace(self.parts[0]).real
         V += (least / n)[:, None, None] * np.eye(n)
-        white = np.linalg.solve(V, np.broadcast_to(self.e[:, None], (len(V), n, 1)))[..., 0]
-        return np.linalg.slogdet(V)[1], (white @ self.e.conj()).real / 2
+        L = np.linalg.cholesky(V)
+        white = np.linalg.solve(L, np.broadcast_to(self.e[:, None], (len(V), n, 1)))
+        log = 2 * np.log(np.einsum("gii->gi", L).real).sum(axis=1)
+        return log, np.sum(np.abs(white) ** 2, axis=(1, 2)) / 2
 
 
 def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[Block]:
@@ -356,7 +358,8 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2
         moved, loads = (alike(m[:, None] * part) for part in (fitted, effect))
-        parts = [np.diag(share @ even), np.diag(share @ own), moved, loads, share.sum() * alike(further)]
+        parts = [np.diag(share @ even), np.diag(share @ own), moved, loads]
+        parts.append(share.sum() * further.T @ further.conj())
         known = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
         keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
         inside = keep @ np.array([*parts, known]) @ keep.conj().T

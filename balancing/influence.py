@@ -221,7 +221,7 @@ class Influence:
         """Those of some speeds, sensors and planes, by their indices; None: of all."""
         sensors = range(len(self.sensors)) if sensors is None else sensors
         planes = list(range(len(self.planes)) if planes is None else planes)
-        at, chosen = np.ix_(speeds, sensors), tuple(self.planes[p] for p in planes)
+        chosen = tuple(self.planes[p] for p in planes)
         mounted = Mounted(self.mounted.run, chosen, self.mounted.weights[planes])
         noise = self.errors.noise.part(speeds, sensors, planes)
         return replace(
@@ -229,8 +229,8 @@ class Influence:
             speeds=self.speeds[list(speeds)],
             sensors=tuple(self.sensors[c] for c in sensors),
             planes=chosen,
-            W=self.W[at][..., planes],
-            baseline=self.baseline[at],
+            W=self.W[np.ix_(speeds, sensors, planes)],
+            baseline=self.baseline[np.ix_(speeds, sensors)],
             errors=self.errors._replace(noise=noise, mounted=mounted),
         )
 
