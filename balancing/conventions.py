@@ -57,7 +57,7 @@ class Labels:
     Raises
     ------
     ValueError
-        If `phase`, `angles`, `rotation` or `view` is none of its words, and where `clock` is set or `view` is
+        If `phase` or `angles` is none of its words, and where `clock` is set or `view` is
         given without `rotation`.
     """
 
@@ -74,16 +74,14 @@ class Labels:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        words = (
+        turns = "clockwise", "counter-clockwise"
+        for name, word, words in (
             ("phase", self.phase, PHASES),
             ("angles", self.angles, ANGLES),
-            ("rotation", self.rotation, (None, "clockwise", "counter-clockwise")),
-            ("view", self.view, (None, "drive end", "free end")),
-        )
-        for name, word, possible in words:
-            if word not in possible:
-                shown = " or ".join(repr(each) for each in possible if each)
-                raise ValueError(f"{name} must be {shown}, not {word!r}")
+            ("rotation", self.rotation or turns[0], turns),
+        ):
+            if word not in words:
+                raise ValueError(f"{name} must be {' or '.join(map(repr, words))}, not {word!r}")
         if self.rotation is None and (self.clock or self.view is not None):
             what = f"a view from the {self.view}"
             if self.clock:
@@ -231,7 +229,7 @@ class Labels:
 
     def drawn(self, angle: ArrayLike) -> FloatArray:
         """Angles with the rotation as angles on the paper, both in rad, there counter-clockwise."""
-        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=float))
+        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=np.float64))
 
     def otherwise(self, names: Collection[str]) -> Labels:
         """The labels with "phase", "angles" or both turned round."""
@@ -284,5 +282,4 @@ def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, Float
 
 
 def _mirror(covariance: FloatArray, scale: float, sign: int) -> FloatArray:
-    flip = np.diag([1.0, float(sign)])
-    return np.asarray(scale**2 * (flip @ covariance @ flip))
+    return covariance * scale**2 * np.array([[1, sign], [sign, 1]])

@@ -36,7 +36,7 @@ from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.conventions import Labels
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import rpm
@@ -101,8 +101,9 @@ class TrialWeight(Answered):
         rad/s, the highest at which it will turn.
     load
         N, that the plane carries; None: unknown.
-    speeds, sensors, before, expected
-        Readings (S, C) without and with it; None where there are no coefficients.
+    influence, expected
+        Coefficients with the readings without it as baseline, and readings (S, C) with it; None where there
+        are no coefficients.
     labels
         Units and conventions to print in.
     warnings
@@ -117,9 +118,7 @@ class TrialWeight(Answered):
     radius: float | None
     speed: float
     load: float | None = None
-    speeds: FloatArray | None = None
-    sensors: tuple[str, ...] = ()
-    before: ComplexArray | None = None
+    influence: Influence | None = None
     expected: ComplexArray | None = None
     labels: Labels = field(default_factory=Labels)
     warnings: tuple[str, ...] = ()
@@ -174,8 +173,9 @@ class TrialWeight(Answered):
             lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N"
             lines[0] += "" if share is None else f", {share:.3g} % of the load"
         table: tuple[str, ...] = ()
-        if self.speeds is not None and self.before is not None and self.expected is not None:
-            largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.expected)
+        if self.influence is not None and self.expected is not None:
+            where = self.influence.speeds, self.influence.sensors
+            largest = largest_readings(labels, *where, self.influence.baseline, self.expected)
             lines.append(f"  largest with it{largest}")
             head = f"Plane {self.plane}, now and with the weight, {labels.vibration_in}"
             table = (f"{head}\n{text(self._columns(), left=2)}",)
@@ -193,12 +193,13 @@ class TrialWeight(Answered):
 
     def _columns(self) -> tuple[Column, ...]:
         """Readings without and with it, one row per speed and sensor; none without coefficients."""
-        if self.speeds is None or self.before is None or self.expected is None:
+        if self.influence is None or self.expected is None:
             return ()
-        change = np.abs(self.expected - self.before) * self.labels.vibration_scale
+        before = self.influence.baseline
+        change = np.abs(self.expected - before) * self.labels.vibration_scale
         return (
-            *reading_columns(self.labels, self.speeds, self.sensors),
-            *vector_columns(self.labels, "before", self.before),
+            *reading_columns(self.labels, self.influence.speeds, self.influence.sensors),
+            *vector_columns(self.labels, "before", before),
             *vector_columns(self.labels, "after", self.expected),
             Column("change", change.ravel(), three_figures),
         )
@@ -311,9 +312,8 @@ def trial_from_force(  # noqa: PLR0913
     )
 
 
-def trial_from_coefficients(  # noqa: PLR0913
+def trial_from_coefficients(
     influence: Influence,
-    readings: ComplexArray,
     plane: str,
     *,
     share: float = SHARE,
@@ -328,9 +328,7 @@ def trial_from_coefficients(  # noqa: PLR0913
     Parameters
     ----------
     influence
-        Coefficients, W (S, C, P).
-    readings
-        Initial vibration, (S, C).
+        With the initial vibration as baseline.
     plane
         Name.
     share
@@ -351,17 +349,14 @@ def trial_from_coefficients(  # noqa: PLR0913
     Raises
     ------
     ValueError
-        For a plane that is not known or acts on no reading, for readings that are all zero, and an amount
+        For a plane that is not known or acts on no reading, readings that are lacking or all zero, and an amount
         larger than the limit.
     """
     if plane not in influence.planes:
         raise ValueError(
             f"there is no plane {plane!r}; the planes are {', '.join(map(repr, influence.planes))}"
         )
-    Y = np.asarray(readings, dtype=complex)
-    w = influence.W[..., influence.planes.index(plane)]
-    if Y.shape != w.shape:
-        raise ValueError(f"the initial readings must have shape {w.shape} (speeds, sensors); got {Y.shape}")
+    Y, w = influence.baseline, influence.W[..., influence.planes.index(plane)]
     labels = influence.labels
     # masses at the trial radius per mass at the radius of the coefficients
     scale = 1.0
@@ -371,8 +366,10 @@ def trial_from_coefficients(  # noqa: PLR0913
             raise ValueError("a trial radius needs the radius of the coefficients' masses, too")
         scale = radius / trial_radius
     size = float(np.abs(Y).max())
-    if not size:
-        raise ValueError("all initial readings are zero: there is nothing to choose a trial weight by")
+    if not size > 0:
+        raise ValueError(
+            "initial readings are lacking or all zero: there is nothing to choose a trial weight by"
+        )
     if not w.any():
         raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
     warnings: list[str] = []
@@ -416,9 +413,7 @@ def trial_from_coefficients(  # noqa: PLR0913
         radius=trial_radius if trial_radius is not None else radius,
         speed=float(influence.speeds.max()),
         load=load,
-        speeds=influence.speeds,
-        sensors=influence.sensors,
-        before=Y,
+        influence=influence,
         expected=expected,
         labels=labels,
     )
