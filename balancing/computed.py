@@ -24,15 +24,16 @@ errs by; the baseline is the measured one.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, chance
 from balancing.conventions import Labels
-from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
+from balancing.errors import reading_of, usual_run_errors
 from balancing.influence import (
     Influence,
     Remarks,
@@ -45,12 +46,11 @@ from balancing.regions import real_parts
 from balancing.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import rpm_text
+from rotorid.base.words import Quantity as Quantity
 from rotorid.regression import covariance_root, solution, stretch, unstretch
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
-
-Quantity = Literal["displacement", "velocity", "acceleration"]
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LEVEL = 0.99
@@ -202,7 +202,9 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     """
     runs = local_runs(expected, trials)
     R, (S, C, P) = len(runs.runs), expected.W.shape
-    reading, run = _shown(runs)
+    reading, run = reading_of(runs), usual_run_errors(runs)
+    with suppress(UndeterminedError):  # as runs that tell more than the coefficients show them
+        _, reading, run, *_ = estimate_influence(runs).errors
     noise = run_noise(runs, expected.W, np.eye(R, dtype=complex), reading, run)
     whitening = Whitening(noise, kind_sizes(run))
     white = whitening.white
@@ -238,15 +240,6 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     )
     spare = N * (R - 1)
     return result, chance(float(np.sum((A @ values - y) ** 2)), spare) if spare else 1.0
-
-
-def _shown(runs: Trials) -> tuple[Reading, RunErrors]:
-    """Errors of readings and between runs: as runs that tell more than the coefficients show them."""
-    try:
-        measured = estimate_influence(runs)
-    except UndeterminedError:
-        return reading_of(runs), usual_run_errors(runs)
-    return measured.reading, measured.run_errors
 
 
 def combine(measured: Influence, computed: Influence) -> Influence:

@@ -282,4 +282,4 @@ def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, Float
 
 
 def _mirror(covariance: FloatArray, scale: float, sign: int) -> FloatArray:
-    return covariance * scale**2 * np.array([[1, sign], [sign, 1]])
+    return np.asarray(covariance * scale**2 * np.array([[1, sign], [sign, 1]]))

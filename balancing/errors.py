@@ -43,7 +43,7 @@ from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
 from balancing.trials import ReadingErrors, Trials
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
 
 Source = Literal[
@@ -337,20 +337,15 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     (R, n), N = A.shape, theta[..., 0].size
     at = np.linspace(0, N - 1, min(N, MOST)).round().astype(np.int64)
 
-    def taken(values: AnyArray, *first: int) -> AnyArray:
-        return values.reshape(*first, N)[..., at]
-
-    Y, W = taken(trials.mean, R), theta.reshape(N, n)[at, 1:]
+    W = theta.reshape(N, n)[at, 1:]
     further = unbalances(theta[..., 1:], rms(trials.mean)).reshape(N, -1)[at].T
-    variance = taken(mean_variance(covariance), R)
-    columns = job_columns(trials, theta[..., 1:])
-    others = taken(columns, len(columns), R)
+    others = job_columns(trials, theta[..., 1:]).reshape(-1, R, N)[..., at]
     # as the coefficients say: what each run errs by would explain itself
     whole = np.einsum("rp,scp->rsc", A, theta)
-    fitted, even, own, effect = (
-        taken(part, R)
-        for part in (whole, own_variance(whole, 1.0), own_variance(whole, 0.0), whole - theta[..., 0])
-    )
+    each = (trials.mean, whole, whole - theta[..., 0])
+    Y, fitted, effect = (part.reshape(R, N)[:, at] for part in each)
+    squares = (own_variance(whole, 1.0), own_variance(whole, 0.0), mean_variance(covariance))
+    even, own, variance = (part.reshape(R, N)[:, at] for part in squares)
 
     def alike(rows: ComplexArray) -> ComplexArray:
         return np.asarray(rows.T @ rows.conj())

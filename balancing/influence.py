@@ -32,7 +32,7 @@ from balancing.noise import Errors, Noise, drawn, run_noise
 from balancing.noise import Gaussian as Gaussian
 from balancing.noise import Mounted as Mounted
 from balancing.noise import Whitening as Whitening
-from balancing.trials import Placement, Trials, check_names, check_speeds
+from balancing.trials import Placement, Trials, check_names, check_speeds, keep
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.regression import gain
@@ -83,17 +83,15 @@ class Influence:
     remarks: Remarks = field(default_factory=Remarks)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
-        object.__setattr__(self, "planes", check_names(self.planes, "planes"))
-        object.__setattr__(self, "speeds", check_speeds(self.speeds))
+        names = {name: check_names(getattr(self, name), name) for name in ("sensors", "planes")}
+        keep(self, speeds=check_speeds(self.speeds), **names)
         S, C, P = len(self.speeds), len(self.sensors), len(self.planes)
         for name, shape in (("W", (S, C, P)), ("baseline", (S, C))):
             array: NDArray[np.complex128] = np.array(getattr(self, name), dtype=complex)
             wrong = np.isinf(array) | (np.isnan(array) & (name == "W"))
             if array.shape != shape or wrong.any():
                 raise ValueError(f"{name} must be finite, of shape {shape}; got shape {array.shape}")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            keep(self, **{name: array})
 
     @property
     def has_baseline(self) -> bool:

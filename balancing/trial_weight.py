@@ -349,7 +349,7 @@ def trial_from_coefficients(
     Raises
     ------
     ValueError
-        For a plane that is not known or acts on no reading, readings that are lacking or all zero, and an amount
+        For a plane that is not known or acts on no reading, readings that are lacking or zero, and an amount
         larger than the limit.
     """
     if plane not in influence.planes:

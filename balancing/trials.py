@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -76,7 +76,6 @@ class Placement(NamedTuple):
 
 
 _EXACT = Placement()
-_NOTHING: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +136,13 @@ class Trials:
     drift: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("runs", "sensors", "planes"):
-            names = check_names(getattr(self, name), name, empty=name == "planes")
-            object.__setattr__(self, name, names)
-        object.__setattr__(self, "speeds", check_speeds(self.speeds))
+        keep(
+            self,
+            runs=check_names(self.runs, "runs"),
+            sensors=check_names(self.sensors, "sensors"),
+            planes=check_names(self.planes, "planes", empty=True),
+            speeds=check_speeds(self.speeds),
+        )
         R, S, C, P = len(self.runs), len(self.speeds), len(self.sensors), len(self.planes)
         readings = np.array(self.readings, dtype=complex)
         if readings.ndim == 3:
@@ -167,9 +169,7 @@ class Trials:
                 raise ValueError(f"{name} must be finite, of shape {shape}, or None; got {array.shape}")
             array[..., missing] = np.nan
             arrays[name] = array
-        for name, array in arrays.items():
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        keep(self, **arrays)
 
     def _check_readings(self, readings: ComplexArray) -> None:
         missing = np.isnan(readings)
@@ -226,8 +226,7 @@ class Limits:
             array = np.array(getattr(self, name), dtype=np.float64)
             if not (array >= 0).all():
                 raise ValueError(f"the limits {name} must be numbers ≥ 0 (infinite for none)")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            keep(self, **{name: array})
         arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
         start, width = arcs.T
         if len(self.forbidden) != len(self.max_weight):
@@ -241,30 +240,6 @@ class Limits:
     def none(cls, S: int, C: int, P: int) -> Limits:
         """No limits at all, for S speeds, C sensors and P planes."""
         return cls(np.full(P, np.inf), np.full((S, C), np.inf), ((),) * P)
-
-    @classmethod
-    def of(
-        cls,
-        speeds: int,
-        sensors: Sequence[str],
-        planes: Sequence[str],
-        *,
-        max_weight: Mapping[str, float] = _NOTHING,
-        residual: Mapping[str, float | FloatArray] = _NOTHING,
-        forbidden: Mapping[str, Sequence[Arc]] = _NOTHING,
-    ) -> Limits:
-        """Limits by name of plane and sensor; a sensor's limit is a number, or one per speed (S,)."""
-        unknown = {*max_weight, *forbidden} - {*planes} | {*residual} - {*sensors}
-        if unknown:
-            raise ValueError(
-                f"there is no {' and no '.join(map(repr, sorted(unknown)))} among the planes "
-                f"{', '.join(map(repr, planes))} and the sensors {', '.join(map(repr, sensors))}"
-            )
-        return cls(
-            np.array([max_weight.get(name, np.inf) for name in planes]),
-            np.column_stack([np.broadcast_to(residual.get(name, np.inf), speeds) for name in sensors]),
-            tuple(tuple(forbidden.get(name, ())) for name in planes),
-        )
 
     @property
     def any(self) -> bool:
@@ -280,6 +255,14 @@ class Limits:
             self.residual[list(speeds)],
             tuple(self.forbidden[p] for p in planes),
         )
+
+
+def keep(made: object, **values: object) -> None:
+    """Set attributes of a frozen object; arrays are read-only then."""
+    for name, value in values.items():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+        object.__setattr__(made, name, value)
 
 
 def check_names(names: Sequence[str], what: str, *, empty: bool = False) -> tuple[str, ...]:
@@ -300,7 +283,7 @@ def check_names(names: Sequence[str], what: str, *, empty: bool = False) -> tupl
 
 
 def check_speeds(speeds: FloatArray) -> FloatArray:
-    """Speeds as a read-only array (S,).
+    """Speeds as an array (S,).
 
     Raises
     ------
@@ -313,5 +296,4 @@ def check_speeds(speeds: FloatArray) -> FloatArray:
         raise ValueError(
             f"speeds must be different, finite and greater than zero, of shape (S,); got {out.tolist()} rad/s"
         )
-    out.flags.writeable = False
     return out
