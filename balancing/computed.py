@@ -270,12 +270,11 @@ def combine(measured: Influence, computed: Influence) -> Influence:
             "coefficients are combined by their errors: state those of a reading, or repeat readings, and "
             "state the relative error of the model"
         )
-    kinds = ["unbalance" if side.labels.unbalances else "mass" for side in (measured, computed)]
-    if kinds[0] != kinds[1]:
+    if measured.labels.unbalances != computed.labels.unbalances:
         raise ValueError(
-            f"the measured coefficients are per {kinds[0]} ({measured.labels.weight_unit}) and the computed "
-            f"ones per {kinds[1]} ({computed.labels.weight_unit}): compute them with the radii of the "
-            "planes, per mass, or without, per unbalance"
+            f"measured coefficients per {measured.labels.weight_unit} and computed ones per "
+            f"{computed.labels.weight_unit}: compute them with the radii of the planes, per mass, or "
+            "without, per unbalance"
         )
     at = match_speeds(measured.speeds, computed.speeds, "computed coefficients")
     lacking = [name for name in measured.sensors if name not in computed.sensors]

@@ -148,9 +148,6 @@ def assumptions(
         if test.chi_square is not None:
             words[-1] += f"{_compared(test, labels)}."
     words += [f"If it is {o.words}, the weights go to the angles under “if {o.words}”." for o in others]
-    if len(labels.assumed) == 2 and len(others) == 1:
-        turned = labels.otherwise(labels.assumed)
-        words.append(f"With {turned.phase} and {turned.angles} together the angles stay as they are.")
     return tuple(words)
 
 

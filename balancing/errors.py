@@ -62,18 +62,12 @@ SIZES = np.concatenate(([0.0], np.geomspace(1e-3, 0.5, 6)))
 """Of each sensor's own, and of what readings have in common, before they are known roughly."""
 SPLITS = np.array([(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0), (0.5, 0, 0.5), (0, 0.5, 0.5)])
 """Of what readings have in common, in the variance: of the reading, of what weights do, further unbalance."""
-EVENLY = (0.5, 1.0)
-"""How much of the own part is alike at all sensors."""
 OWN_SHARES = np.array([0.0, 0.1, 0.4, 1.0])
 """Of stated errors, in the variance; only spare runs show that nothing is common."""
-EXPLAINED = 0.05
-"""Level of the tests whether errors of some size explain what runs leave."""
-REFINED = 2
-"""Times that the grid is drawn closer around what data do not exclude."""
+EVENLY = (0.5, 1.0)
+"""How much of the own part is alike at all sensors."""
 NOTICEABLE = 0.1
 """Relative errors between runs that deserve a question."""
-NEGLIGIBLE = 1e-4
-"""Probability of sizes that are left out."""
 MOST = 64
 """Readings of a run by which sizes are estimated."""
 
@@ -425,7 +419,7 @@ def _estimated(each: Sequence[Block], level: float) -> RunErrors:
     sizes = _grid(own, common, splits)
     log = [-np.sum([block.at(sizes, evenly) for block in each], axis=(0, 1)) for evenly in EVENLY]
     evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
-    for _ in range(REFINED):
+    for _ in range(2):  # closer around what data do not exclude
         chance = _posterior(each, sizes, evenly).reshape(len(own), len(common), -1)
         own, common = (
             _finer(values, chance.sum(axis=axes), count)
@@ -443,7 +437,7 @@ def _grid(own: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray
 
 def _finer(values: FloatArray, probability: FloatArray, count: int) -> FloatArray:
     """So many values between those that are not excluded."""
-    seen = np.flatnonzero(probability > NEGLIGIBLE)
+    seen = np.flatnonzero(probability > 1e-4)
     low, high = max(seen[0] - 1, 0), min(seen[-1] + 1, len(values) - 1)
     if values[low] > 0:
         return np.geomspace(values[low], values[high], count)
@@ -463,7 +457,7 @@ def _posterior(each: Sequence[Block], sizes: FloatArray, evenly: float) -> Float
     weight = np.zeros(len(sizes))
     for block in each:
         likely = sizes[weight > weight.max() - 3.0]
-        if block.spare or (len(block.e) and tail([block], likely, evenly) > EXPLAINED):
+        if block.spare or (len(block.e) and tail([block], likely, evenly) > 0.05):
             weight -= np.sum(block.at(sizes, evenly), axis=0)
     probability = np.exp(weight - weight.max())
     return np.asarray(probability / probability.sum())

@@ -144,12 +144,12 @@ _SOURCES = {
 def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     """Errors of a reading and between runs in one or two sentences."""
     e = reading.errors
-    parts = []
+    parts = {}
     if e is not None:
-        shown = (f"{100 * e.amplitude:.3g} % of the amplitude", f"{np.degrees(e.phase):.3g}°")
-        each = zip((e.amplitude, e.phase, e.floor), (*shown, labels.amplitude_words(e.floor)), strict=True)
-        parts = [words for size, words in each if size]
-    known = ", ".join(parts) or "not known"
+        parts[f"{100 * e.amplitude:.3g} % of the amplitude"] = e.amplitude
+        parts[f"{np.degrees(e.phase):.3g}°"] = e.phase
+        parts[labels.amplitude_words(e.floor)] = e.floor
+    known = ", ".join(words for words, size in parts.items() if size) or "not known"
     out = f"One standard deviation of a reading: {known} ({_SOURCES[reading.source]})"
     what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
     sizes = zip(run.typical, what, strict=True)

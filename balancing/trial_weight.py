@@ -49,14 +49,8 @@ if TYPE_CHECKING:
 
 
 GRAVITY = 9.80665
-FRACTION = 0.10
-"""Of the load that the force of a first trial weight makes."""
 RISKY = 0.25
-SHARE = 0.40
-"""Change of a reading, relative to the largest one, that a trial weight is chosen for."""
-
-DAMPING = 0.05
-"""Damping ratio of the critical speed if nobody says."""
+"""Of the load, for the force of a first trial weight."""
 
 _LAGS = {"below": (45.0, 45.0), "at": (90.0, 0.0), "above": (135.0, 45.0)}
 _LEAD = {"displacement": 0.0, "velocity": math.pi / 2, "acceleration": math.pi}
@@ -231,15 +225,13 @@ def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int
             "the mass of the rotor and the load of the bearing are two ways to the same load: "
             "choose one of them"
         )
-    given = {
-        "number of planes": planes,
-        "mass of the rotor": rotor_mass,
-        "load of the bearing": bearing_load,
-    }
-    for what, value in given.items():
-        if value is not None:
-            positive(what, value)
-    return bearing_load if rotor_mass is None else rotor_mass * GRAVITY / planes
+    positive("number of planes", planes)
+    if rotor_mass is not None:
+        positive("mass of the rotor", rotor_mass)
+        return rotor_mass * GRAVITY / planes
+    if bearing_load is not None:
+        positive("load of the bearing", bearing_load)
+    return bearing_load
 
 
 def trial_from_force(  # noqa: PLR0913
@@ -248,7 +240,7 @@ def trial_from_force(  # noqa: PLR0913
     radius: float,
     load: float,
     *,
-    fraction: float = FRACTION,
+    fraction: float = 0.1,
     limit: float = math.inf,
     phase: float | None = None,
     lag: Lag | None = None,
@@ -316,7 +308,7 @@ def trial_from_coefficients(
     influence: Influence,
     plane: str,
     *,
-    share: float = SHARE,
+    share: float = 0.4,
     amount: float | None = None,
     limit: float = math.inf,
     radius: float | None = None,
@@ -359,12 +351,8 @@ def trial_from_coefficients(
     Y, w = influence.baseline, influence.W[..., influence.planes.index(plane)]
     labels = influence.labels
     # masses at the trial radius per mass at the radius of the coefficients
-    scale = 1.0
-    if trial_radius is not None:
-        positive("trial radius", trial_radius)
-        if radius is None:
-            raise ValueError("a trial radius needs the radius of the coefficients' masses, too")
-        scale = radius / trial_radius
+    at = radius if trial_radius is None else trial_radius
+    scale = 1.0 if radius is None or at is None else radius / at
     size = float(np.abs(Y).max())
     if not size > 0:
         raise ValueError(
@@ -410,7 +398,7 @@ def trial_from_coefficients(
         angle=angle,
         angle_reach=0.0,
         basis=f"{basis}; angle from the coefficients",
-        radius=trial_radius if trial_radius is not None else radius,
+        radius=at,
         speed=float(influence.speeds.max()),
         load=load,
         influence=influence,
@@ -422,12 +410,9 @@ def trial_from_coefficients(
 
 
 def _force_warning(fraction: float) -> tuple[str, ...]:
-    if fraction <= RISKY:
-        return ()
-    return (
-        f"the force of the trial weight is {100 * fraction:.3g} % of the load, more than {100 * RISKY:g} %: "
-        "take less for a first run",
-    )
+    words = "more than 25 %: take less for a first run"
+    high = f"the force of the trial weight is {100 * fraction:.3g} % of the load, {words}"
+    return (high,) if fraction > RISKY else ()
 
 
 def _check_limit(plane: str, amount: float, limit: float, labels: Labels, remedy: str) -> None:
@@ -445,7 +430,7 @@ def expected_lag(
     *,
     degrees: float | None = None,
     ratio: float | None = None,
-    damping: float = DAMPING,
+    damping: float = 0.05,
 ) -> Lag:
     """How far the vibration lags, from the first of these that is given.
 

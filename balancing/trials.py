@@ -178,13 +178,11 @@ class Trials:
         # a reading after a gap would be lost: repeats are numbered without holes
         bad[1:] |= ~missing[1:] & missing[:-1]
         if bad.any():
-            k, r, s, c = np.argwhere(bad)[0]
-            rpm = self.speeds[s] * RPM
-            gap = np.isnan(readings[: k + 1, r, s, c]).any()
+            _, r, s, c = np.argwhere(bad)[0]
             raise ValueError(
-                f"the reading of sensor {self.sensors[c]!r} in run {self.runs[r]!r} at {rpm:.6g} rpm is "
-                f"{'missing' if gap else 'infinite'}: every sensor must be read in every run at every speed; "
-                "leave out the sensor or the speed, or repeat the run"
+                f"the reading of sensor {self.sensors[c]!r} in run {self.runs[r]!r} at "
+                f"{self.speeds[s] * RPM:.6g} rpm is missing or infinite: every sensor must be read in every "
+                "run at every speed; leave out the sensor or the speed, or repeat the run"
             )
 
     @property
@@ -273,12 +271,9 @@ def check_names(names: Sequence[str], what: str, *, empty: bool = False) -> tupl
     ValueError
         For repeated names, and for none at all unless `empty`.
     """
-    out = tuple(str(n) for n in names)
-    if not out and not empty:
-        raise ValueError(f"there are no {what}")
-    twice = sorted({n for n in out if out.count(n) > 1})
-    if twice:
-        raise ValueError(f"{what} need different names; found twice: {', '.join(twice)}")
+    out = tuple(map(str, names))
+    if len(set(out)) < max(len(out), 1 - empty):
+        raise ValueError(f"{what} need different names, at least one; got {', '.join(out) or 'none'}")
     return out
 
 

@@ -194,8 +194,6 @@ def test_trial_radius_different_from_that_of_the_coefficients():
     assert stated.expected == pytest.approx(usual.expected)
     with pytest.raises(ValueError, match=r"5 g is larger .* 4.8 g"):
         trial_from_coefficients(W, "left", amount=0.005, limit=0.006, radius=0.2, trial_radius=0.25)
-    with pytest.raises(ValueError, match="needs the radius of the coefficients"):
-        trial_from_coefficients(W, "left", trial_radius=0.25)
 
 
 def test_what_cannot_be_is_refused():
