@@ -42,6 +42,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
+from balancing.regions import real_parts
 from balancing.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
@@ -195,8 +196,7 @@ def _against_repeats(trials: Trials) -> tuple[float, int]:
     of_means = Reading(trials.errors, "stated").covariance(trials, digits=False)[many]
     V = of_means * count[:, None, None]
     inverse = np.linalg.pinv(V, 1e-9, hermitian=True)  # what has no error is not compared
-    off = np.nan_to_num(trials.readings[:, many] - trials.mean[many])
-    parts = np.stack((off.real, off.imag), axis=-1)
+    parts = real_parts(np.nan_to_num(trials.readings[:, many] - trials.mean[many])[..., None])
     chi_square = float(np.einsum("kgi,gij,kgj->", parts, inverse, parts))
     dof = round(np.einsum("g,gij,gji->", count - 1, inverse, V))
     contradicted = dof > 0 and chance(chi_square, dof) < 1 - CONTRADICTION
@@ -338,8 +338,8 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     whole = np.einsum("rp,scp->rsc", A, theta)
     each = (trials.mean, whole, whole - theta[..., 0])
     Y, fitted, effect = (part.reshape(R, N)[:, at] for part in each)
-    squares = (own_variance(whole, 1.0), own_variance(whole, 0.0), mean_variance(covariance))
-    even, own, variance = (part.reshape(R, N)[:, at] for part in squares)
+    variances = (own_variance(whole, 1.0), own_variance(whole, 0.0), mean_variance(covariance))
+    even, own, variance = (part.reshape(R, N)[:, at] for part in variances)
 
     def alike(rows: ComplexArray) -> ComplexArray:
         return np.asarray(rows.T @ rows.conj())
@@ -356,7 +356,8 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
 
     # combinations whose errors are independent
     basis = np.linalg.svd(A)[0][:, n:]
-    size = np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=1)
+    squares = np.abs(Y) ** 2
+    size = np.mean(squares / squares.mean(axis=0).clip(1e-300), axis=1)
     basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] * basis))[1]
     # a rotor at rest repeats itself to the last digit
     moving = [m for m in basis.T if np.max(np.abs(m) @ np.abs(fitted)) > ROUNDING * np.abs(fitted).max()]
@@ -431,25 +432,23 @@ def _estimated(each: Sequence[Block], level: float) -> RunErrors:
 
 def _grid(own: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray:
     """All combinations of own sizes, sizes in common and splits, (G, 4)."""
-    a, b, split = np.meshgrid(own, common, range(len(splits)), indexing="ij")
-    return np.column_stack((a.ravel(), b.reshape(-1, 1) * np.sqrt(splits[split.ravel()])))
+    each = np.sqrt(splits)
+    return np.array([(a, *(b * split)) for a in own for b in common for split in each])
 
 
 def _finer(values: FloatArray, probability: FloatArray, count: int) -> FloatArray:
     """So many values between those that are not excluded."""
     seen = np.flatnonzero(probability > 1e-4)
     low, high = max(seen[0] - 1, 0), min(seen[-1] + 1, len(values) - 1)
-    if values[low] > 0:
-        return np.geomspace(values[low], values[high], count)
-    return np.concatenate(([0.0], np.geomspace(values[1], values[high], count - 1)))
+    zero = int(values[low] == 0)
+    return np.append(np.zeros(zero), np.geomspace(values[low + zero], values[high], count - zero))
 
 
 def tail(used: Sequence[Block], sizes: FloatArray, evenly: float) -> float:
     """Probability that errors of one of these sizes leave more than was read, at the likeliest of them."""
-    n = sum(len(block.e) for block in used)
     log, q = np.sum([block.at(sizes, evenly) for block in used], axis=0)
-    likely = q[-log - q > np.max(-log - q) - 3.0]
-    return chance(2 * likely.min(), 2 * n)
+    likely = q[log + q < np.min(log + q) + 3.0]
+    return chance(2 * likely.min(), 2 * sum(len(block.e) for block in used))
 
 
 def _posterior(each: Sequence[Block], sizes: FloatArray, evenly: float) -> FloatArray:

@@ -220,7 +220,7 @@ class Influence:
         sensors = range(len(self.sensors)) if sensors is None else sensors
         planes = list(range(len(self.planes)) if planes is None else planes)
         chosen = tuple(self.planes[p] for p in planes)
-        mounted = Mounted(self.mounted.run, chosen, self.mounted.weights[planes])
+        mounted = self.mounted._replace(planes=chosen, weights=self.mounted.weights[planes])
         noise = self.errors.noise.part(speeds, sensors, planes)
         return replace(
             self,
@@ -312,9 +312,9 @@ def local_runs(influence: Influence, trials: Trials) -> Trials:
                 f"a weight is mounted in plane {plane!r}, for which there are no influence coefficients; "
                 f"there are some for {', '.join(map(repr, influence.planes))}"
             )
+    nothing = np.zeros(len(trials.runs))
     speeds = match_speeds(influence.speeds, trials.speeds, "baseline readings")
     at = np.ix_(speeds, [trials.sensors.index(name) for name in influence.sensors])
-    nothing = np.zeros(len(trials.runs))
     arrays = {name: getattr(trials, name) for name in ("readings", "steps", "covariance")}
     return replace(
         trials,

@@ -104,8 +104,8 @@ class Trials:
         What the user should know about how the readings were understood.
     steps
         Steps in which the readings are written, of the amplitude (SI) and of the phase (rad): an instrument
-        that shows whole degrees rounds by up to half of one. Shape (2, K, R, S, C), or (2, R, S, C) for
-        K = 1, NaN where there is no reading; None where they are not rounded.
+        that shows whole degrees rounds by up to half of one. Shape (2, K, R, S, C), NaN where there is no
+        reading; None where they are not rounded.
     covariance
         Of real and imaginary part of each reading, as its instrument measured it: shape (2, 2, K, R, S, C),
         NaN where there is no reading; None: nothing measured it.
@@ -158,15 +158,12 @@ class Trials:
         arrays: dict[str, AnyArray] = {"readings": readings, "weights": weights}
         missing = np.isnan(readings)
         for name, axes in (("steps", (2,)), ("covariance", (2, 2))):
-            given = getattr(self, name)
-            if given is None:
+            if getattr(self, name) is None:
                 continue
-            array = np.array(given, dtype=np.float64)
-            if array.ndim == len(axes) + 3:
-                array = np.expand_dims(array, len(axes))
-            if array.shape != (*axes, *readings.shape) or not (missing | np.isfinite(array)).all():
-                shape = (*axes, *readings.shape)
-                raise ValueError(f"{name} must be finite, of shape {shape}, or None; got {array.shape}")
+            array, shape = np.array(getattr(self, name), dtype=np.float64), (*axes, *readings.shape)
+            wrong = ~np.isfinite(array) | ((array < 0) & (name == "steps"))
+            if array.shape != shape or (wrong & ~missing).any():
+                raise ValueError(f"{name} must be finite, of shape {shape}, steps ≥ 0; got {array.shape}")
             array[..., missing] = np.nan
             arrays[name] = array
         keep(self, **arrays)
