@@ -41,7 +41,7 @@ from balancing.influence import (
     local_runs,
     match_speeds,
 )
-from balancing.noise import Errors, Gaussian, Mounted, Whitening, kind_sizes, run_noise
+from balancing.noise import Gaussian, Mounted, Whitening, kind_sizes, run_noise
 from balancing.regions import real_parts
 from balancing.trials import Trials
 from rotorid.base.arrays import FloatArray
@@ -152,14 +152,8 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
     at = np.arange(2, 2 * P + 2)
     std = np.broadcast_to(far, (S, C))[..., None] * np.abs(influence.W)
     independent[..., at, at] = np.repeat(std**2, 2, axis=-1)
-    errors = Gaussian(
-        independent,
-        np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1),
-        influence.reading,
-        influence.run_errors,
-        influence.mounted,
-    )
-    return replace(influence, errors=errors)
+    common = np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1)
+    return replace(influence, errors=Gaussian(independent, common, *influence.errors[1:4]))
 
 
 def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -> FloatArray:
@@ -281,7 +275,6 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     if lacking:
         raise ValueError(f"there are no computed coefficients of sensor {', '.join(map(repr, lacking))}")
     computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
-    speeds, sensors = measured.speeds, measured.sensors
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
     sides = []
     for side in (measured, computed):
@@ -302,25 +295,18 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     # each two degrees of freedom, and so many chances
     if both.sum() * W[..., 0].size * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
         warnings += (
-            f"measured and computed coefficient of plane {planes[p]!r} at sensor {sensors[c]!r}, "
-            f"{rpm_text(speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: the "
-            "model, the trial runs or the stated errors are wrong",
+            f"measured and computed coefficient of plane {planes[p]!r} at sensor {measured.sensors[c]!r}, "
+            f"{rpm_text(measured.speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: "
+            "the model, the trial runs or the stated errors are wrong",
         )
-    last = dict(zip(measured.planes, measured.mounted.weights, strict=True))
-    mounted = np.array([last.get(plane, 0.0) for plane in planes], dtype=complex)
-    return Influence(
-        speeds,
-        sensors,
-        planes,
-        W * share + model * (1 - share),
-        measured.baseline,
-        Errors(
-            one.changed(shares).plus(other.changed(np.eye(len(planes) + 1) - shares)),
-            measured.reading,
-            measured.run_errors,
-            Mounted(measured.mounted.run, planes, mounted),
-            measured.trials,
-        ),
-        measured.labels,
-        measured.remarks._replace(warnings=warnings),
+    by_plane = dict(zip(measured.planes, measured.mounted.weights, strict=True))
+    mounted = np.array([by_plane.get(plane, 0.0) for plane in planes], dtype=complex)
+    noise = one.changed(shares).plus(other.changed(np.eye(len(planes) + 1) - shares))
+    last = measured.mounted._replace(planes=planes, weights=mounted)
+    return replace(
+        measured,
+        planes=planes,
+        W=W * share + model * (1 - share),
+        errors=measured.errors._replace(noise=noise, mounted=last),
+        remarks=measured.remarks._replace(warnings=warnings),
     )

@@ -122,11 +122,9 @@ def convention_test(trials: Trials) -> ConventionTest:
         return float(np.sum(np.abs(y - K @ (gain(K) @ y)) ** 2))
 
     stated, other = left(A), left(A.conj())
-    verdict: ConventionVerdict = "not told"
+    verdict: ConventionVerdict = "confirmed" if _refuted(other, stated, dof) else "not told"
     if _refuted(stated, other, dof):
         verdict = "contradicted"
-    elif _refuted(other, stated, dof):
-        verdict = "confirmed"
     return ConventionTest(verdict, stated, other, dof)
 
 

@@ -272,14 +272,14 @@ def white_rows(
     """
     reading, run = reading_of(trials), usual_run_errors(trials)
     (S, C), X = W.shape[:2], len(take)
-    noise, sizes = run_noise(trials, W, take.astype(complex), reading, run), kind_sizes(run)
+    noise = run_noise(trials, W, take.astype(complex), reading, run)
     noise.own[READING] += np.kron(take @ take.T, np.eye(2)) * least**2
-    whitening = Whitening(noise, sizes)
+    whitening = Whitening(noise, kind_sizes(run))
 
     def white(vectors: FloatArray) -> FloatArray:
         parts = vectors.reshape(S, X, C, 2, -1).swapaxes(1, 2)
         return whitening.white(parts.reshape(S, C, 2 * X, -1))
 
-    alone = np.einsum("scii->sci", noise.at(sizes)[0])
+    alone = np.einsum("scii->sci", whitening.own)
     variance = alone.reshape(S, C, X, 2).swapaxes(1, 2).reshape(S, -1)
     return white, variance, "assumed" not in (reading.source, run.origin)

@@ -16,13 +16,8 @@ from rotorid.base.result import Column, rows
 from rotorid.base.rpm import RPM, rpm
 from rotorid.base.text import figures
 
-ROUNDING = 1e-12
-"""Predicted amplitudes below this share of the largest one before are rounding."""
-SMALL = 5e-4
-"""Share of a reading that is not worth a word."""
 INVISIBLE = 1e-9
 """Those below this share are zero to a reader."""
-_LARGEST = 3
 
 
 def degrees(angle: float, places: int = 1) -> str:
@@ -75,10 +70,10 @@ def largest_readings(
     """
     old, new = (labels.vibration(readings)[0] for readings in (before, after))
     reach = np.full(old.shape, np.nan) if within is None else within
-    size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
+    size = new if new.max() > 1e-12 * old.max() else np.nan_to_num(reach)
     share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
     words = []
-    for place in np.argsort(-share, axis=None, kind="stable")[:_LARGEST]:
+    for place in np.argsort(-share, axis=None, kind="stable")[:3]:
         s, c = divmod(int(place), len(sensors))
         width = "" if np.isnan(reach[s, c]) else f" (± {figures(reach[s, c], 2)})"
         left = f"{three_figures(old[s, c])} → {small(new[s, c], old.max())}{width}"
@@ -130,17 +125,6 @@ def reading_names(labels: Labels, sensors: Sequence[str], speeds: FloatArray) ->
     return tuple(f"sensor {c!r} at {labels.speed_words(s)}" for s in speeds for c in sensors)
 
 
-_SOURCES = {
-    "stated": "as stated in the job",
-    "measured": "root mean square of those that the instrument measured",
-    "repeats": "from repeated readings",
-    "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
-    "residuals": "from the disagreement of the runs, with what changes between runs",
-    "assumed": "assumed: nothing states or measures them",
-    "unknown": "of stored or computed coefficients",
-}
-
-
 def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     """Errors of a reading and between runs in one or two sentences."""
     e = reading.errors
@@ -150,10 +134,10 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
         parts[f"{np.degrees(e.phase):.3g}°"] = e.phase
         parts[labels.amplitude_words(e.floor)] = e.floor
     known = ", ".join(words for words, size in parts.items() if size) or "not known"
-    out = f"One standard deviation of a reading: {known} ({_SOURCES[reading.source]})"
+    out = f"One standard deviation of a reading: {known} ({reading.source})"
     what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
     sizes = zip(run.typical, what, strict=True)
-    between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > SMALL)
+    between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > 5e-4)
     out += f"; from run to run: {between} ({run.origin})" if between else ""
     return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
 
