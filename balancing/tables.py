@@ -16,6 +16,8 @@ from rotorid.base.result import Column, rows
 from rotorid.base.rpm import RPM, rpm
 from rotorid.base.text import figures
 
+ROUNDING = 1e-12
+"""Predicted amplitudes below this share of the largest one before are rounding."""
 INVISIBLE = 1e-9
 """Those below this share are zero to a reader."""
 
@@ -70,7 +72,7 @@ def largest_readings(
     """
     old, new = (labels.vibration(readings)[0] for readings in (before, after))
     reach = np.full(old.shape, np.nan) if within is None else within
-    size = new if new.max() > 1e-12 * old.max() else np.nan_to_num(reach)
+    size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
     share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
     words = []
     for place in np.argsort(-share, axis=None, kind="stable")[:3]:
