@@ -41,13 +41,13 @@ from balancing.influence import (
     local_runs,
     match_speeds,
 )
-from balancing.noise import Gaussian, Mounted, Whitening, kind_sizes, run_noise
+from balancing.noise import Gaussian, Mounted, kind_sizes, run_noise
 from balancing.regions import real_parts
 from balancing.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import rpm_text
 from rotorid.base.words import Quantity as Quantity
-from rotorid.regression import covariance_root, solution, stretch, unstretch
+from rotorid.regression import covariance_root, unstretch
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
@@ -200,26 +200,32 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     with suppress(UndeterminedError):  # as runs that tell more than the coefficients show them
         _, reading, run, *_ = estimate_influence(runs).errors
     noise = run_noise(runs, expected.W, np.eye(R, dtype=complex), reading, run)
-    whitening = Whitening(noise, kind_sizes(run))
-    white = whitening.white
-    columns, N, ones = expected.columns(), 2 * S * C, np.ones((R, 1))
-    m = len(columns)
-    bare = stretch(np.kron(np.eye(S * C), ones).astype(complex)).reshape(S, C, 2 * R, N)
-    shift = np.moveaxis(real_parts(columns @ np.column_stack((ones, runs.weights)).T), 0, -1)
+    own, shared = noise.at(kind_sizes(run))  # (S, C, 2R, 2R)
+    own += 1e-12 * (np.trace(own, axis1=-2, axis2=-1).max() or 1.0) * np.eye(2 * R)
+    columns = expected.columns()
+    unknown = np.concatenate((columns @ np.column_stack((np.ones(R), runs.weights)).T, shared))
+    root = np.linalg.cholesky(own)
+    K = np.linalg.solve(root, np.moveaxis(real_parts(unknown), 0, -1)).reshape(S * C, 2 * R, -1)
+    free = np.linalg.solve(root, np.tile(np.eye(2), (R, 1))[None, None]).reshape(S * C, 2 * R, 2)
     difference = np.moveaxis(runs.mean, 0, -1) - expected.W @ runs.weights.T
-    A = np.vstack((np.hstack((white(bare), white(shift))), np.eye(N + m)[N:]))
-    y = np.append(white(real_parts(difference)[..., None]), np.zeros(m))
-    values = solution(A, y)
-    joint = np.asarray(np.linalg.pinv(A.T @ A, hermitian=True), dtype=np.float64)
-    variance = np.diag(joint).copy()
-    moved = np.tensordot(values[N:], columns, 1)
+    y = np.linalg.solve(root, real_parts(difference)[..., None]).reshape(-1, 2 * R)
+    N, M, m = 2 * S * C, len(unknown), len(columns)
+    A = np.zeros((S * C, 2 * R, N + M))
+    for k in range(S * C):
+        A[k, :, 2 * k : 2 * k + 2] = free[k]
+    A[..., N:] = K
+    rows = np.vstack((A.reshape(-1, N + M), np.eye(N + M)[N:]))
+    right = np.append(y, np.zeros(M))
+    values, *_ = np.linalg.lstsq(rows, right, rcond=None)
+    covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
+    moved = np.tensordot(values[N : N + m], columns, 1)
     # what a channel's readings tell of its Y₀ alone, all else given, is its own; the rest is in common
     alone = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    pairs = np.tile(np.eye(2), (R, 1))
-    alone[..., :2, :2] = np.linalg.inv(pairs.T @ np.linalg.solve(whitening.own, pairs))
+    alone[..., :2, :2] = np.linalg.inv(np.einsum("kij,kil->kjl", free, free)).reshape(S, C, 2, 2)
+    joint = covariance[: N + m, : N + m].copy()
     for k, block in enumerate(alone[..., :2, :2].reshape(-1, 2, 2)):
         joint[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] -= block
-    factors = covariance_root(joint, variance).T
+    factors = covariance_root(joint, np.diag(covariance)[: N + m]).T
     common = np.tensordot(factors[:, N:], columns, 1)
     common[..., 0] += unstretch(factors[:, :N]).reshape(-1, S, C)
     mounted = Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
@@ -227,13 +233,13 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     result = replace(
         expected,
         W=expected.W + moved[..., 1:],
-        baseline=unstretch(values[:N]).reshape(S, C) + moved[..., 0],
+        baseline=(values[:N:2] + 1j * values[1:N:2]).reshape(S, C) + moved[..., 0],
         errors=Gaussian(alone, common, reading, run, mounted),
         labels=trials.labels,
         remarks=Remarks(tuple(warnings)),
     )
     spare = N * (R - 1)
-    return result, chance(float(np.sum((A @ values - y) ** 2)), spare) if spare else 1.0
+    return result, chance(float(np.sum((rows @ values - right) ** 2)), spare) if spare else 1.0
 
 
 def combine(measured: Influence, computed: Influence) -> Influence:
