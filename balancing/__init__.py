@@ -16,11 +16,12 @@ from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.holes import Holes, equal_holes, from_list
-from balancing.influence import Gaussian, Influence, change_of_run, estimate_influence, white_rows
+from balancing.influence import Influence, change_of_run, estimate_influence
 from balancing.iso21940 import Tolerance, tolerance
 from balancing.machine_type import MachineRecord, MachineType, fit_type
 from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
+from balancing.noise import Gaussian, white_rows
 from balancing.pieces import Discrete, solve_discrete
 from balancing.planes import Subsets, best_subsets, compare_planes
 from balancing.regions import Region

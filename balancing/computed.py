@@ -23,39 +23,34 @@ errs by; the baseline is the measured one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, chance
 from balancing.conventions import Labels
-from balancing.errors import Reading, RunErrors, mean_variance, reading_of, usual_run_errors
+from balancing.errors import reading_of, usual_run_errors
 from balancing.influence import (
-    SPEED_TOLERANCE,
-    Errors,
-    Gaussian,
     Influence,
-    Mounted,
-    Noise,
     Remarks,
     estimate_influence,
     local_runs,
-    run_noise,
+    match_speeds,
 )
+from balancing.noise import Gaussian, Mounted, kind_sizes, run_noise
 from balancing.regions import real_parts
 from balancing.trials import Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import rpm_text
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.words import Quantity as Quantity
 from rotorid.regression import covariance_root, unstretch
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
-
-Quantity = Literal["displacement", "velocity", "acceleration"]
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LEVEL = 0.99
@@ -112,12 +107,6 @@ def model_influence(  # noqa: PLR0913
     """
     from fem import influence
 
-    if not (np.isfinite(relative_error) and relative_error >= 0):
-        raise ValueError(f"the relative error of the model must be a finite number ≥ 0, not {relative_error}")
-    if quantity not in DERIVATIVES:
-        raise ValueError(f"quantity must be one of {', '.join(DERIVATIVES)}, not {quantity!r}")
-    if not np.isfinite(key_phasor):
-        raise ValueError(f"the angle of the key phasor must be finite, not {key_phasor}")
     model = influence(rotor, list(planes.values()), list(sensors.values()), speeds)
     W = np.asarray(model.W) * np.exp(1j * np.radians(key_phasor))
     W = W * ((1j * model.speeds) ** DERIVATIVES[quantity])[:, None, None] * _radii(planes, radii)
@@ -163,31 +152,19 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
     at = np.arange(2, 2 * P + 2)
     std = np.broadcast_to(far, (S, C))[..., None] * np.abs(influence.W)
     independent[..., at, at] = np.repeat(std**2, 2, axis=-1)
-    errors = Gaussian(
-        independent,
-        np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1),
-        influence.reading,
-        influence.run_errors,
-        influence.mounted,
-    )
-    return replace(influence, errors=errors)
+    common = np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1)
+    return replace(influence, errors=Gaussian(independent, common, *influence.errors[1:4]))
 
 
 def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -> FloatArray:
     if radii is None:
         return np.ones(len(planes))
-    unknown = [name for name in radii if name not in planes]
-    lacking = [name for name in planes if name not in radii]
-    if unknown or lacking:
-        hint = did_you_mean(unknown[0], lacking) if len(unknown) == 1 else ""
+    out = np.array([radii.get(name, np.nan) for name in planes])
+    if set(radii) != set(planes) or not (np.isfinite(out) & (out > 0)).all():
         raise ValueError(
-            f"give the radius of every plane and of no other one: "
-            f"{'there is no plane' if unknown else 'lacking is that of'} "
-            f"{', '.join(map(repr, unknown or lacking))}{hint}"
+            f"give the radius of every plane ({', '.join(planes)}) and of no other one, a finite number > 0 m"
+            f"; got {dict(radii)}"
         )
-    out = np.array([radii[name] for name in planes], dtype=np.float64)
-    if not (np.isfinite(out) & (out > 0)).all():
-        raise ValueError(f"the radius of a plane must be a finite number > 0 m; got {out.tolist()}")
     return out
 
 
@@ -219,21 +196,20 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     """
     runs = local_runs(expected, trials)
     R, (S, C, P) = len(runs.runs), expected.W.shape
-    reading, run = _shown(runs)
-    unit = np.broadcast_to(np.eye(R, dtype=complex), (S, C, R, R))
-    noise = run_noise(runs, expected.W, unit, reading, run)
-    sizes = np.array([1.0, *run.typical, 1.0])
-    own = np.tensordot(sizes[:2] ** 2, noise.own, axes=1)  # (S, C, 2R, 2R)
+    reading, run = reading_of(runs), usual_run_errors(runs)
+    with suppress(UndeterminedError):  # as runs that tell more than the coefficients show them
+        _, reading, run, *_ = estimate_influence(runs).errors
+    noise = run_noise(runs, expected.W, np.eye(R, dtype=complex), reading, run)
+    own, shared = noise.at(kind_sizes(run))  # (S, C, 2R, 2R)
     own += 1e-12 * (np.trace(own, axis1=-2, axis2=-1).max() or 1.0) * np.eye(2 * R)
-    change = np.column_stack((np.ones(R), runs.weights))
     columns = expected.columns()
-    unknown = np.concatenate((columns @ change.T, noise.columns * sizes[noise.kind][:, None, None, None]))
+    unknown = np.concatenate((columns @ np.column_stack((np.ones(R), runs.weights)).T, shared))
     root = np.linalg.cholesky(own)
     K = np.linalg.solve(root, np.moveaxis(real_parts(unknown), 0, -1)).reshape(S * C, 2 * R, -1)
     free = np.linalg.solve(root, np.tile(np.eye(2), (R, 1))[None, None]).reshape(S * C, 2 * R, 2)
     difference = np.moveaxis(runs.mean, 0, -1) - expected.W @ runs.weights.T
     y = np.linalg.solve(root, real_parts(difference)[..., None]).reshape(-1, 2 * R)
-    N, M = 2 * S * C, len(unknown)
+    N, M, m = 2 * S * C, len(unknown), len(columns)
     A = np.zeros((S * C, 2 * R, N + M))
     for k in range(S * C):
         A[k, :, 2 * k : 2 * k + 2] = free[k]
@@ -242,9 +218,7 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     right = np.append(y, np.zeros(M))
     values, *_ = np.linalg.lstsq(rows, right, rcond=None)
     covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
-    m = len(columns)
     moved = np.tensordot(values[N : N + m], columns, 1)
-    baseline = (values[:N:2] + 1j * values[1:N:2]).reshape(S, C) + moved[..., 0]
     # what a channel's readings tell of its Y₀ alone, all else given, is its own; the rest is in common
     alone = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
     alone[..., :2, :2] = np.linalg.inv(np.einsum("kij,kil->kjl", free, free)).reshape(S, C, 2, 2)
@@ -252,31 +226,20 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     for k, block in enumerate(alone[..., :2, :2].reshape(-1, 2, 2)):
         joint[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] -= block
     factors = covariance_root(joint, np.diag(covariance)[: N + m]).T
-    Y = unstretch(factors[:, :N]).reshape(-1, S, C, 1)
-    both = np.tensordot(factors[:, N:], columns, 1)
-    both[..., :1] += Y
+    common = np.tensordot(factors[:, N:], columns, 1)
+    common[..., 0] += unstretch(factors[:, :N]).reshape(-1, S, C)
     mounted = Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
-    spare = len(right) - N - M - (N + M - np.linalg.matrix_rank(rows))
-    left = float(np.sum((rows @ values - right) ** 2))
     warnings = dict.fromkeys((*expected.remarks.warnings, *trials.warnings, *reading.warnings))
     result = replace(
         expected,
         W=expected.W + moved[..., 1:],
-        baseline=baseline,
-        errors=Gaussian(alone, both, reading, run, mounted),
+        baseline=(values[:N:2] + 1j * values[1:N:2]).reshape(S, C) + moved[..., 0],
+        errors=Gaussian(alone, common, reading, run, mounted),
         labels=trials.labels,
         remarks=Remarks(tuple(warnings)),
     )
-    return result, chance(left, spare) if spare > 0 else 1.0
-
-
-def _shown(runs: Trials) -> tuple[Reading, RunErrors]:
-    """Errors of readings and between runs: as runs that tell more than the coefficients show them."""
-    try:
-        measured = estimate_influence(runs)
-    except UndeterminedError:
-        return reading_of(runs), usual_run_errors(runs)
-    return measured.reading, measured.run_errors
+    spare = N * (R - 1)
+    return result, chance(float(np.sum((rows @ values - right) ** 2)), spare) if spare else 1.0
 
 
 def combine(measured: Influence, computed: Influence) -> Influence:
@@ -288,156 +251,68 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         Coefficients with errors, from `estimate_influence`, or stored ones.
     computed
         Of the same kind (per mass or per unbalance) with errors, from `model_influence` with a
-        `relative_error`. Speeds within 0.5 % of a measured one count as that.
+        `relative_error`; at every speed (within 0.5 %) and sensor of the measurement.
 
     Returns
     -------
     Influence
-        At all speeds, sensors and planes of either; coefficients that only one of them has are taken from it.
-        Baseline, errors of further readings, labels and what is mounted are those of the measurement; the
-        baseline is NaN where nothing was measured. Contradictions are warnings.
+        At the speeds and sensors of the measurement and the planes of either; the coefficients of a plane
+        that only one of them has are taken from it. Baseline, errors of further readings, labels and what is
+        mounted are those of the measurement. Contradictions are warnings.
 
     Raises
     ------
     ValueError
-        If one side has no errors, both are not of the same kind, or a coefficient is on neither side.
+        If one side has no errors, both are not of the same kind, or a speed or sensor is not computed.
     """
-    for side, words in (
-        (measured, "measured coefficients are not known: state the errors of a reading, or repeat readings"),
-        (computed, "computed coefficients are not known: state the relative error of the model"),
-    ):
-        if not side.known_errors:
-            raise ValueError(f"coefficients can be combined only by their errors, and those of the {words}")
-    _check_kinds(measured, computed)
-    speeds, *places = _speeds(measured, computed)
-    sensors = tuple(dict.fromkeys((*measured.sensors, *computed.sensors)))
+    if not (measured.known_errors and computed.known_errors):
+        raise ValueError(
+            "coefficients are combined by their errors: state those of a reading, or repeat readings, and "
+            "state the relative error of the model"
+        )
+    if measured.labels.unbalances != computed.labels.unbalances:
+        raise ValueError(
+            f"measured coefficients per {measured.labels.weight_unit} and computed ones per "
+            f"{computed.labels.weight_unit}: compute them with the radii of the planes, per mass, or "
+            "without, per unbalance"
+        )
+    at = match_speeds(measured.speeds, computed.speeds, "computed coefficients")
+    lacking = [name for name in measured.sensors if name not in computed.sensors]
+    if lacking:
+        raise ValueError(f"there are no computed coefficients of sensor {', '.join(map(repr, lacking))}")
+    computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
-    first, second = (
-        _spread(side, at, sensors, planes) for side, at in zip((measured, computed), places, strict=True)
-    )
-    lacking = np.argwhere(np.isnan(first.W) & np.isnan(second.W))
-    if len(lacking):
-        s, c, p = lacking[0]
-        raise ValueError(
-            f"there is neither a measured nor a computed coefficient of plane {planes[p]!r} at sensor "
-            f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
-        )
-    both = ~(np.isnan(first.W) | np.isnan(second.W))
-    sum_ = first.variance + second.variance
-    share = np.where(np.isnan(second.W), 1.0, 0.0)
-    share[both] = np.where(
-        sum_[both] > 0, second.variance[both] / np.where(sum_[both] > 0, sum_[both], 1), 0.5
-    )
-    W = np.nan_to_num(first.W) * share + np.nan_to_num(second.W) * (1 - share)
-    one = np.ones((*share.shape[:2], 1))
-    noises = (
-        side.noise.scaled(np.concatenate(parts, axis=-1))
-        for side, parts in ((first, (one, share)), (second, (0 * one, 1 - share)))
-    )
-    one_side, other = noises
-    noise = Noise(
-        one_side.own + other.own,
-        np.concatenate((one_side.columns, other.columns)),
-        np.concatenate((one_side.kind, other.kind)),
-    )
-    by_name = dict(zip(measured.planes, measured.mounted.weights, strict=True))
-    mounted = np.array([by_name.get(plane, 0.0) for plane in planes], dtype=complex)
-    errors = Errors(
-        noise,
-        measured.reading,
-        measured.run_errors,
-        Mounted(measured.mounted.run, planes, mounted),
-        measured.trials,
-    )
-    chi = np.where(both, np.abs(np.nan_to_num(first.W - second.W)) ** 2 / np.where(sum_ > 0, sum_, np.inf), 0)
-    remarks = Remarks(
-        (
-            *measured.remarks.warnings,
-            *computed.remarks.warnings,
-            *_contradictions(chi, int(both.sum()), planes, sensors, speeds),
-        ),
-        measured.remarks.notes,
-        measured.remarks.contradictions,
-    )
-    return Influence(speeds, sensors, planes, W, first.baseline, errors, measured.labels, remarks)
-
-
-class _Side(NamedTuple):
-    """One side at the speeds, sensors and planes of both: NaN where it has nothing."""
-
-    W: ComplexArray
-    baseline: ComplexArray
-    variance: FloatArray
-    noise: Noise
-
-
-def _spread(
-    side: Influence, at: Sequence[int | None], sensors: Sequence[str], planes: Sequence[str]
-) -> _Side:
-    """Put the coefficients of a side in their places among those of both."""
-    S, C, P = len(at), len(sensors), len(planes)
-    rows = [s for s, i in enumerate(at) if i is not None]
-    source = [i for i in at if i is not None]
-    columns = [sensors.index(name) for name in side.sensors]
-    chosen = [planes.index(name) for name in side.planes]
-    part = side.part(source)
-    W = np.full((S, C, P), np.nan, dtype=complex)
-    W[np.ix_(rows, columns, chosen)] = part.W
-    baseline = np.full((S, C), np.nan, dtype=complex)
-    baseline[np.ix_(rows, columns)] = part.baseline
-    variance = np.zeros((S, C, P))
-    blocks = part.channels()[..., 2:, 2:]
-    n = len(chosen)
-    each = np.einsum("scpipj->scpij", blocks.reshape(*blocks.shape[:2], n, 2, n, 2))
-    variance[np.ix_(rows, columns, chosen)] = mean_variance(each)
-    return _Side(W, baseline, variance, part.errors.noise.spread((S, C, P), rows, columns, chosen))
-
-
-def _contradictions(
-    chi: FloatArray, n: int, planes: Sequence[str], sensors: Sequence[str], speeds: FloatArray
-) -> tuple[str, ...]:
-    """χ² (S, C, P) of differences, two degrees of freedom each, that n chances do not explain."""
+    sides = []
+    for side in (measured, computed):
+        change = np.zeros((len(planes) + 1, len(side.planes) + 1), dtype=complex)
+        change[[0, *(1 + planes.index(name) for name in side.planes)], range(len(side.planes) + 1)] = 1
+        noise = side.errors.noise.changed(change)
+        parts = np.einsum("scii->sci", noise.covariance(side.errors.sizes))[..., 2:]
+        variance = parts.reshape(*parts.shape[:2], -1, 2).mean(axis=-1)
+        sides.append((side.W @ change[1:, 1:].T, noise, variance, change[1:, 1:].any(axis=1)))
+    (W, one, v, first), (model, other, u, second) = sides
+    both, total = first & second, np.maximum(v + u, 1e-300)
+    share = np.where(both, u / total, first)
+    whole = np.concatenate((np.ones((*share.shape[:2], 1)), share), axis=-1)
+    shares = whole[..., None] * np.eye(len(planes) + 1, dtype=complex)
+    chi = both * np.abs(W - model) ** 2 / total
+    warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))
-    if n * chance(float(chi[s, c, p]), 2) >= 1 - LEVEL:
-        return ()
-    return (
-        f"measured and computed coefficient of plane {planes[p]!r} at sensor {sensors[c]!r}, "
-        f"{rpm_text(speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: the model, "
-        "the trial runs or the stated errors are wrong",
-    )
-
-
-def _check_kinds(measured: Influence, computed: Influence) -> None:
-    kinds = ["unbalance" if "_" in side.labels.weight_unit else "mass" for side in (measured, computed)]
-    if kinds[0] != kinds[1]:
-        units = measured.labels.weight_unit, computed.labels.weight_unit
-        remedy = "give the radii of the planes, to compute them per mass"
-        if kinds[0] == "unbalance":
-            remedy = "compute them per unbalance, without radii"
-        raise ValueError(
-            f"the measured coefficients are per {kinds[0]} ({units[0]}) and the computed ones per {kinds[1]} "
-            f"({units[1]}): {remedy}"
+    # each two degrees of freedom, and so many chances
+    if both.sum() * W[..., 0].size * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
+        warnings += (
+            f"measured and computed coefficient of plane {planes[p]!r} at sensor {measured.sensors[c]!r}, "
+            f"{rpm_text(measured.speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: "
+            "the model, the trial runs or the stated errors are wrong",
         )
-
-
-def _speeds(
-    measured: Influence, computed: Influence
-) -> tuple[FloatArray, list[int | None], list[int | None]]:
-    """All speeds, ascending, and where each stands on either side (None: nowhere)."""
-    pairs: dict[int, int] = {}
-    for j, speed in enumerate(computed.speeds):
-        i = int(np.argmin(np.abs(measured.speeds - speed)))
-        if abs(measured.speeds[i] - speed) <= SPEED_TOLERANCE * measured.speeds[i]:
-            if i in pairs:
-                two = f"{rpm_text(computed.speeds[pairs[i]])} and {rpm_text(speed)}"
-                raise ValueError(
-                    f"two computed speeds, {two}, fit the measured {rpm_text(measured.speeds[i])}: "
-                    "leave one out"
-                )
-            pairs[i] = j
-    rows: list[tuple[float, int | None, int | None]] = [
-        (float(speed), i, pairs.get(i)) for i, speed in enumerate(measured.speeds)
-    ]
-    rows += [(float(speed), None, j) for j, speed in enumerate(computed.speeds) if j not in pairs.values()]
-    rows.sort(key=lambda row: row[0])
-    return np.array([r[0] for r in rows]), [r[1] for r in rows], [r[2] for r in rows]
+    by_plane = dict(zip(measured.planes, measured.mounted.weights, strict=True))
+    mounted = np.array([by_plane.get(plane, 0.0) for plane in planes], dtype=complex)
+    noise = one.changed(shares).plus(other.changed(np.eye(len(planes) + 1) - shares))
+    last = measured.mounted._replace(planes=planes, weights=mounted)
+    return replace(
+        measured,
+        planes=planes,
+        W=W * share + model * (1 - share),
+        errors=measured.errors._replace(noise=noise, mounted=last),
+        remarks=measured.remarks._replace(warnings=warnings),
+    )

@@ -19,7 +19,7 @@ from balancing.conditioning import chance
 from balancing.conventions import Labels
 from balancing.errors import mean_variance, reading_of
 from balancing.trials import Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray
 from rotorid.regression import gain
 
 ConventionVerdict = Literal["confirmed", "contradicted", "not told", "no redundant run", "weights in line"]
@@ -35,6 +35,9 @@ _WHY = {
         "The runs cannot tell: the weights of each plane stand on one line through the shaft; one run with a "
         "weight at another angle would decide."
     ),
+    "confirmed": "The runs themselves confirm ",
+    "contradicted": "The runs contradict ",
+    "not told": "The runs cannot tell from its opposite ",
 }
 
 
@@ -55,22 +58,14 @@ class ConventionTest:
     chi_square_other: float | None = None
     degrees_of_freedom: int | None = None
 
-    @property
-    def other_fits(self) -> bool:
-        """Whether the errors explain what the other reading leaves."""
-        other, dof = self.chi_square_other, self.degrees_of_freedom
-        return other is not None and dof is not None and chance(other, dof) > FITS
-
     def contradiction(self, labels: Labels) -> tuple[str, ...]:
         """The warning where the runs contradict their conventions, stated or assumed."""
         if self.verdict != "contradicted":
             return ()
-        stated, other = _names(labels)
-        fits = "fits" if self.other_fits else "is far nearer"
+        than = "is assumed" if labels.assumed else "the job says"
         return (
-            f"these runs contradict {stated!r}: χ² {self.chi_square:.3g} of {self.degrees_of_freedom}; "
-            f"{other!r} {fits}: {self.chi_square_other:.3g}. Phases or angles count the other way than "
-            f"{'is assumed' if labels.assumed else 'the job says'}, and the weights would go to wrong places",
+            f"these runs contradict {_compared(self, labels)}. Phases or angles count the other way than "
+            f"{than}, and the weights would go to wrong places",
         )
 
 
@@ -121,24 +116,21 @@ def convention_test(trials: Trials) -> ConventionTest:
     # a reading near zero would otherwise count infinitely much
     root = 1 / np.sqrt(np.maximum(variance, 1e-4 * variance.max(axis=1, keepdims=True)))
     dof = 2 * (R - rank) * len(Y)
-    stated, other = (_residual(B, Y, root) for B in (A, A.conj()))
-    verdict: ConventionVerdict = "not told"
+
+    def left(B: ComplexArray) -> float:
+        K, y = root[..., None] * B, (root * Y)[..., None]
+        return float(np.sum(np.abs(y - K @ (gain(K) @ y)) ** 2))
+
+    stated, other = left(A), left(A.conj())
+    verdict: ConventionVerdict = "confirmed" if _refuted(other, stated, dof) else "not told"
     if _refuted(stated, other, dof):
         verdict = "contradicted"
-    elif _refuted(other, stated, dof):
-        verdict = "confirmed"
     return ConventionTest(verdict, stated, other, dof)
 
 
-def _residual(A: ComplexArray, Y: ComplexArray, root: FloatArray) -> float:
-    """Weighted sum of squared residuals of all channels, Y and root of shape (N, R)."""
-    K, y = root[..., None] * A, (root * Y)[..., None]
-    return float(np.sum(np.abs(y - K @ (gain(K) @ y)) ** 2))
-
-
-def _refuted(own: float, other: float, dof: int) -> bool:
-    clearly = chance(own, dof) < UNLIKELY and chance(other, dof) > FITS and own > 2 * other
-    ratio = own / max(other, _SAME * dof)
+def _refuted(one: float, other: float, dof: int) -> bool:
+    clearly = chance(one, dof) < UNLIKELY and chance(other, dof) > FITS and one > 2 * other
+    ratio = one / max(other, _SAME * dof)
     return clearly or bool(ratio > FAR and chance(ratio * dof, dof, dof) < UNLIKELY)
 
 
@@ -150,28 +142,20 @@ def assumptions(
         return ()
     words = [labels.assumed_in_words()]
     if test is not None:
-        words.append(_answered(test, labels))
+        words.append(_WHY[test.verdict])
+        if test.chi_square is not None:
+            words[-1] += f"{_compared(test, labels)}."
     words += [f"If it is {o.words}, the weights go to the angles under “if {o.words}”." for o in others]
-    if len(labels.assumed) == 2 and len(others) == 1:
-        turned = labels.otherwise(labels.assumed)
-        words.append(f"With {turned.phase} and {turned.angles} together the angles stay as they are.")
     return tuple(words)
 
 
-def _answered(test: ConventionTest, labels: Labels) -> str:
-    if test.chi_square is None:
-        return _WHY[test.verdict]
-    stated, other = _names(labels)
-    sums = f"χ² {test.chi_square:.3g} of {test.degrees_of_freedom}; {other!r}: {test.chi_square_other:.3g}"
+def _compared(test: ConventionTest, labels: Labels) -> str:
+    """Both readings of the runs: how angles count where that alone is assumed, else phases."""
+    angles = labels.assumed == ("angles",)
+    turned = labels.otherwise(("angles",) if angles else ("phase",))
+    stated, other = (each.angles if angles else each.phase for each in (labels, turned))
     both = f" for angles {labels.angle_words}" if len(labels.assumed) == 2 else ""
-    return {
-        "confirmed": f"The runs themselves confirm {stated!r}{both}: {sums}.",
-        "contradicted": f"The runs contradict it: {sums}.",
-        "not told": f"The runs fit both, and cannot tell: {sums}.",
-    }[test.verdict]
-
-
-def _names(labels: Labels) -> tuple[str, str]:
-    """The tested convention and its opposite: how angles count where that alone is assumed, else phases."""
-    other = labels.otherwise(labels.assumed if labels.assumed == ("angles",) else ("phase",))
-    return (labels.angles, other.angles) if labels.assumed == ("angles",) else (labels.phase, other.phase)
+    return (
+        f"{stated!r}{both}: χ² {test.chi_square:.3g} of {test.degrees_of_freedom}; {other!r}: "
+        f"{test.chi_square_other:.3g}"
+    )

@@ -57,7 +57,7 @@ class Labels:
     Raises
     ------
     ValueError
-        If `phase`, `angles`, `rotation` or `view` is none of its words, and where `clock` is set or `view` is
+        If `phase` or `angles` is none of its words, and where `clock` is set or `view` is
         given without `rotation`.
     """
 
@@ -74,11 +74,22 @@ class Labels:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.phase not in PHASES:
-            raise ValueError(f"phase must be 'lead' or 'lag', not {self.phase!r}")
-        if self.angles not in ANGLES:
-            raise ValueError(f"angles must be 'with rotation' or 'against rotation', not {self.angles!r}")
-        check_turning(self.rotation, self.view, clock=self.clock)
+        turns = "clockwise", "counter-clockwise"
+        for name, word, words in (
+            ("phase", self.phase, PHASES),
+            ("angles", self.angles, ANGLES),
+            ("rotation", self.rotation or turns[0], turns),
+        ):
+            if word not in words:
+                raise ValueError(f"{name} must be {' or '.join(map(repr, words))}, not {word!r}")
+        if self.rotation is None and (self.clock or self.view is not None):
+            what = f"a view from the {self.view}"
+            if self.clock:
+                what = "angles that count clockwise or counter-clockwise"
+            raise ValueError(
+                f"{what} cannot be understood without the direction of rotation seen from the same end: "
+                "state rotation as clockwise or counter-clockwise"
+            )
 
     def vibration_from(self, amplitude: ArrayLike, phase: ArrayLike) -> ComplexArray:
         """Vibrations from amplitudes (SI) and phases (rad) as the job counts them; turns back `vibration`.
@@ -86,16 +97,14 @@ class Labels:
         A reading s(t) = A cos(ω t + φ) has the lead φ and is A e^{iφ}. A job that writes the lag −φ writes
         its conjugate.
         """
-        value = polar(amplitude, phase)
-        return value if self.phase_sign > 0 else np.conj(value)
+        return polar(amplitude, self.phase_sign * np.asarray(phase))
 
     def weight_from(self, size: ArrayLike, angle: ArrayLike) -> ComplexArray:
         """Weights from sizes (SI) and angles (rad) as the job counts them; turns back `weight`.
 
         A weight m at α with the rotation is m e^{iα}. A job that counts against the rotation writes −α.
         """
-        value = polar(size, angle)
-        return value if self.angle_sign > 0 else np.conj(value)
+        return polar(size, self.angle_sign * np.asarray(angle))
 
     def vibration(self, amplitude: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Amplitude in the job's unit and phase in degrees, 0 ≤ phase < 360, as the job counts it."""
@@ -209,22 +218,9 @@ class Labels:
         return self.angles.partition(" ")[0]
 
     @property
-    def counted_alike(self) -> bool:
-        """Whether the angle of a weight adds to the phase of its vibration.
-
-        Inside it does (W e^{iα} leads by α more); turning both round, phases and angles, changes nothing.
-        """
-        return self.phase_sign == self.angle_sign
-
-    @property
     def angles_on_paper(self) -> int:
         """+1 where angles as the job counts them grow counter-clockwise in a picture, −1 clockwise."""
         return self.angle_sign * self.drawn_sign
-
-    @property
-    def phases_on_paper(self) -> int:
-        """+1 where phases as the job writes them grow counter-clockwise in a picture: leads do."""
-        return self.phase_sign
 
     @property
     def drawn_sign(self) -> int:
@@ -233,56 +229,45 @@ class Labels:
 
     def drawn(self, angle: ArrayLike) -> FloatArray:
         """Angles with the rotation as angles on the paper, both in rad, there counter-clockwise."""
-        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=float))
+        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=np.float64))
 
     def otherwise(self, names: Collection[str]) -> Labels:
         """The labels with "phase", "angles" or both turned round."""
-        phase: Phase = "lag" if self.phase == "lead" else "lead"
-        angles: Angles = "against rotation" if self.angle_sign > 0 else "with rotation"
-        return replace(
-            self,
-            phase=phase if "phase" in names else self.phase,
-            angles=angles if "angles" in names else self.angles,
-        )
+        turned: dict[str, Any] = {
+            "phase": "lag" if self.phase == "lead" else "lead",
+            "angles": "against rotation" if self.angle_sign > 0 else "with rotation",
+        }
+        return replace(self, **{name: turned[name] for name in names})
 
     def assumed_in_words(self) -> str:
         """One sentence about what is assumed; empty where nothing is."""
-        words = {"phase": self.phase, "angles": self.angle_words}
-        taken = [words[name] for name in self.assumed]
-        if not taken:
+        if not self.assumed:
             return ""
         asked = {"phase": "whether phases lead or lag", "angles": "how angles count"}
-        said = " and ".join(asked[name] for name in self.assumed)
-        return (
-            f"Neither the job nor the command line says {said}; {' and '.join(taken)} "
-            f"{'is' if len(taken) == 1 else 'are'} assumed."
-        )
+        words = {"phase": self.phase, "angles": self.angle_words}
+        missing, taken = (" and ".join(each[name] for name in self.assumed) for each in (asked, words))
+        are = "is" if len(self.assumed) == 1 else "are"
+        return f"Neither the job nor the command line says {missing}; {taken} {are} assumed."
 
     def turning_in_words(self) -> str:
         """One clause for captions: how angles count and how the rotor turns."""
+        end = "" if self.view is None else f" seen from the {self.view}"
         if self.clock:
-            end = "" if self.view is None else f" seen from the {self.view}"
             return f"angles from the mark {self.angle_words}{end}, the rotor turns {self.rotation}"
-        words = f"angles from the mark {self.side} the rotation"
-        if self.rotation is not None:
-            words += f", which is {self.rotation}"
-            words += "" if self.view is None else f" seen from the {self.view}"
-        return words
+        turns = "" if self.rotation is None else f", which is {self.rotation}{end}"
+        return f"angles from the mark {self.side} the rotation{turns}"
 
     def conventions(self) -> dict[str, Any]:
         """The conventions in the words of the job file; rotation and view only where they are stated."""
-        words: dict[str, Any] = {
+        stated = {"rotation": self.rotation, "view": self.view}
+        return {
             "phase": self.phase,
             "angles": self.angle_words,
             "vibration_unit": self.vibration_unit,
             "weight_unit": self.weight_unit,
             "assumed": list(self.assumed),
+            **{name: words for name, words in stated.items() if words is not None},
         }
-        if self.rotation is not None:
-            words["rotation"] = self.rotation
-        if self.view is not None:
-            words["view"] = self.view
-        return words
 
 
 def opposite(rotation: Rotation) -> Rotation:
@@ -290,32 +275,11 @@ def opposite(rotation: Rotation) -> Rotation:
     return "counter-clockwise" if rotation == "clockwise" else "clockwise"
 
 
-def check_turning(rotation: str | None, view: str | None, *, clock: bool) -> None:
-    """Refuse a rotation that is none, and what cannot be understood without one.
-
-    Raises
-    ------
-    ValueError
-        Saying what is missing.
-    """
-    if rotation not in (None, "clockwise", "counter-clockwise"):
-        raise ValueError(f"rotation must be 'clockwise' or 'counter-clockwise', not {rotation!r}")
-    if view not in (None, "drive end", "free end"):
-        raise ValueError(f"view must be 'drive end' or 'free end', not {view!r}")
-    if rotation is None and (clock or view is not None):
-        what = "angles that count clockwise or counter-clockwise" if clock else f"a view from the {view}"
-        raise ValueError(
-            f"{what} cannot be understood without the direction of rotation seen from the same end: "
-            "state rotation as clockwise or counter-clockwise"
-        )
-
-
 def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, FloatArray]:
     z = np.asarray(value, dtype=complex)
     angle = np.mod(sign * np.degrees(np.angle(z)), 360.0)
-    return np.abs(z) * scale, np.where(angle >= 360.0, 0.0, angle)
+    return np.abs(z) * scale, np.mod(angle, 360.0)  # what is hardly below 0 is rounded to 360
 
 
 def _mirror(covariance: FloatArray, scale: float, sign: int) -> FloatArray:
-    flip = np.diag([1.0, float(sign)])
-    return np.asarray(scale**2 * (flip @ covariance @ flip))
+    return np.asarray(covariance * scale**2 * np.array([[1, sign], [sign, 1]]))

@@ -136,7 +136,7 @@ def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
     part, P = case.part, len(case.names)
     check_planes(case.W[counts], part.planes)
     known, every = (
-        V[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts] for V in (part.known_channels(), part.channels())
+        part.channels(known=only)[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts] for only in (True, False)
     )
     words = ""
     if part.trials is not None or part.known_errors:

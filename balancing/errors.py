@@ -35,13 +35,14 @@ as large ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
+from balancing.regions import real_parts
 from balancing.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
@@ -62,18 +63,12 @@ SIZES = np.concatenate(([0.0], np.geomspace(1e-3, 0.5, 6)))
 """Of each sensor's own, and of what readings have in common, before they are known roughly."""
 SPLITS = np.array([(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0), (0.5, 0, 0.5), (0, 0.5, 0.5)])
 """Of what readings have in common, in the variance: of the reading, of what weights do, further unbalance."""
-EVENLY = (0.5, 1.0)
-"""How much of the own part is alike at all sensors."""
 OWN_SHARES = np.array([0.0, 0.1, 0.4, 1.0])
 """Of stated errors, in the variance; only spare runs show that nothing is common."""
-EXPLAINED = 0.05
-"""Level of the tests whether errors of some size explain what runs leave."""
-REFINED = 2
-"""Times that the grid is drawn closer around what data do not exclude."""
+EVENLY = (0.5, 1.0)
+"""How much of the own part is alike at all sensors."""
 NOTICEABLE = 0.1
 """Relative errors between runs that deserve a question."""
-NEGLIGIBLE = 1e-4
-"""Probability of sizes that are left out."""
 MOST = 64
 """Readings of a run by which sizes are estimated."""
 
@@ -137,14 +132,6 @@ def mean_variance(covariance: FloatArray) -> FloatArray:
     return np.asarray(np.trace(covariance, axis1=-2, axis2=-1) / 2)
 
 
-def hermitian(covariance: FloatArray) -> ComplexArray:
-    """S[p, q] = E[dz_p conj(dz_q)] / 2 from covariances (N, 2P, 2P); half: the variance in one direction."""
-    N, n, _ = covariance.shape
-    C = covariance.reshape(N, n // 2, 2, n // 2, 2)
-    real = C[:, :, 0, :, 0] + C[:, :, 1, :, 1]
-    return np.asarray((real + 1j * (C[:, :, 1, :, 0] - C[:, :, 0, :, 1])) / 2)
-
-
 def reading_of(trials: Trials) -> Reading:
     """Errors of a reading of these runs: stated, measured, from repeats, or assumed.
 
@@ -155,83 +142,65 @@ def reading_of(trials: Trials) -> Reading:
     """
     stated, scatter = trials.errors, _scatter(trials)
     ratio, dof = _against_repeats(trials)
-    known = stated is not None or trials.covariance is not None
-    if not known:
-        return _from_repeats(scatter)
     if stated is None:
+        found = _from_repeats(*scatter)
+        if trials.covariance is None:
+            return found
         if ratio == 1.0:
-            variance = np.nanmean(np.asarray(trials.covariance)[[0, 1], [0, 1]])
+            variance = np.nanmean(trials.covariance[[0, 1], [0, 1]])
             return Reading(ReadingErrors(floor=float(np.sqrt(variance))), "measured")
         words = f"repeated readings scatter {ratio:.2g} times as much as the measured standard deviations: "
-        found = _from_repeats(scatter)
         return found._replace(warnings=(words + "their scatter was added", *found.warnings))
-    errors, warnings, degrees = stated, [], np.inf
+    sizes = {"amplitude": stated.amplitude * ratio, "phase": stated.phase * ratio}
+    warnings: list[str] = []
     if ratio > 1.0:
-        errors = ReadingErrors(stated.amplitude * ratio, stated.phase * ratio, stated.floor * ratio)
-        degrees = dof
         warnings.append(
             f"repeated readings scatter {ratio:.2g} times as much as the stated errors: "
             "the errors were enlarged accordingly"
         )
-    if scatter is not None and stated.floor == 0:
+    degrees = dof if ratio > 1.0 else np.inf
+    if stated.floor == 0:
         # an error that was left out is not zero if the repeats show it
-        for kind, size in (("amplitude", scatter[0]), ("phase", scatter[1])):
-            if getattr(stated, kind) == 0 and size > ROUNDING:
-                errors, degrees = replace(errors, **{kind: size}), min(scatter[2], degrees)
-                shown = f"{100 * size:.2g} %" if kind == "amplitude" else f"{np.degrees(size):.2g}°"
-                warnings.append(
-                    f"no {kind} error is stated; repeated readings scatter by {shown}, which is used"
-                )
+        for kind, size in zip(sizes, scatter, strict=False):
+            if not sizes[kind] and size > ROUNDING:
+                sizes[kind], degrees = size, min(scatter[2], degrees)
     source: Source = "stated" if degrees == np.inf else "stated, enlarged by repeats"
+    errors = ReadingErrors(**sizes, floor=stated.floor * ratio)
     return Reading(errors, source, tuple(warnings), degrees)
 
 
-def _from_repeats(scatter: tuple[float, float, int] | None) -> Reading:
-    if scatter is None:
-        return Reading(ASSUMED, "assumed")
-    radial, tangential, dof = scatter
+def _from_repeats(radial: float, tangential: float, dof: int) -> Reading:
     if max(radial, tangential) < ROUNDING:
         words = "all repeated readings are equal to the last digit: they say nothing about the errors"
-        return Reading(ASSUMED, "assumed", (words,))
-    warnings: tuple[str, ...] = ()
+        return Reading(ASSUMED, "assumed", (words,) if dof else ())
     if min(radial, tangential) < ROUNDING:  # read in whole degrees, say
-        equal, other = ("amplitudes", "phases") if radial < ROUNDING else ("phases", "amplitudes")
-        warnings = (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
         radial = tangential = max(radial, tangential)
-    return Reading(ReadingErrors(amplitude=radial, phase=tangential), "repeats", warnings, dof)
+    return Reading(ReadingErrors(radial, tangential), "repeats", (), dof)
 
 
-def _scatter(trials: Trials) -> tuple[float, float, int] | None:
+def _scatter(trials: Trials) -> tuple[float, float, int]:
     """Pooled relative radial and tangential standard deviation and their degrees of freedom."""
     mean, count = trials.mean, trials.repeats
     used = (count > 1) & (mean != 0)
     dof = int(np.sum(count[used] - 1))
-    if dof == 0:
-        return None
     relative = trials.readings[:, used] / mean[used] - 1
     squares = (np.nansum(part**2) for part in (relative.real, relative.imag))
-    radial, tangential = (float(np.sqrt(square / dof)) for square in squares)
+    radial, tangential = (float(np.sqrt(square / max(dof, 1))) for square in squares)
     return radial, tangential, dof
 
 
 def _against_repeats(trials: Trials) -> tuple[float, int]:
     """How many times more repeats scatter than stated and measured errors explain; degrees of freedom."""
-    from scipy.special import chdtri
-
     many = trials.repeats > 1
-    mean, count = trials.mean[many], trials.repeats[many]
+    count = trials.repeats[many]
     of_means = Reading(trials.errors, "stated").covariance(trials, digits=False)[many]
-    covariance = of_means * count[:, None, None]
-    values, axes = np.linalg.eigh(covariance)
-    deviation = trials.readings[:, many] - mean
-    parts = np.stack((deviation.real, deviation.imag), axis=-1)
-    along = np.nansum(np.einsum("gij,kgi->kgj", axes, parts) ** 2, axis=0)
-    known = values > 1e-9 * values.max(axis=-1, initial=0.0, keepdims=True)
-    chi_square = float(np.sum(along[known] / values[known]))
-    dof = int(np.sum((count[:, None] - 1) * known))
-    if dof == 0 or chi_square <= float(chdtri(dof, 1 - CONTRADICTION)):
-        return 1.0, dof
-    return float(np.sqrt(chi_square / dof)), dof
+    V = of_means * count[:, None, None]
+    inverse = np.linalg.pinv(V, 1e-9, hermitian=True)  # what has no error is not compared
+    parts = real_parts(np.nan_to_num(trials.readings[:, many] - trials.mean[many])[..., None])
+    chi_square = float(np.einsum("kgi,gij,kgj->", parts, inverse, parts))
+    dof = round(np.einsum("g,gij,gji->", count - 1, inverse, V))
+    contradicted = dof > 0 and chance(chi_square, dof) < 1 - CONTRADICTION
+    return (float(np.sqrt(chi_square / dof)) if contradicted else 1.0), dof
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,17 +251,12 @@ class RunErrors:
         return float(low), float(high)
 
 
-def fixed(sizes: Sequence[float], origin: Origin) -> RunErrors:
-    """Errors of one size of each part."""
-    return RunErrors(np.array([sizes], dtype=np.float64), np.ones(1), origin)
+NO_RUN_ERRORS = RunErrors(np.zeros((1, 4)), np.ones(1), "none")
 
 
-NO_RUN_ERRORS = fixed((0.0, 0.0, 0.0, 0.0), "none")
-
-
-def rms(readings: ComplexArray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(np.abs(readings) ** 2)))
+def rms(values: ArrayLike) -> float:
+    """Root mean square of real or complex numbers."""
+    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
@@ -312,19 +276,14 @@ def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
 
     A weight that stays in its plane from one run to the next has one error in both.
     """
-    R = len(trials.runs)
-    out = []
-    for p in range(len(trials.planes)):
-        weights = trials.weights[:, p]
-        starts = np.flatnonzero((weights != 0) & (weights != np.concatenate(([0], weights[:-1]))))
-        for start in starts:
-            same = np.cumprod(weights[start:] == weights[start]).astype(bool)
-            there = np.zeros(R, dtype=complex)
-            there[start:][same] = weights[start]
-            effect = there[:, None, None] * W[..., p]
+    out: list[ComplexArray] = []
+    for p, weights in enumerate(trials.weights.T):
+        stays = np.cumsum(weights != np.append(0, weights[:-1]))
+        for k in np.unique(stays[weights != 0]):
+            effect = np.where(stays == k, weights, 0)[:, None, None] * W[..., p]
             out += [size * effect for size in (trials.placement.mass, 1j * trials.placement.angle) if size]
     if trials.drift:
-        course = trials.drift * np.linspace(0.0, 1.0, R)[:, None, None] * trials.mean
+        course = trials.drift * np.linspace(0.0, 1.0, len(trials.runs))[:, None, None] * trials.mean
         out += [course, 1j * course]
     return np.array(out).reshape(len(out), *trials.mean.shape)
 
@@ -332,10 +291,12 @@ def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
 class Block(NamedTuple):
     """A combination of runs that holds no coefficient: residuals (n,), and variances of either direction.
 
+    `spare`: of spare runs, or of the corrected reading;
     `parts` (5, n, n): by the parts at size 1, the first alike at all sensors and in proportion;
     `known` (n, n): by all that is known.
     """
 
+    spare: bool
     e: ComplexArray
     parts: ComplexArray
     known: ComplexArray
@@ -354,15 +315,8 @@ class Block(NamedTuple):
         return log, np.sum(np.abs(white) ** 2, axis=(1, 2)) / 2
 
 
-class Blocks(NamedTuple):
-    """Of spare runs, and of the corrected reading (at most one)."""
-
-    spare: tuple[Block, ...]
-    corrected: tuple[Block, ...]
-
-
-def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Blocks:
-    """What runs tell of their errors.
+def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[Block]:
+    """What runs tell of their errors: those of spare runs, and that of the corrected reading at the end.
 
     Parameters
     ----------
@@ -374,74 +328,76 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> Block
         Of the readings, by their errors alone, (R, S, C, 2, 2).
     """
     A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
-    (R, n), (S, C) = A.shape, theta.shape[:2]
-    at = np.linspace(0, S * C - 1, min(S * C, MOST)).round().astype(np.int64)
-    Y, W = trials.mean.reshape(R, -1)[:, at], theta[..., 1:]
-    c = unbalances(W, rms(trials.mean)).reshape(S * C, -1)[at].T
-    variance = mean_variance(covariance).reshape(R, -1)[:, at]
-    others = job_columns(trials, W).reshape(-1, R, S * C)[..., at]
+    (R, n), N = A.shape, theta[..., 0].size
+    at = np.linspace(0, N - 1, min(N, MOST)).round().astype(np.int64)
+
+    W = theta.reshape(N, n)[at, 1:]
+    further = unbalances(theta[..., 1:], rms(trials.mean)).reshape(N, -1)[at].T
+    others = job_columns(trials, theta[..., 1:]).reshape(-1, R, N)[..., at]
     # as the coefficients say: what each run errs by would explain itself
     whole = np.einsum("rp,scp->rsc", A, theta)
-    each = (whole, own_variance(whole, 1.0), own_variance(whole, 0.0), whole - theta[..., 0])
-    fitted, even, own, effect = (part.reshape(R, -1)[:, at] for part in each)
+    each = (trials.mean, whole, whole - theta[..., 0])
+    Y, fitted, effect = (part.reshape(R, N)[:, at] for part in each)
+    variances = (own_variance(whole, 1.0), own_variance(whole, 0.0), mean_variance(covariance))
+    even, own, variance = (part.reshape(R, N)[:, at] for part in variances)
+
+    def alike(rows: ComplexArray) -> ComplexArray:
+        return np.asarray(rows.T @ rows.conj())
 
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2
-        moved = m[:, None] * fitted
-        alone = [np.diag(share @ part) for part in (even, own)]
-        loads = m[:, None] * effect
-        parts = [*alone, moved.T @ moved.conj(), loads.T @ loads.conj(), share.sum() * c.T @ c.conj()]
-        along = np.einsum("r,mrn->mn", m, others)
-        known = np.diag(share @ variance) + along.T @ along.conj() / 2
+        moved, loads = (alike(m[:, None] * part) for part in (fitted, effect))
+        parts = [np.diag(share @ even), np.diag(share @ own), moved, loads]
+        parts.append(share.sum() * further.T @ further.conj())
+        known = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
         keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
         inside = keep @ np.array([*parts, known]) @ keep.conj().T
-        return Block(keep @ (m @ Y), inside[:5], inside[5])
+        return Block(not free.size, keep @ (m @ Y), inside[:5], inside[5])
 
     # combinations whose errors are independent
-    basis, size = (
-        np.linalg.svd(A)[0][:, n:],
-        np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=1),
-    )
+    basis = np.linalg.svd(A)[0][:, n:]
+    squares = np.abs(Y) ** 2
+    size = np.mean(squares / squares.mean(axis=0).clip(1e-300), axis=1)
     basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] * basis))[1]
     # a rotor at rest repeats itself to the last digit
     moving = [m for m in basis.T if np.max(np.abs(m) @ np.abs(fitted)) > ROUNDING * np.abs(fitted).max()]
-    spare = tuple(block(m.conj(), W.reshape(S * C, -1)[at, :0]) for m in moving)
-    if len(at) < n or not theta[..., 0].any():
-        return Blocks(spare, ())
-    flat = theta.reshape(-1, n)
-    m = np.concatenate(([1.0], -gain(flat[:, 1:]) @ flat[:, 0])) @ gain(A)
-    row = block(m, flat[at, 1:])
-    # what is common to a run leaves other weights, not a rest
-    return Blocks(spare, (row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]),))
+    out = [block(m.conj(), W[:, :0]) for m in moving]
+    if len(at) >= n and theta[..., 0].any():
+        flat = theta.reshape(N, n)
+        m = np.concatenate(([1.0], -gain(flat[:, 1:]) @ flat[:, 0])) @ gain(A)
+        row = block(m, W)
+        # what is common to a run leaves other weights, not a rest
+        out.append(row._replace(parts=row.parts * np.array([1, 1, 0, 0, 0])[:, None, None]))
+    return out
 
 
-def run_errors(trials: Trials, theta: ComplexArray, covariance: FloatArray, reading: Reading) -> RunErrors:
+def run_errors(
+    trials: Trials, theta: ComplexArray | None, covariance: FloatArray, reading: Reading
+) -> RunErrors:
     """Stated, estimated by spare runs, none beside stated errors of a reading, or assumed.
 
     Parameters
     ----------
     trials, theta, covariance
-        As `blocks`.
+        As `blocks`; None: no spare run tells of them.
     reading
         Where these come from.
     """
-    return _sized(blocks(trials, theta, covariance), trials, reading)
-
-
-def _sized(found: Blocks, trials: Trials, reading: Reading) -> RunErrors:
+    all_ = [] if theta is None else blocks(trials, theta, covariance)
+    spare = [block for block in all_ if block.spare]
     level = rms(trials.mean)
     if trials.run_errors is not None:
         relative, floor = trials.run_errors[0] ** 2, (trials.run_errors[1] / (level or 1.0)) ** 2
-        own = OWN_SHARES[: 4 if found.spare else 3, None]
-        sizes = np.sqrt(np.hstack((own * (relative + floor), (1 - own) * (relative, 0.0, floor))))
+        share = OWN_SHARES[: 4 if spare else 3, None]
+        sizes = np.sqrt(np.hstack((share * (relative + floor), (1 - share) * (relative, 0.0, floor))))
         evenly = floor / ((relative + floor) or 1.0)
-        if not sizes.any() or not found.spare or tail(found.spare, sizes, evenly) > 1 - CONTRADICTION:
-            return RunErrors(sizes, _posterior(found, sizes, evenly), "stated", level, evenly)
-    if found.spare:
-        return _estimated(found, level)
+        if not sizes.any() or not spare or tail(spare, sizes, evenly) > 1 - CONTRADICTION:
+            return RunErrors(sizes, _posterior(all_, sizes, evenly), "stated", level, evenly)
+    if spare:
+        return _estimated(all_, level)
     if reading.source == "stated":
         return NO_RUN_ERRORS
-    return replace(fixed((ASSUMED_RUN, ASSUMED_RUN, 0.0, ASSUMED_RUN), "assumed"), level=level)
+    return RunErrors(ASSUMED_RUN * np.array([[1.0, 1.0, 0.0, 1.0]]), np.ones(1), "assumed", level)
 
 
 def usual_run_errors(trials: Trials) -> RunErrors:
@@ -452,61 +408,55 @@ def usual_run_errors(trials: Trials) -> RunErrors:
     trials
         The runs, whose statement counts; none beside stated errors of a reading, else they are assumed.
     """
-    return _sized(Blocks((), ()), trials, reading_of(trials))
+    return run_errors(trials, None, np.zeros(0), reading_of(trials))
 
 
-def _estimated(found: Blocks, level: float) -> RunErrors:
+def _estimated(each: Sequence[Block], level: float) -> RunErrors:
     """The grid, drawn closer around what data do not exclude; own parts as they fit best."""
     own = common = SIZES
-    each = (*found.spare, *found.corrected)
-    seen, loaded = (sum(np.trace(block.parts[k]).real for block in found.spare) for k in (2, 3))
+    seen, loaded = (sum(np.trace(block.parts[k]).real for block in each) for k in (2, 3))
     # runs without weights tell nothing of what goes with the weights
     splits = SPLITS if loaded > 0.03 * seen else SPLITS[SPLITS[:, 1] == 0]
-    log = [
-        -np.sum([block.at(_grid(own, common, splits), evenly) for block in each], axis=(0, 1))
-        for evenly in EVENLY
-    ]
+    sizes = _grid(own, common, splits)
+    log = [-np.sum([block.at(sizes, evenly) for block in each], axis=(0, 1)) for evenly in EVENLY]
     evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
-    for _ in range(REFINED):
-        chance = _posterior(found, _grid(own, common, splits), evenly).reshape(len(own), len(common), -1)
+    for _ in range(2):  # closer around what data do not exclude
+        chance = _posterior(each, sizes, evenly).reshape(len(own), len(common), -1)
         own, common = (
             _finer(values, chance.sum(axis=axes), count)
             for values, axes, count in ((own, (1, 2), 5), (common, (0, 2), 6))
         )
-    sizes = _grid(own, common, splits)
-    return RunErrors(sizes, _posterior(found, sizes, evenly), "estimated", level, evenly)
+        sizes = _grid(own, common, splits)
+    return RunErrors(sizes, _posterior(each, sizes, evenly), "estimated", level, evenly)
 
 
 def _grid(own: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray:
     """All combinations of own sizes, sizes in common and splits, (G, 4)."""
-    a, b, split = np.meshgrid(own, common, range(len(splits)), indexing="ij")
-    return np.column_stack((a.ravel(), b.reshape(-1, 1) * np.sqrt(splits[split.ravel()])))
+    each = np.sqrt(splits)
+    return np.array([(a, *(b * split)) for a in own for b in common for split in each])
 
 
 def _finer(values: FloatArray, probability: FloatArray, count: int) -> FloatArray:
     """So many values between those that are not excluded."""
-    seen = np.flatnonzero(probability > NEGLIGIBLE)
+    seen = np.flatnonzero(probability > 1e-4)
     low, high = max(seen[0] - 1, 0), min(seen[-1] + 1, len(values) - 1)
-    if values[low] > 0:
-        return np.geomspace(values[low], values[high], count)
-    return np.concatenate(([0.0], np.geomspace(values[1], values[high], count - 1)))
+    zero = int(values[low] == 0)
+    return np.append(np.zeros(zero), np.geomspace(values[low + zero], values[high], count - zero))
 
 
 def tail(used: Sequence[Block], sizes: FloatArray, evenly: float) -> float:
     """Probability that errors of one of these sizes leave more than was read, at the likeliest of them."""
-    n = sum(len(block.e) for block in used)
     log, q = np.sum([block.at(sizes, evenly) for block in used], axis=0)
-    likely = q[-log - q > np.max(-log - q) - 3.0]
-    return chance(2 * likely.min(), 2 * n)
+    likely = q[log + q < np.min(log + q) + 3.0]
+    return chance(2 * likely.min(), 2 * sum(len(block.e) for block in used))
 
 
-def _posterior(found: Blocks, sizes: FloatArray, evenly: float) -> FloatArray:
+def _posterior(each: Sequence[Block], sizes: FloatArray, evenly: float) -> FloatArray:
     """Probability of every point; the corrected reading takes part unless unbalance elsewhere shows in it."""
     weight = np.zeros(len(sizes))
-    for block in found.spare:
-        weight -= np.sum(block.at(sizes, evenly), axis=0)
-    for block in found.corrected:
-        if len(block.e) and tail([block], sizes[weight > weight.max() - 3.0], evenly) > EXPLAINED:
+    for block in each:
+        likely = sizes[weight > weight.max() - 3.0]
+        if block.spare or (len(block.e) and tail([block], likely, evenly) > 0.05):
             weight -= np.sum(block.at(sizes, evenly), axis=0)
     probability = np.exp(weight - weight.max())
     return np.asarray(probability / probability.sum())

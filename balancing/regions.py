@@ -7,7 +7,7 @@ it needs no distribution of its own: what is drawn decides, sizes that are only 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,14 +41,13 @@ class Region:
     @classmethod
     def of(cls, draws: ComplexArray, centre: ComplexArray) -> Region:
         """From draws (n, k) around an estimate (k,); NaN where there are no more than 2k."""
-        if len(draws) <= 2 * len(centre):
-            return cls(np.asarray(centre), np.full((2 * len(centre),) * 2, np.nan), np.nan)
-        off = real_parts(draws - centre)
-        covariance = np.atleast_2d(np.cov(off.T))
-        region = cls(np.asarray(centre), covariance, 1.0)
+        off, n = real_parts(draws - centre), 2 * len(centre)
+        if len(draws) <= n:
+            return cls(centre, np.full((n, n), np.nan), np.nan)
+        region = cls(centre, np.atleast_2d(np.cov(off.T)), 1.0)
         square = region._distance(off) ** 2
         square = square / np.maximum(1 - square / len(draws), 0.1)  # as if a draw had no part in V
-        return cls(region.centre, covariance, float(np.sqrt(np.quantile(square, LEVEL))))
+        return replace(region, radius=float(np.sqrt(np.quantile(square, LEVEL))))
 
     def holds(self, value: ComplexArray) -> bool:
         """Whether k numbers lie in it."""
@@ -88,4 +87,4 @@ def half_width(deviations: FloatArray) -> FloatArray:
 
 def real_parts(values: ComplexArray) -> FloatArray:
     """(…, k) complex as (…, 2k) real: Re, Im, …"""
-    return np.stack((values.real, values.imag), axis=-1).reshape(*values.shape[:-1], 2 * values.shape[-1])
+    return np.ascontiguousarray(values, dtype=complex).view(np.float64)

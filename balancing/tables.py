@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
 from balancing.errors import Reading, RunErrors
+from balancing.errors import rms as rms
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import RPM, rpm
@@ -17,21 +18,8 @@ from rotorid.base.text import figures
 
 ROUNDING = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
-SMALL = 5e-4
-"""Share of a reading that is not worth a word."""
 INVISIBLE = 1e-9
 """Those below this share are zero to a reader."""
-_LARGEST = 3
-
-
-def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:
-    """The values, or NaN where nothing is known."""
-    return np.full(shape, np.nan) if values is None else values
-
-
-def rms(values: ArrayLike) -> float:
-    """Root mean square of real or complex numbers."""
-    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def degrees(angle: float, places: int = 1) -> str:
@@ -60,12 +48,6 @@ def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> li
     return rows(weight_columns(labels, planes, weights))
 
 
-def mounted_rows(labels: Labels, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
-    """JSON rows of the planes in which there is something."""
-    there = np.flatnonzero(weights).tolist()
-    return weight_rows(labels, [planes[p] for p in there], weights[there])
-
-
 def reading_columns(labels: Labels, speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
     """speed_rpm and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
     turns = np.repeat([rpm(speed) for speed in speeds], len(sensors))
@@ -89,11 +71,11 @@ def largest_readings(
     left, the three largest of these.
     """
     old, new = (labels.vibration(readings)[0] for readings in (before, after))
-    reach = known(within, old.shape)
+    reach = np.full(old.shape, np.nan) if within is None else within
     size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
     share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
     words = []
-    for place in np.argsort(-share, axis=None, kind="stable")[:_LARGEST]:
+    for place in np.argsort(-share, axis=None, kind="stable")[:3]:
         s, c = divmod(int(place), len(sensors))
         width = "" if np.isnan(reach[s, c]) else f" (± {figures(reach[s, c], 2)})"
         left = f"{three_figures(old[s, c])} → {small(new[s, c], old.max())}{width}"
@@ -145,47 +127,28 @@ def reading_names(labels: Labels, sensors: Sequence[str], speeds: FloatArray) ->
     return tuple(f"sensor {c!r} at {labels.speed_words(s)}" for s in speeds for c in sensors)
 
 
-_SOURCES = {
-    "stated": "as stated in the job",
-    "measured": "root mean square of those that the instrument measured",
-    "repeats": "from repeated readings",
-    "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
-    "residuals": "from the disagreement of the runs, with what changes between runs",
-    "assumed": "assumed: nothing states or measures them",
-    "unknown": "of stored or computed coefficients",
-}
-
-
 def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     """Errors of a reading and between runs in one or two sentences."""
-    e, parts = reading.errors, []
+    e = reading.errors
+    parts = {}
     if e is not None:
-        parts = [f"{100 * e.amplitude:.3g} % of the amplitude"] if e.amplitude else []
-        parts += [f"{np.degrees(e.phase):.3g}°"] if e.phase else []
-        parts += [labels.amplitude_words(e.floor)] if e.floor else []
-    words = (
-        f"One standard deviation of a reading: {', '.join(parts) or 'not known'} ({_SOURCES[reading.source]})"
-    )
-    sizes = run.typical
-    if sizes.any():
-        what = (
-            "of each sensor alone",
-            "common to the run",
-            "of what the weights do",
-            "as further unbalance",
-        )
-        shown = [f"{100 * size:.2g} % {of}" for size, of in zip(sizes, what, strict=True) if size > SMALL]
-        words += f"; from run to run: {', '.join(shown)} ({run.origin})"
-    few = f" Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ""
-    return f"{words}.{few}"
+        parts[f"{100 * e.amplitude:.3g} % of the amplitude"] = e.amplitude
+        parts[f"{np.degrees(e.phase):.3g}°"] = e.phase
+        parts[labels.amplitude_words(e.floor)] = e.floor
+    known = ", ".join(words for words, size in parts.items() if size) or "not known"
+    out = f"One standard deviation of a reading: {known} ({reading.source})"
+    what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
+    sizes = zip(run.typical, what, strict=True)
+    between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > 5e-4)
+    out += f"; from run to run: {between} ({run.origin})" if between else ""
+    return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
 
 
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
     """The same in numbers; amplitudes in the job's unit."""
     e, scale = reading.errors, labels.vibration_scale
     alone, common, effect, further = run.typical
-    whole = float(np.linalg.norm(run.typical))
-    level = run.level * scale
+    whole, level = float(np.linalg.norm(run.typical)), run.level * scale
     return {
         "source": reading.source,
         "amplitude_percent": None if e is None else 100 * e.amplitude,

@@ -34,37 +34,25 @@ import numpy as np
 
 from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.conventions import Labels
-from balancing.errors import RunErrors, mean_variance, reading_covariance
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import rpm
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.words import Quantity as Quantity
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from balancing.influence import Influence
-    from balancing.trials import ReadingErrors
 
 
 GRAVITY = 9.80665
-FRACTION = 0.10
-"""Of the load that the force of a first trial weight makes."""
 RISKY = 0.25
-SHARE = 0.40
-"""Change of a reading, relative to the largest one, that a trial weight is chosen for."""
+"""Of the load, for the force of a first trial weight."""
 
-_SEEN = 2.448 * math.sqrt(2)
-"""Standard deviations of a reading that the difference of two must exceed to be no chance (95 %)."""
-
-DAMPING = 0.05
-"""Damping ratio of the critical speed if nobody says."""
-
-_LAGS = {"below": (0.0, 45.0, 90.0), "at": (90.0, 90.0, 90.0), "above": (90.0, 135.0, 180.0)}
+_LAGS = {"below": (45.0, 45.0), "at": (90.0, 0.0), "above": (135.0, 45.0)}
 _LEAD = {"displacement": 0.0, "velocity": math.pi / 2, "acceleration": math.pi}
 
 
@@ -74,15 +62,14 @@ class Lag:
 
     Attributes
     ----------
-    expected, low, high
-        rad: expected, least and largest.
+    expected, reach
+        rad, and how far it may be from that, either side.
     words
         Why.
     """
 
     expected: float
-    low: float
-    high: float
+    reach: float
     words: str
 
 
@@ -108,8 +95,9 @@ class TrialWeight(Answered):
         rad/s, the highest at which it will turn.
     load
         N, that the plane carries; None: unknown.
-    speeds, sensors, before, expected
-        Readings (S, C) without and with it; None where there are no coefficients.
+    influence, expected
+        Coefficients with the readings without it as baseline, and readings (S, C) with it; None where there
+        are no coefficients.
     labels
         Units and conventions to print in.
     warnings
@@ -124,9 +112,7 @@ class TrialWeight(Answered):
     radius: float | None
     speed: float
     load: float | None = None
-    speeds: FloatArray | None = None
-    sensors: tuple[str, ...] = ()
-    before: ComplexArray | None = None
+    influence: Influence | None = None
     expected: ComplexArray | None = None
     labels: Labels = field(default_factory=Labels)
     warnings: tuple[str, ...] = ()
@@ -140,22 +126,20 @@ class TrialWeight(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        size, angle = self._weight()
-        share = None if self.force is None or self.load is None else 100 * self.force / self.load
-        expected = self._columns()
+        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
         document = {
             "plane": self.plane,
             "mass": size,
             "unit": self.labels.weight_unit,
-            "angle_deg": angle,
+            "angle_deg": None if self.angle is None else angle,
             "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
             "basis": self.basis,
             "radius_m": self.radius,
             "speed_rpm": rpm(self.speed),
             "force_N": self.force,
             "load_N": self.load,
-            "force_percent": share,
-            "expected": None if expected is None else rows(expected),
+            "force_percent": self._share(),
+            "expected": rows(self._columns()) or None,
             "conventions": self.labels.conventions(),
             "warnings": self.warnings,
         }
@@ -163,60 +147,53 @@ class TrialWeight(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and sensor with the expected readings; one row without coefficients."""
-        size, angle = self._weight()
-        expected = self._columns()
-        n = 1 if expected is None else len(expected[0].values)
-        return frame(
-            (
-                Column("plane", (self.plane,) * n),
-                Column("mass", np.full(n, size)),
-                Column("unit", (self.labels.weight_unit,) * n),
-                Column("angle_deg", np.full(n, angle)),
-                *(expected or ()),
-            )
-        )
+        document, expected = self.to_dict(), self._columns()
+        n = len(expected[0].values) if expected else 1
+        named = (Column(name, [document[name]] * n) for name in ("plane", "mass", "unit", "angle_deg"))
+        return frame((*named, *expected))
 
     @property
     def answer(self) -> Answer:
         """Amount and place, what for, and the readings expected with it."""
-        found, labels = self.to_dict(), self.labels
+        labels, share = self.labels, self._share()
+        size, turned = labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
         at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
         angle = "at any angle (no phase, or no lag, is known)"
-        if found["angle_deg"] is not None:
-            angle = f"at {found['angle_deg']:.0f}° {labels.angle_words}"
-            if self.angle_reach:
-                angle += f" (± {math.degrees(self.angle_reach):.0f}°)"
+        if self.angle is not None:
+            angle = f"at {turned:.0f}° {labels.angle_words}"
+            angle += f" (± {math.degrees(self.angle_reach):.0f}°)" if self.angle_reach else ""
         lines = [f"Plane {self.plane}: {self.basis}"]
         if self.force is not None:
-            share = "" if self.load is None else f", {found['force_percent']:.3g} % of the load"
-            lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N{share}"
+            lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N"
+            lines[0] += "" if share is None else f", {share:.3g} % of the load"
         table: tuple[str, ...] = ()
-        if self.speeds is not None and self.before is not None and self.expected is not None:
-            largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.expected)
+        if self.influence is not None and self.expected is not None:
+            where = self.influence.speeds, self.influence.sensors
+            largest = largest_readings(labels, *where, self.influence.baseline, self.expected)
             lines.append(f"  largest with it{largest}")
             head = f"Plane {self.plane}, now and with the weight, {labels.vibration_in}"
-            table = (f"{head}\n{text(self._columns() or (), left=2)}",)
+            table = (f"{head}\n{text(self._columns(), left=2)}",)
         return Answer(
-            f"Trial weight in plane {self.plane}: {found['mass']:.4g} {labels.weight_in}{at}, {angle}.",
+            f"Trial weight in plane {self.plane}: {size:.4g} {labels.weight_in}{at}, {angle}.",
             "\n".join(lines),
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
             tables=table,
             more="every reading",
         )
 
-    def _weight(self) -> tuple[float, float]:
-        """Size in the job's unit and angle in degrees; NaN: nothing is known to choose it by."""
-        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
-        return float(size), np.nan if self.angle is None else float(angle)
+    def _share(self) -> float | None:
+        """Force in percent of the load; None where one of both is unknown."""
+        return None if self.force is None or self.load is None else 100 * self.force / self.load
 
-    def _columns(self) -> tuple[Column, ...] | None:
-        """Readings without and with it, one row per speed and sensor; None without coefficients."""
-        if self.speeds is None or self.before is None or self.expected is None:
-            return None
-        change = np.abs(self.expected - self.before) * self.labels.vibration_scale
+    def _columns(self) -> tuple[Column, ...]:
+        """Readings without and with it, one row per speed and sensor; none without coefficients."""
+        if self.influence is None or self.expected is None:
+            return ()
+        before = self.influence.baseline
+        change = np.abs(self.expected - before) * self.labels.vibration_scale
         return (
-            *reading_columns(self.labels, self.speeds, self.sensors),
-            *vector_columns(self.labels, "before", self.before),
+            *reading_columns(self.labels, self.influence.speeds, self.influence.sensors),
+            *vector_columns(self.labels, "before", before),
             *vector_columns(self.labels, "after", self.expected),
             Column("change", change.ravel(), three_figures),
         )
@@ -263,7 +240,7 @@ def trial_from_force(  # noqa: PLR0913
     radius: float,
     load: float,
     *,
-    fraction: float = FRACTION,
+    fraction: float = 0.1,
     limit: float = math.inf,
     phase: float | None = None,
     lag: Lag | None = None,
@@ -307,50 +284,43 @@ def trial_from_force(  # noqa: PLR0913
         positive(what, value)
     amount = fraction * load / (radius * speed**2)
     made = labels or Labels()
-    _check_limit(
-        plane, amount, limit, made, f"take at most {100 * fraction * limit / amount:.3g} % of the load"
-    )
+    most = 100 * fraction * limit / amount
+    _check_limit(plane, amount, limit, made, f"take at most {most:.3g} % of the load")
     words = f"{100 * fraction:.3g} % of the load of {load:.4g} N"
     angle = reach = None
-    warnings = _force_warning(fraction)
+    if (phase is None) != (lag is None):
+        raise ValueError(
+            "an angle needs both the phase of the initial reading and the lag: give the other one, too"
+        )
     if phase is not None and lag is not None:
         angle = opposing_angle(
             phase, lag.expected, sensor_angle=sensor_angle, key_phasor=key_phasor, quantity=quantity
         )
-        reach = max(lag.high - lag.expected, lag.expected - lag.low)
-        degrees = math.degrees(lag.expected)
+        reach, degrees = lag.reach, math.degrees(lag.expected)
         words += f"; angle opposite to the heavy spot with a lag of {degrees:.3g}° ({lag.words})"
-    elif phase is not None or lag is not None:
-        raise ValueError(
-            "an angle needs both the phase of the initial reading and the lag: give the other one, too"
-        )
+    warnings = _force_warning(fraction)
     return TrialWeight(
         plane, amount, angle, reach, words, radius, speed, load, labels=made, warnings=warnings
     )
 
 
-def trial_from_coefficients(  # noqa: PLR0913, PLR0915
+def trial_from_coefficients(
     influence: Influence,
-    readings: ComplexArray,
     plane: str,
     *,
-    share: float = SHARE,
+    share: float = 0.4,
     amount: float | None = None,
     limit: float = math.inf,
     radius: float | None = None,
     trial_radius: float | None = None,
     load: float | None = None,
-    errors: ReadingErrors | None = None,
-    labels: Labels | None = None,
 ) -> TrialWeight:
     """Trial weight of one plane from stored or computed coefficients.
 
     Parameters
     ----------
     influence
-        Coefficients, W (S, C, P).
-    readings
-        Initial vibration, (S, C).
+        With the initial vibration as baseline.
     plane
         Name.
     share
@@ -367,132 +337,91 @@ def trial_from_coefficients(  # noqa: PLR0913, PLR0915
         m, where the trial weight will be mounted: `amount` and the result are masses there. None: `radius`.
     load
         N, that the plane carries, to compare the force with.
-    errors
-        Of a reading; None: those of the coefficients.
-    labels
-        Units and conventions to print in; None: those of the coefficients.
 
     Raises
     ------
     ValueError
-        For a plane that is not known or acts on no reading, for readings that are all zero, and an amount
+        For a plane that is not known or acts on no reading, readings that are lacking or zero, and an amount
         larger than the limit.
     """
     if plane not in influence.planes:
-        hint = did_you_mean(str(plane), influence.planes)
         raise ValueError(
-            f"there is no plane {plane!r}{hint}; the planes are {', '.join(map(repr, influence.planes))}"
+            f"there is no plane {plane!r}; the planes are {', '.join(map(repr, influence.planes))}"
         )
-    Y = np.asarray(readings, dtype=complex)
-    w = influence.W[..., influence.planes.index(plane)]
-    if Y.shape != w.shape:
-        raise ValueError(f"the initial readings must have shape {w.shape} (speeds, sensors); got {Y.shape}")
-    made = labels or influence.labels
+    Y, w = influence.baseline, influence.W[..., influence.planes.index(plane)]
+    labels = influence.labels
     # masses at the trial radius per mass at the radius of the coefficients
-    scale = 1.0
-    if trial_radius is not None:
-        positive("trial radius", trial_radius)
-        if radius is None:
-            raise ValueError("a trial radius needs the radius of the coefficients' masses, too")
-        scale = radius / trial_radius
+    at = radius if trial_radius is None else trial_radius
+    scale = 1.0 if radius is None or at is None else radius / at
     size = float(np.abs(Y).max())
-    if not size:
-        raise ValueError("all initial readings are zero: there is nothing to choose a trial weight by")
+    if not size > 0:
+        raise ValueError(
+            "initial readings are lacking or all zero: there is nothing to choose a trial weight by"
+        )
+    if not w.any():
+        raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
     warnings: list[str] = []
+    basis = "amount as stated"
     if amount is None:
         positive("share of the largest reading", share)
-        most = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
-        if not abs(w[most]):
-            raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
-        amount = share * size / abs(w[most])
-        speed = influence.labels.speed_words(influence.speeds[most[0]])
-        reading = f"sensor {influence.sensors[most[1]]!r} at {speed}"
+        s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
+        amount = share * size / float(abs(w[s, c])) * scale
+        reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
         basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
-        if amount > limit:
-            amount, basis = limit, "the largest weight of the plane"
+        if amount > limit * scale:
+            amount, basis = limit * scale, "the largest weight of the plane"
             warnings.append(
                 f"a change by {100 * share:.3g} % of the largest reading would need more than the largest "
                 f"weight of plane {plane!r}: that is proposed"
             )
-    else:
-        positive("trial weight", amount)
-        _check_limit(plane, amount, limit * scale, made, "choose a smaller one")
-        amount = amount / scale
-        basis = "amount as stated"
-    positive("largest weight of the plane", limit if math.isfinite(limit) else 1.0)
-    direction = -np.vdot(w, Y)
-    angle = float(np.angle(direction)) % (2 * math.pi)
-    expected = Y + w * amount * np.exp(1j * angle)
-    warnings += _seen(Y, expected, errors or influence.reading.errors, influence.run_errors, plane)
+    _check_limit(plane, amount, limit * scale, labels, "choose a smaller one")
+    positive("trial weight", amount)
+    angle = float(np.angle(-np.vdot(w, Y))) % (2 * math.pi)
+    expected = Y + w * (amount / scale * np.exp(1j * angle))
+    seen = np.abs(Y) > 1e-9 * size
+    ratio = expected[seen] / Y[seen]
+    change, turn = float(np.abs(np.abs(ratio) - 1).max()), float(np.abs(np.angle(ratio)).max())
+    if change < ENGINEERS_AMPLITUDE and turn < ENGINEERS_PHASE:
+        warnings.append(
+            f"the trial weight in plane {plane!r} changes no reading by 30 % or 30° (at most "
+            f"{100 * change:.2g} % and {math.degrees(turn):.2g}°): a larger one would be more certain"
+        )
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(
             f"with the trial weight sensor {influence.sensors[worst]!r} would read more than the largest "
             "reading now: take less, or begin with another plane"
         )
-    found = TrialWeight(
+    weight = TrialWeight(
         plane=plane,
-        amount=float(amount) * scale,
+        amount=float(amount),
         angle=angle,
         angle_reach=0.0,
         basis=f"{basis}; angle from the coefficients",
-        radius=trial_radius if trial_radius is not None else radius,
+        radius=at,
         speed=float(influence.speeds.max()),
         load=load,
-        speeds=influence.speeds,
-        sensors=influence.sensors,
-        before=Y,
+        influence=influence,
         expected=expected,
-        labels=made,
+        labels=labels,
     )
-    if load is not None and found.force is not None:
-        warnings += _force_warning(found.force / load)
-    return replace(found, warnings=tuple(warnings))
-
-
-def _seen(
-    before: ComplexArray, expected: ComplexArray, errors: ReadingErrors | None, run: RunErrors, plane: str
-) -> tuple[str, ...]:
-    """Warn of a weight that changes too little: within the errors, or below the engineers' 30 % or 30°."""
-    change = np.abs(expected - before)
-    if errors is not None:
-        alone, common, _, further = run.typical**2
-        squares = np.abs(before) ** 2
-        between = (alone + common) * squares + further * squares.mean()
-        single = mean_variance(reading_covariance(before, errors)) + between
-        if (change**2 <= _SEEN**2 * single).all():
-            return (
-                f"the trial weight in plane {plane!r} changes no reading by more than the errors of two "
-                "readings (95 %): its effect would not be determined",
-            )
-    seen = np.abs(before) > 1e-9 * np.abs(before).max()
-    ratio = expected[seen] / before[seen]
-    amplitude, phase = np.abs(np.abs(ratio) - 1).max(), np.abs(np.angle(ratio)).max()
-    if amplitude < ENGINEERS_AMPLITUDE and phase < ENGINEERS_PHASE:
-        return (
-            f"the trial weight in plane {plane!r} changes no reading by 30 % or 30° (at most "
-            f"{100 * amplitude:.2g} % and {np.degrees(phase):.2g}°): a larger one would be more certain",
-        )
-    return ()
+    force = () if load is None or weight.force is None else _force_warning(weight.force / load)
+    return replace(weight, warnings=(*warnings, *force))
 
 
 def _force_warning(fraction: float) -> tuple[str, ...]:
-    if fraction <= RISKY:
-        return ()
-    return (
-        f"the force of the trial weight is {100 * fraction:.3g} % of the load, more than {100 * RISKY:g} %: "
-        "take less for a first run",
-    )
+    words = "more than 25 %: take less for a first run"
+    high = f"the force of the trial weight is {100 * fraction:.3g} % of the load, {words}"
+    return (high,) if fraction > RISKY else ()
 
 
 def _check_limit(plane: str, amount: float, limit: float, labels: Labels, remedy: str) -> None:
-    positive("largest weight of the plane", limit if math.isfinite(limit) else 1.0)
+    if not limit > 0:
+        raise ValueError(f"the largest weight of the plane must be above 0, not {limit:g}")
     if amount > limit * (1 + 1e-12):
-        shown = (f"{x * labels.weight_scale:.4g} {labels.weight_in}" for x in (amount, limit))
-        first, second = shown
         raise ValueError(
-            f"the trial weight of {first} is larger than the largest weight of plane {plane!r}, "
-            f"{second}: {remedy}"
+            f"the trial weight of {labels.weight_words(amount)} is larger than the largest weight of plane "
+            f"{plane!r}, {labels.weight_words(limit)}: {remedy}"
         )
 
 
@@ -501,9 +430,9 @@ def expected_lag(
     *,
     degrees: float | None = None,
     ratio: float | None = None,
-    damping: float = DAMPING,
+    damping: float = 0.05,
 ) -> Lag:
-    """How far the vibration lags, from one of these.
+    """How far the vibration lags, from the first of these that is given.
 
     Parameters
     ----------
@@ -517,27 +446,25 @@ def expected_lag(
     Raises
     ------
     ValueError
-        Unless exactly one is given, and for impossible numbers.
+        If none is given, and for impossible numbers.
     """
-    if sum(x is not None for x in (where, degrees, ratio)) != 1:
-        raise ValueError("give one of: below, at or above the critical speed; a lag; the critical speed")
     if where is not None:
         if where not in _LAGS:
             raise ValueError(f"the speed is below, at or above the critical speed, not {where!r}")
-        low, middle, high = (math.radians(x) for x in _LAGS[where])
-        return Lag(middle, low, high, f"{where} the critical speed")
+        lag, reach = map(math.radians, _LAGS[where])
+        return Lag(lag, reach, f"{where} the critical speed")
     if degrees is not None:
         if not 0 <= degrees <= 360:
             raise ValueError(f"a lag is from 0 to 360 degrees, not {degrees:g}")
-        lag = math.radians(degrees)
-        return Lag(lag, lag, lag, f"{degrees:g}°, as stated")
-    assert ratio is not None
+        return Lag(math.radians(degrees), 0.0, f"{degrees:g}°, as stated")
+    if ratio is None:
+        raise ValueError("give one of: below, at or above the critical speed; a lag; the critical speed")
     positive("ratio of the speed to the critical speed", ratio)
     positive("damping ratio", damping)
     lag = math.atan2(2 * damping * ratio, 1 - ratio**2)
+    middle = (0.25 if ratio < 1 else 0.75) * math.pi
     words = f"one mode at {ratio:.3g} times the critical speed, damping {damping:g}"
-    low, high = (0.0, math.pi / 2) if ratio < 1 else (math.pi / 2, math.pi)
-    return Lag(lag, low, high, words)
+    return Lag(lag, abs(lag - middle) + math.pi / 4, words)
 
 
 def opposing_angle(
@@ -561,8 +488,6 @@ def opposing_angle(
     quantity
         What the sensor reads.
     """
-    if quantity not in _LEAD:
-        raise ValueError(f"quantity must be one of {', '.join(_LEAD)}, not {quantity!r}")
     angle = phase - _LEAD[quantity] + sensor_angle - key_phasor + lag + math.pi
     return angle % (2 * math.pi)
 

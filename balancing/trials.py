@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from balancing.conventions import Labels
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import off_axis as off_axis
 from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
 
 Arc = tuple[float, float]
 """First angle and width, rad, with the rotation; 0 < width ≤ 2π."""
@@ -42,14 +41,11 @@ class ReadingErrors:
     floor: float = 0.0
 
     def __post_init__(self) -> None:
-        values = {"amplitude": self.amplitude, "phase": self.phase, "floor": self.floor}
-        for name, value in values.items():
-            if not np.isfinite(value) or value < 0:
-                raise ValueError(f"the {name} error of a reading must be a finite number ≥ 0, not {value}")
-        if not any(values.values()):
+        values = self.amplitude, self.phase, self.floor
+        if not (all(0 <= value < np.inf for value in values) and any(values)):
             raise ValueError(
-                "the stated errors of a reading are all zero, and no instrument is that good: "
-                "state amplitude, phase or floor, or state no errors at all"
+                f"the errors of a reading must be finite numbers ≥ 0, not {values}, and not all zero, which "
+                "no instrument is: state amplitude, phase or floor, or state no errors at all"
             )
 
 
@@ -108,8 +104,8 @@ class Trials:
         What the user should know about how the readings were understood.
     steps
         Steps in which the readings are written, of the amplitude (SI) and of the phase (rad): an instrument
-        that shows whole degrees rounds by up to half of one. Shape (2, K, R, S, C), or (2, R, S, C) for
-        K = 1, NaN where there is no reading; None where they are not rounded.
+        that shows whole degrees rounds by up to half of one. Shape (2, K, R, S, C), NaN where there is no
+        reading; None where they are not rounded.
     covariance
         Of real and imaginary part of each reading, as its instrument measured it: shape (2, 2, K, R, S, C),
         NaN where there is no reading; None: nothing measured it.
@@ -140,10 +136,13 @@ class Trials:
     drift: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("runs", "sensors", "planes"):
-            names = check_names(getattr(self, name), name, empty=name == "planes")
-            object.__setattr__(self, name, names)
-        object.__setattr__(self, "speeds", check_speeds(self.speeds))
+        keep(
+            self,
+            runs=check_names(self.runs, "runs"),
+            sensors=check_names(self.sensors, "sensors"),
+            planes=check_names(self.planes, "planes", empty=True),
+            speeds=check_speeds(self.speeds),
+        )
         R, S, C, P = len(self.runs), len(self.speeds), len(self.sensors), len(self.planes)
         readings = np.array(self.readings, dtype=complex)
         if readings.ndim == 3:
@@ -154,35 +153,20 @@ class Trials:
             )
         self._check_readings(readings)
         weights = np.array(self.weights, dtype=complex)
-        if weights.shape != (R, P):
-            raise ValueError(f"weights must have shape ({R} runs, {P} planes); got {weights.shape}")
-        if not np.isfinite(weights).all():
-            r, p = np.argwhere(~np.isfinite(weights))[0]
-            raise ValueError(
-                f"the weight in plane {self.planes[p]!r} of run {self.runs[r]!r} is not a finite number"
-            )
-        self._freeze("readings", readings)
-        self._freeze("weights", weights)
+        if weights.shape != (R, P) or not np.isfinite(weights).all():
+            raise ValueError(f"weights must be finite, of shape ({R} runs, {P} planes); got {weights.shape}")
+        arrays: dict[str, AnyArray] = {"readings": readings, "weights": weights}
         missing = np.isnan(readings)
-        if self.steps is not None:
-            steps = np.array(self.steps, dtype=np.float64)
-            self._freeze("steps", steps[:, None] if steps.ndim == 4 else steps, (2, *readings.shape), missing)
-            if (np.nan_to_num(self.steps) < 0).any():
-                raise ValueError("the step in which a reading is written must be a finite number ≥ 0")
-        if self.covariance is not None:
-            covariance = np.array(self.covariance, dtype=np.float64)
-            self._freeze("covariance", covariance, (2, 2, *readings.shape), missing)
-
-    def _freeze(
-        self, name: str, array: AnyArray, shape: tuple[int, ...] = (), missing: BoolArray | None = None
-    ) -> None:
-        """Keep an array, read-only; NaN where the readings have none, else finite."""
-        if missing is not None:
-            if array.shape != shape or not (missing | np.isfinite(array)).all():
-                raise ValueError(f"{name} must be finite, of shape {shape}, or None; got {array.shape}")
+        for name, axes in (("steps", (2,)), ("covariance", (2, 2))):
+            if getattr(self, name) is None:
+                continue
+            array, shape = np.array(getattr(self, name), dtype=np.float64), (*axes, *readings.shape)
+            wrong = ~np.isfinite(array) | ((array < 0) & (name == "steps"))
+            if array.shape != shape or (wrong & ~missing).any():
+                raise ValueError(f"{name} must be finite, of shape {shape}, steps ≥ 0; got {array.shape}")
             array[..., missing] = np.nan
-        array.flags.writeable = False
-        object.__setattr__(self, name, array)
+            arrays[name] = array
+        keep(self, **arrays)
 
     def _check_readings(self, readings: ComplexArray) -> None:
         missing = np.isnan(readings)
@@ -191,13 +175,11 @@ class Trials:
         # a reading after a gap would be lost: repeats are numbered without holes
         bad[1:] |= ~missing[1:] & missing[:-1]
         if bad.any():
-            k, r, s, c = np.argwhere(bad)[0]
-            rpm = self.speeds[s] * RPM
-            gap = np.isnan(readings[: k + 1, r, s, c]).any()
+            _, r, s, c = np.argwhere(bad)[0]
             raise ValueError(
-                f"the reading of sensor {self.sensors[c]!r} in run {self.runs[r]!r} at {rpm:.6g} rpm is "
-                f"{'missing' if gap else 'infinite'}: every sensor must be read in every run at every speed; "
-                "leave out the sensor or the speed, or repeat the run"
+                f"the reading of sensor {self.sensors[c]!r} in run {self.runs[r]!r} at "
+                f"{self.speeds[s] * RPM:.6g} rpm is missing or infinite: every sensor must be read in every "
+                "run at every speed; leave out the sensor or the speed, or repeat the run"
             )
 
     @property
@@ -208,8 +190,6 @@ class Trials:
     @property
     def mean(self) -> ComplexArray:
         """Mean of the repeated readings, shape (R, S, C)."""
-        if len(self.readings) == 1:
-            return np.asarray(self.readings[0])
         return np.asarray(np.nansum(self.readings, axis=0) / self.repeats)
 
 
@@ -239,43 +219,22 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("max_weight", "residual"):
             array = np.array(getattr(self, name), dtype=np.float64)
-            if np.isnan(array).any() or (array < 0).any():
+            if not (array >= 0).all():
                 raise ValueError(f"the limits {name} must be numbers ≥ 0 (infinite for none)")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            keep(self, **{name: array})
+        arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
+        start, width = arcs.T
         if len(self.forbidden) != len(self.max_weight):
             raise ValueError("there must be arcs, or none, for every plane")
-        for arcs in self.forbidden:
-            for start, width in arcs:
-                if not (np.isfinite(start) and 0 < width <= 2 * np.pi):
-                    raise ValueError(f"an arc of {width} rad from {start} rad is none")
+        if not (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all():
+            raise ValueError(
+                f"there are arcs from no angle, or wider than 2π or than none: {arcs.tolist()} rad"
+            )
 
     @classmethod
     def none(cls, S: int, C: int, P: int) -> Limits:
         """No limits at all, for S speeds, C sensors and P planes."""
         return cls(np.full(P, np.inf), np.full((S, C), np.inf), ((),) * P)
-
-    @classmethod
-    def of(
-        cls,
-        speeds: int,
-        sensors: Sequence[str],
-        planes: Sequence[str],
-        *,
-        max_weight: Mapping[str, float] | None = None,
-        residual: Mapping[str, float | FloatArray] | None = None,
-        forbidden: Mapping[str, Sequence[Arc]] | None = None,
-    ) -> Limits:
-        """Limits by name of plane and sensor; a sensor's limit is a number, or one per speed (S,)."""
-        weight, amplitude = np.full(len(planes), np.inf), np.full((speeds, len(sensors)), np.inf)
-        arcs: list[tuple[Arc, ...]] = [() for _ in planes]
-        for name, value in (max_weight or {}).items():
-            weight[_place(name, planes, "plane")] = value
-        for name, size in (residual or {}).items():
-            amplitude[:, _place(name, sensors, "sensor")] = size
-        for name, own in (forbidden or {}).items():
-            arcs[_place(name, planes, "plane")] = tuple(own)
-        return cls(weight, amplitude, tuple(arcs))
 
     @property
     def any(self) -> bool:
@@ -293,6 +252,14 @@ class Limits:
         )
 
 
+def keep(made: object, **values: object) -> None:
+    """Set attributes of a frozen object; arrays are read-only then."""
+    for name, value in values.items():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+        object.__setattr__(made, name, value)
+
+
 def check_names(names: Sequence[str], what: str, *, empty: bool = False) -> tuple[str, ...]:
     """Names as a tuple.
 
@@ -301,17 +268,14 @@ def check_names(names: Sequence[str], what: str, *, empty: bool = False) -> tupl
     ValueError
         For repeated names, and for none at all unless `empty`.
     """
-    out = tuple(str(n) for n in names)
-    if not out and not empty:
-        raise ValueError(f"there are no {what}")
-    twice = sorted({n for n in out if out.count(n) > 1})
-    if twice:
-        raise ValueError(f"{what} need different names; found twice: {', '.join(twice)}")
+    out = tuple(map(str, names))
+    if len(set(out)) < max(len(out), 1 - empty):
+        raise ValueError(f"{what} need different names, at least one; got {', '.join(out) or 'none'}")
     return out
 
 
 def check_speeds(speeds: FloatArray) -> FloatArray:
-    """Speeds as a read-only array (S,).
+    """Speeds as an array (S,).
 
     Raises
     ------
@@ -319,18 +283,9 @@ def check_speeds(speeds: FloatArray) -> FloatArray:
         For a wrong shape, no speed, speeds that are not finite or not positive, and repeated speeds.
     """
     out = np.array(speeds, dtype=np.float64)
-    if out.ndim != 1 or not len(out):
-        raise ValueError(f"speeds must have shape (S,), at least one; got {out.shape}")
-    if not (np.isfinite(out) & (out > 0)).all():
-        raise ValueError(f"speeds must be finite and greater than zero; got {out.tolist()} rad/s")
-    if len(set(out.tolist())) < len(out):
-        raise ValueError(f"every speed may stand only once; got {out.tolist()} rad/s")
-    out.flags.writeable = False
+    each = set(out.ravel().tolist())
+    if out.shape != (len(each),) or not each or not all(0 < speed < np.inf for speed in each):
+        raise ValueError(
+            f"speeds must be different, finite and greater than zero, of shape (S,); got {out.tolist()} rad/s"
+        )
     return out
-
-
-def _place(name: str, names: Sequence[str], what: str) -> int:
-    if name not in names:
-        hint = did_you_mean(str(name), names)
-        raise ValueError(f"there is no {what} {name!r}{hint}; there are {', '.join(map(repr, names))}")
-    return list(names).index(name)

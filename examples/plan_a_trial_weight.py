@@ -44,13 +44,13 @@ def main() -> dict[str, float]:
     influence = balancing.model_influence(
         job.rotor, job.plane_nodes, job.sensor_places, job.trials.speeds, labels=job.trials.labels
     )
-    baseline = job.trials.readings[0, 0]  # of the only run, (speeds, sensors)
-    modelled = balancing.trial_from_coefficients(influence, baseline, "left", labels=job.trials.labels)
+    today = influence.rebased(job.trials)  # its only run, without weights
+    modelled = balancing.trial_from_coefficients(today, "left")
     print(modelled.summary(), end="\n\n")
 
     # What such a weight would leave, from the same coefficients.
     assert modelled.expected is not None
-    ratio = float(np.linalg.norm(modelled.expected) / np.linalg.norm(baseline))
+    ratio = float(np.linalg.norm(modelled.expected) / np.linalg.norm(today.baseline))
     print(f"rms with the trial weight: {ratio:.1%} of what it was")
     assert aimed.angle is not None
     assert modelled.angle is not None

@@ -112,7 +112,7 @@ def draw_readings(
         For axes that are not polar.
     """
     labels, shown, values = trials.labels, trials.labels.vibration, trials.mean[:, 0, 0]
-    polar = polar_axes(ax, labels.phases_on_paper)
+    polar = polar_axes(ax, labels.phase_sign)
     edges = region_edge(values, covariance[:, 0, 0], 121)
     for r, (run, size, phase) in enumerate(zip(trials.runs, *shown(values), strict=True)):
         name, look = f"{cut(run, 24)}: {figures(size)} at {phase:.0f}°", of_plane(r)

@@ -246,7 +246,6 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
         weights.append(
             trial_from_coefficients(
                 today,
-                today.baseline,
                 name,
                 share=options.share / 100,
                 amount=amount,

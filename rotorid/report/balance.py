@@ -152,7 +152,7 @@ def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any])
 
 def _turn(result: Correction) -> str:
     """What the angle of a weight does to the phase of its vibration."""
-    return "is added to" if result.labels.counted_alike else "is taken from"
+    return "is added to" if result.labels.phase_sign == result.labels.angle_sign else "is taken from"
 
 
 def _discs(

@@ -4,13 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from balancing_data import GRAM, bruel_kjaer, complex_normal, feese_grazier, job, noisy, stored, synthetic
+from balancing_data import (
+    GRAM,
+    bruel_kjaer,
+    complex_normal,
+    feese_grazier,
+    job,
+    limits_by_name,
+    noisy,
+    stored,
+    synthetic,
+)
 from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL, lowest_share
 
-from balancing import Labels, Limits, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
+from balancing import Labels, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
 
 ERRORS = ReadingErrors(0.01, 0.01)
 seeds = st.integers(0, 2**32 - 1)
@@ -265,7 +275,7 @@ def test_limits_are_kept_and_their_errors_are_drawn(method):
     influence = estimate_influence(trials)
     free = correct(influence, method=method)
     most, arc = 0.8 * abs(free.weights[0]), (float(np.angle(free.weights[1]) - 0.2), 0.5)
-    limits = Limits.of(3, influence.sensors, influence.planes, max_weight={"A": most}, forbidden={"B": [arc]})
+    limits = limits_by_name(influence, max_weight={"A": most}, forbidden={"B": [arc]})
     c = correct(influence, method=method, limits=limits)
     assert abs(c.weights[0]) <= most * (1 + 1e-9)
     turn = np.mod(np.angle(c.weights[1]) - arc[0], 2 * np.pi)
@@ -273,14 +283,14 @@ def test_limits_are_kept_and_their_errors_are_drawn(method):
     assert len(c.active) == 2
     assert np.isfinite(c.covariance).all()
     assert (np.abs(c.draws[:, 0]) <= most * (1 + 1e-6)).all()
-    loose = Limits.of(3, influence.sensors, influence.planes, max_weight={"A": 100.0})
+    loose = limits_by_name(influence, max_weight={"A": 100.0})
     assert np.allclose(correct(influence, method=method, limits=loose).weights, free.weights, rtol=1e-6)
 
 
 def test_a_weight_at_its_limit_has_no_error_of_its_size():
     influence = estimate_influence(rotor(0)[0])
     free = correct(influence)
-    limits = Limits.of(3, influence.sensors, influence.planes, max_weight={"A": 0.8 * abs(free.weights[0])})
+    limits = limits_by_name(influence, max_weight={"A": 0.8 * abs(free.weights[0])})
     c = correct(influence, limits=limits)
     assert c.held.tolist() == [True, False]
     assert c.mass_std[0] < 1e-5 * free.mass_std[0]

@@ -9,7 +9,6 @@ from balancing.tables import (
     error_document,
     error_words,
     largest_readings,
-    mounted_rows,
     reading_names,
     rms,
     small,
@@ -40,11 +39,6 @@ def test_the_largest_readings_are_named_with_what_they_were():
     words = largest_readings(Labels("um", 1e6), np.array([100 * np.pi]), ("DE", "NDE"), before, after)
     assert words == ", µm peak: DE at 3000 rpm 3.00 → 1.00; NDE at 3000 rpm 2.00 → 0.200."
     assert reading_names(Labels(), ("DE",), np.array([100 * np.pi])) == ("sensor 'DE' at 3000 rpm",)
-
-
-def test_only_planes_with_a_weight_are_mounted_ones():
-    [row] = mounted_rows(LABELS, ("A", "B"), np.array([0, 2e-3j]))
-    assert (row["plane"], row["mass"], row["angle_deg"]) == ("B", pytest.approx(2), pytest.approx(270))
 
 
 def test_errors_in_words_and_numbers():

@@ -5,11 +5,10 @@ from math import pi
 
 import numpy as np
 import pytest
-from balancing_data import complex_normal, stored, synthetic
+from balancing_data import complex_normal, limits_by_name, stored, synthetic
 
 from balancing import (
     Labels,
-    Limits,
     ReadingErrors,
     correct,
     estimate_influence,
@@ -143,7 +142,7 @@ def test_readings_against_limits(job):
     made, W, _, influence = job
     residual = np.array([2e-4, 1e-4j])
     check = check_run(made, W, residual)
-    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 5.0, "s3": 1e-3})
+    limits = limits_by_name(made, residual={"s1": 5.0, "s3": 1e-3})
     found = verdict_of_check(influence, check, limits=limits)
     assert [(r.name, r.speed) for r in found.rows] == [(s, v) for v in made.speeds for s in ("s1", "s3")]
     for row in found.rows:
@@ -164,7 +163,7 @@ def test_part_of_the_sensors_and_speeds(job):
     part = replace(
         whole, sensors=("s2", "s0"), speeds=made.speeds[1:2], readings=whole.readings[:, :, 1:2, [2, 0]]
     )
-    limits = Limits.of(3, made.sensors, made.planes, residual={"s2": 1.0})
+    limits = limits_by_name(made, residual={"s2": 1.0})
     found = verdict_of_check(influence, part, tolerance=rigid(3e-4), limits=limits)
     assert [r.value for r in found.rows[:2]] == pytest.approx(residual, rel=1e-9)
     assert [r.name for r in found.rows] == ["A", "B", "s2"]
@@ -174,7 +173,7 @@ def test_part_of_the_sensors_and_speeds(job):
 
 def test_prediction(job):
     made, W, Y0, influence = job
-    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 5.0})
+    limits = limits_by_name(made, residual={"s1": 5.0})
     c = correct(influence, limits=limits)
     wide = 10 * np.sqrt(np.trace(c.covariance))
     found = verdict_of_prediction(c, tolerance=rigid(wide))
@@ -196,7 +195,7 @@ def test_words_and_table(job):
     made, W, _, influence = job
     check = check_run(made, W, np.array([2e-4, 1e-4j]))
     labels = Labels(vibration_unit="um", vibration_scale=1.0, weight_unit="g", weight_scale=1e3)
-    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 0.2})
+    limits = limits_by_name(made, residual={"s1": 0.2})
     found = verdict_of_check(
         replace(influence, labels=labels),
         replace(check, labels=labels),

@@ -61,9 +61,8 @@ def foiles(limit=None):
     coefficients = np.array([[polar(line[plane]) for plane in PLANES] for line in table])
     limits = None
     if limit is not None:
-        limits = Limits.of(
-            1, [line["reading"] for line in table], PLANES, max_weight=dict.fromkeys(PLANES, limit)
-        )
+        most, free = np.full(len(PLANES), limit), np.full((1, len(table)), np.inf)
+        limits = Limits(most, free, ((),) * len(PLANES))
     return _correction(coefficients, [line["initial"] for line in table], method="minmax", limits=limits)
 
 

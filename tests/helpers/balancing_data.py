@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from balancing import Gaussian, Influence, Labels, Trials, with_parameters
+from balancing import Gaussian, Influence, Labels, Limits, Trials, with_parameters
 
 GRAM = 1e-3
 
@@ -88,3 +88,16 @@ def stored(W, baseline=None, speeds=None, *, relative=0.0, planes=None, labels=N
 
 def rms(z):
     return float(np.sqrt(np.mean(np.abs(z) ** 2)))
+
+
+def limits_by_name(influence, *, max_weight=None, residual=None, forbidden=None):
+    """Limits of a correction, by the names of planes and sensors."""
+    max_weight, residual, forbidden = max_weight or {}, residual or {}, forbidden or {}
+    free = np.full(len(influence.speeds), np.inf)
+    return Limits(
+        np.array([max_weight.get(name, np.inf) for name in influence.planes]),
+        np.column_stack(
+            [np.broadcast_to(residual.get(name, free), free.shape) for name in influence.sensors]
+        ),
+        tuple(tuple(forbidden.get(name, ())) for name in influence.planes),
+    )

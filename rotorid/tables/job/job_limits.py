@@ -58,8 +58,11 @@ def _limits(said: Said, planes: Planes) -> Limits | None:
         if name in trials.sensors and sensor["limit"]:
             rows = at_speeds(said, sensor.section, "limit", sensor["limit"], trials, math.inf)
             residual[name] = rows / labels.vibration_scale
-    made = Limits.of(
-        len(trials.speeds), trials.sensors, planes.names, max_weight=amount, residual=residual, forbidden=arcs
+    free = np.full(len(trials.speeds), np.inf)
+    made = Limits(
+        np.array([amount.get(name, np.inf) for name in planes.names]),
+        np.column_stack([residual.get(name, free) for name in trials.sensors]),
+        tuple(arcs.get(name, ()) for name in planes.names),
     )
     return made if made.any else None
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, figures
 from rotorid.commands.outcome import Delivered, command, provenance
 
@@ -48,15 +49,18 @@ class TypeFound(Delivered):
 
         kind = self.known.kind
         influence = kind.influence(self.known.labels)
-        found = influence.to_frame()
+        labels, W = influence.labels, influence.W.ravel()
+        where = np.meshgrid(influence.speeds * RPM, influence.sensors, influence.planes, indexing="ij")
+        speeds, sensors, planes = (part.ravel() for part in where)
+        size = np.abs(W) * labels.vibration_scale / labels.weight_scale
         (along, across), (run, turn) = map(kind.scatter, (kind.effects.between, kind.effects.within))
         angle = "{:.1f}".format
         return (
-            Column("speed_rpm", found["speed_rpm"].tolist(), "{:.6g}".format, "rpm"),
-            Column("sensor", found["sensor"].tolist(), str),
-            Column("plane", found["plane"].tolist(), str),
-            Column("influence", found["influence"].tolist(), partial(figures, digits=3), influence.unit),
-            Column("phase_deg", found["phase_deg"].tolist(), angle, "°"),
+            Column("speed_rpm", np.round(speeds, 9), "{:.6g}".format, "rpm"),
+            Column("sensor", sensors.tolist(), str),
+            Column("plane", planes.tolist(), str),
+            Column("influence", size, partial(figures, digits=3), influence.unit),
+            Column("phase_deg", np.degrees(np.angle(W)) % 360.0, angle, "°"),
             Column("between_percent", 100 * along.ravel(), angle, "± % between"),
             Column("between_deg", np.degrees(across.ravel()), angle, "± °"),
             Column("within_percent", 100 * run.ravel(), angle, "± % within"),

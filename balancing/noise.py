@@ -1,0 +1,285 @@
+"""How combinations of runs err: numbers of their own, and columns in common; drawn, and made white.
+
+All errors act linearly. θ = (Y₀, W₁, …, W_P) of every reading errs by numbers of its own and by columns that
+readings have in common,
+
+    δθ = own + Σ column_m · (size of its kind) · z_m,    z real, independent, of variance 1.
+
+For trial runs θ = G Y with the gain G of least squares, so that a run drawn again draws θ again. The size of
+each kind (readings, own part of a run, what is common to it, further unbalance, what is known) comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from balancing.errors import (
+    NO_RUN_ERRORS,
+    Reading,
+    RunErrors,
+    job_columns,
+    own_variance,
+    reading_of,
+    rms,
+    unbalances,
+    usual_run_errors,
+)
+from balancing.regions import real_parts
+from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.regression import covariance_root, stretch, unstretch
+
+BLOCK = 200_000
+"""Readings of a block of draws."""
+READING, OWN, COMMON, LOADS, UNBALANCE, KNOWN = range(6)
+
+
+class Noise(NamedTuple):
+    """How (Y₀, W) err.
+
+    `own` (2, S, C, 2P + 2, 2P + 2): covariances by readings, and by the own part of runs of size 1; `columns`
+    (M, S, C, P + 1) of size 1, and `kind` (M,), which size each has.
+    """
+
+    own: FloatArray
+    columns: ComplexArray
+    kind: IntArray
+
+    def part(self, speeds: Sequence[int], sensors: Sequence[int], planes: Sequence[int]) -> Noise:
+        """Of some speeds, sensors and planes."""
+        chosen = [0, *(1 + p for p in planes)]
+        real = [2 * k + part for k in chosen for part in (0, 1)]
+        return Noise(
+            self.own[np.ix_((0, 1), speeds, sensors, real, real)],
+            self.columns[np.ix_(range(len(self.columns)), speeds, sensors, chosen)],
+            self.kind,
+        )
+
+    def changed(self, change: ComplexArray) -> Noise:
+        """Of other combinations (m, P + 1), or (S, C, m, P + 1), of (Y₀, W)."""
+        real = stretch(change)
+        own = real @ self.own @ np.swapaxes(real, -1, -2)
+        return Noise(own, (change @ self.columns[..., None])[..., 0], self.kind)
+
+    def plus(self, other: Noise) -> Noise:
+        """Together with an independent one."""
+        columns = np.concatenate((self.columns, other.columns))
+        return Noise(self.own + other.own, columns, np.concatenate((self.kind, other.kind)))
+
+    def at(self, sizes: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        """Own covariances (S, C, 2P + 2, 2P + 2) and columns at sizes (6,) of the kinds."""
+        own = np.tensordot(sizes[:2] ** 2, self.own, axes=1)
+        return own, self.columns * sizes[self.kind][:, None, None, None]
+
+    def covariance(self, sizes: FloatArray) -> FloatArray:
+        """Of each reading, (S, C, 2P + 2, 2P + 2), at sizes (6,) of the kinds."""
+        own, columns = self.at(sizes)
+        F = real_parts(columns)
+        return np.asarray(own + np.einsum("mscp,mscq->scpq", F, F, optimize=True))
+
+
+def kind_sizes(run: RunErrors) -> FloatArray:
+    """Typical size of each kind, (6,)."""
+    return np.array([1.0, *run.typical, 1.0])
+
+
+class Mounted(NamedTuple):
+    """What is mounted: name of the run, planes, weights (P,); all zero where nothing is."""
+
+    run: str
+    planes: tuple[str, ...]
+    weights: ComplexArray
+
+
+class Errors(NamedTuple):
+    """Where (Y₀, W) come from, and how they err.
+
+    Attributes
+    ----------
+    noise
+        How they err.
+    reading, run
+        Errors of a reading and of a run that they are made of, and that further readings have.
+    mounted
+        In the last run.
+    trials
+        The runs; None: stored, computed or combined coefficients.
+    """
+
+    noise: Noise
+    reading: Reading
+    run: RunErrors
+    mounted: Mounted
+    trials: Trials | None = None
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Typical size of each kind, (6,)."""
+        return kind_sizes(self.run)
+
+    def draw(self, count: int, seed: int) -> FloatArray:
+        """Sizes of each kind in so many draws, (count, 6); the same for the same seed."""
+        rng = np.random.default_rng([seed, 0])
+        scales = self.reading.scales(rng, count)
+        return np.column_stack((scales, self.run.draw(rng, count), np.ones(count)))
+
+
+class Gaussian(Errors):
+    """Errors of stored, computed or combined coefficients: normal, as they are.
+
+    Parameters
+    ----------
+    own
+        Covariance of (Re Y₀, Im Y₀, Re W₁, …) of each reading without the columns, (S, C, 2P + 2, 2P + 2);
+        zero where nothing is known.
+    columns
+        What readings have in common: Σ column · (independent real normal of variance 1), (M, S, C, P + 1).
+    reading, run
+        Of further readings.
+    mounted
+        What is mounted.
+
+    Attributes
+    ----------
+    noise, trials
+        How (Y₀, W) err; None: there are no runs.
+    """
+
+    def __new__(
+        cls,
+        own: FloatArray,
+        columns: ComplexArray,
+        reading: Reading,
+        run: RunErrors,
+        mounted: Mounted | None = None,
+    ) -> Gaussian:
+        """Normal errors of this covariance."""
+        noise = Noise(np.stack((own, 0 * own)), columns, np.full(len(columns), KNOWN))
+        nothing = Mounted("", (), np.zeros(columns.shape[-1] - 1, dtype=complex))
+        return super().__new__(cls, noise, reading, run, mounted or nothing)
+
+    @classmethod
+    def none(cls, S: int, C: int, P: int) -> Gaussian:
+        """Of coefficients (S, C, P) of which no errors are known."""
+        own = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
+        return cls(own, np.zeros((0, S, C, P + 1), dtype=complex), Reading(), NO_RUN_ERRORS)
+
+
+def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading, run: RunErrors) -> Noise:
+    """Errors of combinations G Y of runs.
+
+    Parameters
+    ----------
+    trials
+        Runs with the readings Y, (R, S, C).
+    W
+        Coefficients (S, C, P) of all their planes.
+    G
+        (S, C, n, R), or (n, R) for all readings.
+    reading, run
+        How they err.
+    """
+    Y = trials.mean
+    R, S, C = Y.shape
+    n = G.shape[-2]
+    G = np.broadcast_to(G, (S, C, n, R))
+    B = stretch(G).reshape(S, C, 2 * n, R, 2)
+    by_size = np.einsum("rsc,ij->rscij", own_variance(Y, run.evenly), np.eye(2))
+    own = [
+        np.einsum("scark,rsckl,scbrl->scab", B, part, B, optimize=True)
+        for part in (reading.covariance(trials), by_size)
+    ]
+    loads = np.einsum("scp,rp->rsc", W, trials.weights)
+    common, loaded = (np.moveaxis(G, -1, 0) * part[..., None] for part in (Y, loads))
+    c = unbalances(W, run.level or rms(Y))
+    further = np.einsum("scnr,scp->rpscn", G, c).reshape(-1, S, C, n)
+    known = np.einsum("scnr,mrsc->mscn", G, job_columns(trials, W))
+    parts = [common, 1j * common, loaded, 1j * loaded, further, 1j * further, known]
+    kinds = (COMMON, COMMON, LOADS, LOADS, UNBALANCE, UNBALANCE, KNOWN)
+    return Noise(np.array(own), np.concatenate(parts), np.repeat(kinds, [len(part) for part in parts]))
+
+
+def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray]:
+    """Errors (B, S, C, P + 1), block by block, at sizes (n, 6) of the draws; the same whatever the blocks."""
+    S, C = noise.own.shape[1:3]
+    step = max(1, BLOCK // (S * C))
+    rngs = [np.random.default_rng([seed, part]) for part in (1, 2, 3)]
+    roots = [covariance_root(part, np.einsum("...ii->...i", part)) for part in noise.own]
+    for start in range(0, len(factors), step):
+        f = factors[start : start + step]
+        z = rngs[2].standard_normal((len(f), len(noise.kind))) * f[:, noise.kind]
+        error = np.tensordot(z, noise.columns, 1)
+        for kind in (READING, OWN):
+            if roots[kind].any() and factors[:, kind].any():
+                z = rngs[kind].standard_normal((len(f), *roots[kind].shape[:-1], 1))
+                error = error + f[:, kind, None, None, None] * unstretch((roots[kind] @ z)[..., 0])
+        yield error
+
+
+class Whitening:
+    """V⁻¹ of a noise at some sizes: blocks of each sensor and speed, and columns in common.
+
+    V = L (1 + F Fᵀ) Lᵀ, `own` = L Lᵀ and F = U s Vᵀ, has the inverse root (1 + U (1/√(1 + s²) − 1) Uᵀ) L⁻¹.
+    """
+
+    def __init__(self, noise: Noise, sizes: FloatArray) -> None:
+        own, columns = noise.at(sizes)
+        n = own.shape[-1]
+        least = 1e-12 * (np.trace(own, axis1=-2, axis2=-1).max() or 1.0) / n
+        self.own: FloatArray = own + least * np.eye(n)
+        self._root = np.linalg.cholesky(self.own)
+        F = self._alone(np.moveaxis(real_parts(columns), 0, -1))
+        self._basis, size, _ = np.linalg.svd(F, full_matrices=False)
+        self._less = 1 - 1 / np.hypot(1, size)
+
+    def _alone(self, columns: FloatArray) -> FloatArray:
+        white = np.asarray(np.linalg.solve(self._root, columns))
+        return white.reshape(self._root[..., 0].size, columns.shape[-1])
+
+    def white(self, columns: FloatArray) -> FloatArray:
+        """Columns (S, C, n, k) with V⁻¹ = wᵀ w, (S C n, k)."""
+        w = self._alone(columns)
+        return np.asarray(w - self._basis @ (self._less[:, None] * (self._basis.T @ w)))
+
+    def chi_square(self, difference: ComplexArray) -> float:
+        """Of differences (S, C, R)."""
+        return float(np.sum(self.white(real_parts(difference)[..., None]) ** 2))
+
+
+def white_rows(
+    trials: Trials, W: ComplexArray, take: FloatArray, least: float = 0.0
+) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, bool]:
+    """Joint errors, of readings and between runs, of rows that combine the runs' mean readings.
+
+    Parameters
+    ----------
+    trials
+        R runs at S speeds by C sensors.
+    W
+        Coefficients of their planes, shape (S, C, P), of about the right size.
+    take
+        Rows (X, R) as combinations of runs, real.
+    least
+        Error of a reading, in its unit, that is added in either direction.
+
+    Returns
+    -------
+    What makes vectors (S, 2 X C, j) independent and of variance 1, flat; the variance (S, 2 X C) of each by
+    itself; whether none of the errors are assumed.
+    """
+    reading, run = reading_of(trials), usual_run_errors(trials)
+    (S, C), X = W.shape[:2], len(take)
+    noise = run_noise(trials, W, take.astype(complex), reading, run)
+    noise.own[READING] += np.kron(take @ take.T, np.eye(2)) * least**2
+    whitening = Whitening(noise, kind_sizes(run))
+
+    def white(vectors: FloatArray) -> FloatArray:
+        parts = vectors.reshape(S, X, C, 2, -1).swapaxes(1, 2)
+        return whitening.white(parts.reshape(S, C, 2 * X, -1))
+
+    alone = np.einsum("scii->sci", whitening.own)
+    variance = alone.reshape(S, C, X, 2).swapaxes(1, 2).reshape(S, -1)
+    return white, variance, "assumed" not in (reading.source, run.origin)
