@@ -4,10 +4,11 @@ With weights D = D₀ + T y (stretched), every limit is a disc: |r₀ᵢ + Wᵢ 
 reading, |D₀ₚ + Tₚ y| ≤ Mₚ for a weight; in min–max wᵢ |r₀ᵢ + Wᵢ T y| ≤ t, t the smallest. A sector in which
 a weight must stand is two half planes. T makes what is minimised a length: |y| for `nearest`, and for min–max
 the columns of all scaled rows orthogonal; so the solver's tolerances mean the same in any unit. The program
-starts from the few discs that D₀ is farthest out of and adds those that its solution violates, hence the
-dual value of the last program is a lower bound for all. Weights are within every limit exactly: limits are
-made tighter by 3e-9 of themselves, more where many digits cancel, and what that costs is in the gap.
-Where a plane may stand in several sectors, branch and bound chooses among them.
+starts from the few discs that D₀ is farthest out of (for min–max the largest amplitudes that least squares
+leaves, with rows reweighted by these a few times: C. L. Lawson, 1961) and adds those that its solution
+violates, hence the dual value of the last program is a lower bound for all. Weights are within every limit
+exactly: limits are made tighter by 3e-9 of themselves, more where many digits cancel, and what that costs is
+in the gap. Where a plane may stand in several sectors, branch and bound chooses among them.
 """
 
 from __future__ import annotations
@@ -31,12 +32,14 @@ PLAIN: Words = "{:.4g}".format
 TOLERANCE = 1e-9
 TIGHTER = (0.3, 3.0, 30.0, 300.0, 3000.0)
 """By how many tolerances limits are tightened, one after the other until all are kept."""
-AT_LIMIT = 1e-5
-"""A limit is reached where less than this share of it is left."""
+AT_LIMIT = 2e-3
+"""A limit is reached where less than this share of it is left: solvers stay a little inside."""
 PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""
-FIRST, MORE = 5, 3
+FIRST, MORE = 3, 3
 """Discs a plane that a program starts from, and that are added to it."""
+STEPS = 4
+"""Of reweighting before min–max."""
 TURN, TINY = 2 * np.pi, 1e-300
 
 
@@ -203,15 +206,11 @@ def nearest(
     def bound(value: float) -> float:
         return float(np.sqrt(floor**2 + 2 * max(value, 0.0)))
 
-    goal = _Goal(
-        target, np.asarray(np.linalg.inv(root)), np.zeros(bounds.W.shape[0] + len(target)), objective, bound
-    )
-    return _best(bounds, goal, None, tolerance)
+    shares = np.zeros(len(bounds.Y) + len(target))
+    return _best(bounds, _Goal(target, np.linalg.inv(root), shares, objective, bound), tolerance)
 
 
-def smallest_maximum(
-    bounds: Bounds, shares: FloatArray, first: BoolArray | None = None, tolerance: float = TOLERANCE
-) -> Optimum:
+def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLERANCE) -> Optimum:
     """Weights within limits that minimise max wᵢ |Yᵢ + Wᵢ D|, and wₚ |Dₚ| where that counts, too.
 
     Parameters
@@ -220,8 +219,6 @@ def smallest_maximum(
         Of planes that may all carry a weight.
     shares
         w ≥ 0 of the readings and of the weights, (N + P,).
-    first
-        Those of them to start from; default the largest ones that least squares leaves.
     tolerance
         Of the solver, relative.
 
@@ -232,50 +229,61 @@ def smallest_maximum(
     """
     E, e, limit = bounds.stacked()
     on, limited, none = shares > 0, np.isfinite(limit), np.zeros(E.shape[1], dtype=complex)
+    rows = shares[on, None] * E[on]
 
     def objective(weights: ComplexArray) -> float:
         return float((shares * np.abs(e + E @ weights)).max())
 
-    rows = shares[on, None] * E[on]
-    start = _shortened(solution(rows, -shares[on] * e[on]), bounds.max_weight)
+    start = _shortened(_levelled(rows, shares[on] * e[on]), bounds.max_weight)
     if objective(start) >= objective(none):
         start = none
     left, unit = e + E @ start, objective(start)
-    out = np.abs(left) > limit
     if unit <= 1e-12 * objective(none) or not len(none):
         if within(bounds, start):  # nothing is left to minimise
             return Optimum(start, unit, 0.0, (shares * np.abs(left) >= unit).astype(float))
         if not len(none):
             raise InfeasibleError("no plane may carry a weight")
+        out = np.abs(left) > limit
         unit = float(np.abs(rows @ solution(E[out], -left[out])).max()) if out.any() else 0.0
     unit = unit or float(np.abs(rows).max()) or 1.0
     size = np.maximum(np.maximum(limit, np.abs(left)), TINY)[limited]
     scaled = np.concatenate((rows / unit, E[limited] / size[:, None]))
     values, vectors = np.linalg.eigh(scaled.conj().T @ scaled)
     transform = stretch(vectors * np.sqrt(len(scaled) / np.maximum(values, 1e-12 * values[-1])))
-    goal = _Goal(start, transform, shares / unit, objective, lambda value: unit * value)
-    return _best(bounds, goal, first, tolerance)
+    return _best(bounds, _Goal(start, transform, shares / unit, objective, lambda t: unit * t), tolerance)
 
 
-def _best(bounds: Bounds, goal: _Goal, first: BoolArray | None, tolerance: float) -> Optimum:
+def _levelled(rows: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Unknowns x that leave nearly the least maximum of |right + rows x|."""
+    Q, R = np.linalg.qr(rows)
+    x, counts = -(Q.conj().T @ right), np.ones(len(rows))
+    for _ in range(STEPS):
+        counts = counts * np.abs(right + Q @ x) ** 2
+        counts = counts / counts.max(initial=TINY) + 1e-8
+        weighed = counts * Q.conj().T
+        x = np.linalg.solve(weighed @ Q, -(weighed @ right))
+    return np.asarray(solution(R, x))
+
+
+def _best(bounds: Bounds, goal: _Goal, tolerance: float) -> Optimum:
     """Branch and bound: a plane whose weight stands at a forbidden angle is tried in each of its sectors."""
-
-    def branch(chosen: tuple[Arc | None, ...], best: Optimum | None) -> Optimum | None:
+    best: Optimum | None = None
+    branches: list[tuple[Arc | None, ...]] = [(None,) * len(goal.start)]
+    while branches:
+        chosen = branches.pop()
         try:
-            optimum = _convex(bounds, chosen, goal, first, tolerance)
+            optimum = _convex(bounds, chosen, goal, tolerance)
         except InfeasibleError:
-            return best
+            continue
         if best is not None and optimum.objective * (1 - optimum.gap) >= best.objective:
-            return best
-        pairs = enumerate(zip(optimum.weights.tolist(), bounds.sectors, strict=True))
-        plane = next((p for p, pair in pairs if not stands_in(*pair)), None)
+            continue
+        inside = map(stands_in, optimum.weights.tolist(), bounds.sectors)
+        plane = next((p for p, stands in enumerate(inside) if not stands), None)
         if plane is None:
-            return optimum
-        for sector in bounds.sectors[plane] or ():
-            best = branch((*chosen[:plane], sector, *chosen[plane + 1 :]), best)
-        return best
-
-    best = branch((None,) * len(goal.start), None)
+            best = optimum
+            continue
+        sectors = reversed(bounds.sectors[plane] or ())
+        branches += [(*chosen[:plane], sector, *chosen[plane + 1 :]) for sector in sectors]
     if best is None:
         raise InfeasibleError("no weights are within the limits")
     if best.gap > 1e-3:
@@ -286,33 +294,30 @@ def _best(bounds: Bounds, goal: _Goal, first: BoolArray | None, tolerance: float
     return best
 
 
-def _convex(
-    bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, first: BoolArray | None, tolerance: float
-) -> Optimum:
+def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, tolerance: float) -> Optimum:
     """The best weights with at most one sector for each plane."""
     E, e, limit = bounds.stacked()
     start, T, shares = goal.start, goal.transform, goal.shares
     P, left = len(start), e + E @ start
-    rising = np.flatnonzero(shares > 0)
-    index = np.concatenate((rising, np.flatnonzero(np.isfinite(limit))))
-    rises = np.arange(len(index)) < len(rising)
+    index = np.concatenate((np.flatnonzero(shares), np.flatnonzero(np.isfinite(limit))))
+    rises = np.arange(len(index)) < np.count_nonzero(shares)
     # discs |known + rows y| ≤ head, or t where it rises, each divided by its size
-    size = np.where(rises, 1 / np.maximum(shares, TINY)[index], np.maximum(limit, np.abs(left))[index])
+    size = np.maximum(limit, np.abs(left))[index]
+    size[rises] = 1 / shares[shares > 0]
     size = np.maximum(size, TINY)
     head, known = np.where(rises, 0.0, limit[index]) / size, left[index] / size
     rows = (stretch(E) @ T).reshape(-1, 2, 2 * P)[index] / size[:, None, None]
     sides, right = _sides(chosen, start, T)
     excess, scale = np.where(rises, 0.0, np.abs(known) - head), 1.0
-    if not len(rising):  # the way to go is about as long as the way to the farthest disc or side
+    if not rises.any():  # the way to go is about as long as the way to the farthest disc or side
         reach = np.linalg.norm(rows, axis=(1, 2))
         steps = excess / np.maximum(reach, 1e-9 * reach.max(initial=0.0))
         scale = float(np.concatenate((steps, -right)).max(initial=0.0))
         if not scale > 0:
             return Optimum(start, goal.objective(start), 0.0, np.zeros(len(e)))
         rows, sides, T = scale * rows, scale * sides, scale * T
-    active = (excess > 0) if first is None else first[index]
-    if first is None:
-        active[np.argsort(-np.abs(known[rises]))[: FIRST * P]] = True
+    active = excess > 0
+    active[np.argsort(-np.abs(known[rises]))[: FIRST * P]] = True
     for tighter in TIGHTER:
         inner = head * (1 - tighter * tolerance)
         while True:
@@ -323,8 +328,8 @@ def _convex(
             if not len(more):
                 break
             active[more[np.argsort(-out[more])[: MORE * P]]] = True
-        pairs = zip((start + unstretch(T @ y)).tolist(), chosen, strict=True)
-        weights = _shortened(np.array([project(*pair) for pair in pairs]), bounds.max_weight)
+        weights = np.array(list(map(project, (start + unstretch(T @ y)).tolist(), chosen)))
+        weights = _shortened(weights, bounds.max_weight)
         if (np.abs(e + E @ weights) <= limit).all():
             break
     else:
@@ -382,7 +387,11 @@ def _program(
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.presolve_enable, settings.max_threads = False, False, 1
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
-    solved = clarabel.DefaultSolver(curvature, q, csc_matrix(A), b, cones, settings).solve()
+    for refined in (False, True):  # steps of full accuracy take half as long again, and are hardly needed
+        settings.iterative_refinement_enable = refined
+        solved = clarabel.DefaultSolver(curvature, q, csc_matrix(A), b, cones, settings).solve()
+        if str(solved.status) == "Solved":
+            break
     if "PrimalInfeasible" in str(solved.status):
         raise InfeasibleError("no weights are within the limits")
     x = np.append(solved.x, 0.0)
@@ -391,8 +400,8 @@ def _program(
 
 def explain(
     bounds: Bounds,
-    planes: Sequence[str],
-    readings: Sequence[str],
+    planes: Sequence[str] = (),
+    readings: Sequence[str] = (),
     amplitude: Words = PLAIN,
     weight: Words = PLAIN,
 ) -> str:
@@ -403,11 +412,13 @@ def explain(
     bounds
         Limits that no weights meet, some of them of amplitudes.
     planes, readings
-        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm".
+        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm"; default "1", … and "reading 1", ….
     amplitude, weight
         Write a number with its unit.
     """
     L, M, used = bounds.residual, bounds.max_weight, bounds.used
+    planes = planes or [str(p + 1) for p in range(len(M))]
+    readings = readings or [f"reading {i + 1}" for i in range(len(L))]
     rounding = "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
     if not L.all():
         return rounding

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, check_planes, conditioning, unresolved
+from balancing.cones import Bounds, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
 from balancing.influence import Influence, Whitening, match_speeds
@@ -162,6 +163,10 @@ def fit_part(
     errors, N = part.known_errors, part.baseline.size
     asked = method or ("weighted" if errors and strength is None else "least-squares")
 
+    def conflict(bounds: Bounds) -> str:
+        labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
+        return explain(bounds, part.planes, readings, labels.amplitude_words, labels.weight_words)
+
     def by(name: str) -> Solution:
         P = len(part.planes)
         return solve(
@@ -174,9 +179,7 @@ def fit_part(
             limits=limits,
             strength=strength,
             names=part.planes,
-            readings=reading_names(part.labels, part.sensors, part.speeds),
-            amplitude=part.labels.amplitude_words,
-            weight=part.labels.weight_words,
+            conflict=conflict,
             explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
         )
 
