@@ -151,8 +151,8 @@ def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray
     UndeterminedError
         Naming the planes, and the run to add.
     """
-    for plane, there in zip(planes, weights.any(axis=0), strict=True):
-        if not there:
+    for p, plane in enumerate(planes):
+        if not weights[:, p].any():
             raise UndeterminedError(
                 f"no run has a weight greater than zero in plane {plane!r}: "
                 "make a run with a trial weight there, or leave the plane out"

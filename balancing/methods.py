@@ -134,10 +134,8 @@ class Job(NamedTuple):
         residual, share = self.Y + self.W @ D, 1 - AT_LIMIT
         left = self.w * np.abs(residual)
         objective = float(left.max() if self.method == "minmax" else np.linalg.norm(left))
-        heavy, high = (
-            np.abs(D) >= share * self.bounds.max_weight,
-            np.abs(residual) >= share * self.bounds.residual,
-        )
+        heavy = np.abs(D) >= share * self.bounds.max_weight
+        high = np.abs(residual) >= share * self.bounds.residual
         return Solution(D, residual, objective, heavy, high, resolve, **more)
 
 
