@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.text import counted
 from rotorid.regression import RCOND, WORD_TOLERANCE, solution
 
-NEARLY_ALIKE = 10.0
-"""Above this condition number planes do the same but for a fifth of their effect: they are named."""
+NEARLY_ALIKE = 30.0
+"""Planes with a larger condition number are named."""
 ROUNDING = 1e-9
 """An effect below this share is rounding."""
 HOPELESS = 1e3
@@ -45,8 +44,6 @@ class Conditioning:
     ----------
     planes
         Names, P.
-    readings
-        Their number, N.
     lengths
         Of the columns, shape (P,).
     singular_values
@@ -56,7 +53,6 @@ class Conditioning:
     """
 
     planes: tuple[str, ...]
-    readings: int
     lengths: FloatArray
     singular_values: FloatArray
     directions: ComplexArray
@@ -87,14 +83,14 @@ class Conditioning:
     def sentence(self) -> str:
         """What is determined, which planes act alike, and what to do."""
         P, condition = len(self.planes), self.condition_number
-        words = (
-            f"{counted(P, 'plane')}, {counted(self.readings, 'reading')}: rank {self.rank} of {P}, "
-            f"condition number {condition:.3g}."
-        )
+        planes = {1: "The plane is", 2: "Both planes are"}.get(P, f"All {P} planes are")
+        words = f"{planes} determined (rank {self.rank} of {P}, condition number {condition:.3g})."
+        if self.rank < P:
+            words = f"Rank {self.rank} of {P}: not all planes are determined."
         if condition <= NEARLY_ALIKE:
             return words
-        planes = ", ".join(repr(self.planes[p]) for p in self.weakest)
-        return f"{words} Planes {planes} act nearly alike: leave one out, or add sensors or speeds."
+        alike = ", ".join(repr(self.planes[p]) for p in self.weakest)
+        return f"{words} Planes {alike} act alike or nearly so: leave one out, or add sensors or speeds."
 
 
 def conditioning(W: ArrayLike, planes: Sequence[str]) -> Conditioning:
@@ -116,7 +112,7 @@ def conditioning(W: ArrayLike, planes: Sequence[str]) -> Conditioning:
     N, P = K.shape
     lengths = np.linalg.norm(K, axis=0)
     _, s, Vh = np.linalg.svd(K / np.where(lengths > 0, lengths, 1.0), full_matrices=N < P)
-    return Conditioning(tuple(planes), N, lengths, np.pad(s, (0, P - len(s))), Vh.conj().T)
+    return Conditioning(tuple(planes), lengths, np.pad(s, (0, P - len(s))), Vh.conj().T)
 
 
 def chance(chi_square: float, n: int, dof: int | None = None) -> float:

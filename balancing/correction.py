@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from balancing.convention_test import ConventionTest, OtherReading, assumptions
 from balancing.conventions import Labels
 from balancing.influence import Influence, Mounted
 from balancing.methods import Solution, method_words
-from balancing.regions import NORMAL_RADIUS, Region, half_width, reach, real_parts
+from balancing.regions import NORMAL_RADIUS, Region, half_width, reach
 from balancing.tables import (
     INVISIBLE,
     ROUNDING,
@@ -43,8 +44,10 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
-_TOUCHES = 2e-3
-"""Relative distance from a limit that counts as none (the solver stays a little inside)."""
+HARDLY_APART = 10.0
+"""Above this condition number two planes do the same but for a fifth of their effect."""
+STATIC = 0.2
+"""Difference of the effects of two planes, relative, below which their sum is called the static part."""
 _NAME = 16
 """So many letters of the name of a run stand over a column."""
 
@@ -229,51 +232,66 @@ class Correction(Answered):
     @property
     def covariance(self) -> FloatArray:
         """Of (Re D₁, Im D₁, …), (2P, 2P); NaN where errors are unknown."""
-        if not self.region_known:
-            return np.full((2 * len(self.planes),) * 2, np.nan)
-        return np.asarray(np.cov(real_parts(self.draws).T))
+        return self.region().covariance
 
-    @property
-    def _turned(self) -> ComplexArray:
-        """Draws seen along each weight, (n, P): size and angle off in real and imaginary part."""
+    @cached_property
+    def _off(self) -> tuple[FloatArray, FloatArray]:
+        """How far draws (n, P) are off in size, along a weight within its own error, and in angle (rad)."""
         size = np.abs(self.weights)
-        unit = np.where(size > 0, self.weights, 1.0) / np.where(size > 0, size, 1.0)
-        return np.asarray(self.draws / unit)
+        draws = self.draws if self.region_known else np.full((1, len(size)), np.nan)
+        along = draws / np.exp(1j * np.angle(self.weights))
+        sizes = np.where(self._clear, np.abs(draws), along.real) - size
+        return sizes, np.where(self._clear, np.angle(along), np.nan)
 
-    @property
-    def _sizes(self) -> FloatArray:
-        """Sizes of draws (n, P); along the weight where it is within its own error."""
-        return np.where(self._clear, np.abs(self.draws), self._turned.real)
+    @cached_property
+    def _clear(self) -> BoolArray:
+        """Whether the 95 % region of each weight (P,) leaves zero out, so that its angle is determined."""
+        nothing = np.zeros(1, dtype=complex)
+        return np.array([bool(w) and not self.region([p]).holds(nothing) for p, w in enumerate(self.weights)])
 
     @property
     def mass_std(self) -> FloatArray:
         """Standard deviation (P,) of the weights' sizes; NaN where errors are unknown."""
-        return self._sizes.std(axis=0) if self.region_known else np.full(len(self.planes), np.nan)
+        return np.asarray(self._off[0].std(axis=0))
 
     @property
     def angle_std(self) -> FloatArray:
-        """Standard deviation (P,) of the weights' angles, rad; NaN for a weight within its own error.
-
-        Within its own error is a weight whose 95 % region holds zero: its angle is not determined.
-        """
-        if not self.region_known:
-            return np.full(len(self.planes), np.nan)
-        return np.where(self._clear, np.angle(self._turned).std(axis=0), np.nan)
-
-    @property
-    def _clear(self) -> BoolArray:
-        nothing = np.zeros(1, dtype=complex)
-        if not self.region_known:
-            return np.ones(len(self.planes), dtype=bool)
-        clear = [bool(w) and not self.region([p]).holds(nothing) for p, w in enumerate(self.weights)]
-        return np.array(clear)
+        """Standard deviation (P,) of the weights' angles, rad; NaN for one whose 95 % region holds zero."""
+        return np.asarray(self._off[1].std(axis=0))
 
     def half_widths(self) -> tuple[FloatArray, FloatArray]:
         """Half widths (P,) of 95 % intervals of the weights' sizes and angles (rad); NaN: not known."""
-        if not self.region_known:
-            return self.mass_std, self.angle_std
-        angles = np.where(self._clear, half_width(np.angle(self._turned)), np.nan)
-        return half_width(self._sizes - np.abs(self.weights)), angles
+        return half_width(self._off[0]), half_width(self._off[1])
+
+    @property
+    def combination(self) -> str:
+        """What is determined of two planes that are hardly told apart, and what is not; else empty.
+
+        The columns w of both planes, scaled to length 1, differ by little but a factor: w₂ ≈ ρ w₁. Then
+        D₁ + ρ D₂, the weight in the first plane that does the same, is determined, and
+        (D₁ − ρ D₂) / 2 is not. With ρ ≈ 1 they are the static part and the couple.
+        """
+        apart, labels = self.conditioning, self.labels
+        if len(self.planes) != 2 or not self.region_known or apart.condition_number <= HARDLY_APART:
+            return ""
+        v = apart.directions[:, 0].conj() * apart.lengths
+        ratio = v[1] / v[0]
+        static = bool(abs(ratio - 1) < STATIC)
+        ways = np.array([[1, 0.5], [1, -0.5]]) if static else np.array([[1, 0.5], [ratio, -0.5 * ratio]])
+        both, widths = self.weights @ ways, half_width((self.draws - self.weights) @ ways)
+        if abs(both[1]) > widths[1]:
+            return ""
+        size, angle = map(float, labels.weight(both[0]))
+        sure, open_ = (figures(width * labels.weight_scale, 2) for width in widths)
+        unit = labels.weight_in
+        shown = f"{three_figures(size)} ± {sure} {unit} at {degrees(angle)}"
+        if static:
+            return f"static part {shown}; couple not determined: ± {open_} {unit}"
+        first, second = map(repr, self.planes)
+        return (
+            f"planes {first} and {second} together do what {shown} would in {first} alone; "
+            f"how it is shared between them is not determined: ± {open_} {unit}"
+        )
 
     @property
     def to_add(self) -> ComplexArray:
@@ -297,23 +315,24 @@ class Correction(Answered):
     @property
     def active(self) -> tuple[str, ...]:
         """Limits that bind, in words."""
-        if self.limits is None:
+        limits, labels, fitted = self.limits, self.labels, self.fitted
+        if limits is None:
             return ()
-        weight, amplitude = self.labels.weight_words, self.labels.amplitude_words
+        names = reading_names(labels, self.sensors, self.speeds)
         words = [
-            f"plane {name!r} has its largest weight, {weight(float(limit))}"
-            for name, D, limit in zip(self.planes, self.weights, self.limits.max_weight, strict=True)
-            if abs(D) >= limit * (1 - _TOUCHES)
+            f"plane {name!r} has its largest weight, {labels.weight_words(float(limit))}"
+            for name, limit, at in zip(self.planes, limits.max_weight, fitted.active_weights, strict=True)
+            if at
         ]
-        names = reading_names(self.labels, self.sensors, self.speeds)
+        highest = zip(names, limits.residual.ravel(), fitted.active_residuals, strict=True)
         words += [
-            f"{name} has its largest amplitude, {amplitude(float(limit))}"
-            for name, z, limit in zip(names, self.after.ravel(), self.limits.residual.ravel(), strict=True)
-            if abs(z) >= limit * (1 - _TOUCHES)
+            f"{name} has its largest amplitude, {labels.amplitude_words(float(limit))}"
+            for name, limit, at in highest
+            if at
         ]
         words += [
             f"plane {name!r} stands at the end of a forbidden arc"
-            for name, D, arcs in zip(self.planes, self.weights, self.limits.forbidden, strict=True)
+            for name, D, arcs in zip(self.planes, self.weights, limits.forbidden, strict=True)
             if D and any(np.abs(np.angle(D * np.exp([-1j * a, -1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
         ]
         return tuple(words)
@@ -334,9 +353,10 @@ class Correction(Answered):
         within = [
             f"the weight in plane {plane!r} lies within its own error: its angle is not determined"
             for plane, clear, weight in zip(self.planes, self._clear, self.weights, strict=True)
-            if weight and not clear
+            if weight and not clear and self.region_known
         ]
-        return (*self.influence.remarks.notes, *within, *self.decision.notes)
+        together = [self.combination] if self.combination else within
+        return (*self.influence.remarks.notes, *together, *self.decision.notes)
 
     @property
     def sound(self) -> bool:
@@ -381,7 +401,7 @@ class Correction(Answered):
                 "limits_that_bind": self.active,
                 "errors": error_document(self.influence.reading, self.influence.run_errors, self.labels),
                 "convention_test": None if self.convention_test is None else asdict(self.convention_test),
-                "other_readings": [row for other in self.others for row in self._other_rows(other)],
+                "other_readings": [row for other in self.others for row in other.rows],
                 "assumptions": assumptions(self.labels, self.convention_test, self.others),
                 "warnings": self.warnings,
                 "notes": self.notes,
@@ -395,33 +415,33 @@ class Correction(Answered):
         `equivalent_added_deg` the angle of the added weight that would do the same. Where a convention is
         assumed, `mass_if_…` and `angle_deg_if_…` say what the other reading gives.
         """
-        shown = frame([column for column in self._weight_columns() if column.name != "covariance"])
-        action, at = shown.pop("action"), shown.pop("remove_at_deg")
+        *numbers, _, action, _ = self._weight_columns()
+        shown = frame(numbers)
         if self.remove:
-            shown.insert(1, "action", action)
+            shown.insert(1, "action", action.values)
             shown["equivalent_added_deg"] = shown["angle_deg"]
-            shown["angle_deg"] = at.fillna(shown["angle_deg"])
+            shown["angle_deg"] = self.places(self.planes, self.weights)
         for other in self.others:
             word = other.words.replace(" ", "_")
-            shown[f"mass_if_{word}"] = other.labels.weight(other.weights)[0]
-            shown[f"angle_deg_if_{word}"] = self._other_places(other)
+            shown[f"mass_if_{word}"] = [row["mass"] for row in other.rows]
+            shown[f"angle_deg_if_{word}"] = other.places
         return shown
-
-    def residuals_frame(self) -> pd.DataFrame:
-        """One row per speed and sensor: amplitude and phase before and after (NaN: after is nothing)."""
-        return frame(self._residual_columns()[:-1])
 
     def sentence(self) -> str:
         """Whether to mount what, and what a check run will read."""
+        together = f"{capital(self.combination)}." if self.combination else ""
         if not self.sound:
             first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
-            return "\n".join([*first, *self.decision.lines()])
+            stop, *instead = self.decision.lines() or ("",)
+            return "\n".join(filter(None, (*first, stop, together, *instead)))
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
         what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
         ways = {"phase": f"phases {self.labels.phase}", "angles": f"angles count {self.labels.angle_words}"}
         taken = " and ".join(ways[name] for name in self.labels.assumed) if self.others else ""
-        return f"{what}{f', if {taken} as assumed' if taken else ''}: {self._rms_words()}."
+        what += f", if {taken} as assumed" if taken else ""
+        left = self._rms_words()
+        return f"{what}: {self.combination}. Predicted: {left}." if together else f"{what}: {left}."
 
     @property
     def answer(self) -> Answer:
@@ -439,7 +459,7 @@ class Correction(Answered):
             first,
             f"{self._weights_text()}\n\nLargest left{left}",
             (() if sure else taken) + self.warnings[len(self.contradictions) :],
-            (taken if sure else ()) + self.notes,
+            (taken if sure else ()) + tuple(note for note in self.notes if note != self.combination),
             tuple(table for table in tables if table),
             "every reading, method and errors",
         )
@@ -456,7 +476,10 @@ class Correction(Answered):
 
     def otherwise(self, words: str) -> OtherReading:
         """What a correction under other conventions notes of this one; in words, what is otherwise in it."""
-        return OtherReading(words, self.labels, self.weights, self.to_add)
+        labels, planes = self.labels, self.planes
+        head = {"if": words, "phase": labels.phase, "angles": labels.angle_words}
+        each = rows(self._work_columns(planes, self.weights, ()))
+        return OtherReading(words, [head | row for row in each], self.places(planes, self.weights).tolist())
 
     def vibration_columns(
         self, rounding: float = INVISIBLE, after: ComplexArray | None = None
@@ -479,13 +502,9 @@ class Correction(Answered):
 
     def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
         """Weights of planes as JSON types, and where to take material away from some."""
-        added = weight_rows(self.labels, planes, weights)
-        for row, at in zip(added, self.places(planes, weights).tolist(), strict=True):
-            if row["plane"] in self.remove:
-                row.update(action="remove", remove_at_deg=at)
-            elif self.remove:
-                row.update(action="add", remove_at_deg=None)
-        return added
+        action = (self._actions(planes),) if self.remove else ()
+        columns = self._work_columns(planes, weights, action)
+        return rows(columns if self.remove else columns[:-1])
 
     def plane_limits(self, p: int) -> dict[str, Any]:
         """Largest weight and forbidden arcs of a plane as the job writes them: where to work, from and to."""
@@ -497,18 +516,26 @@ class Correction(Answered):
             "forbidden_deg": [self.labels.arc(*a, opposite=opposite) for a in self.limits.forbidden[p]],
         }
 
+    def _actions(self, planes: Sequence[str]) -> Column:
+        return Column("action", ["remove" if plane in self.remove else "add" for plane in planes])
+
+    def _work_columns(
+        self, planes: Sequence[str], weights: ComplexArray, between: Sequence[Column]
+    ) -> tuple[Column, ...]:
+        gone = [plane in self.remove for plane in planes]
+        at = Column("remove_at_deg", np.where(gone, self.places(planes, weights), np.nan))
+        return (*weight_columns(self.labels, planes, weights), *between, at)
+
     def _weight_columns(self) -> tuple[Column, ...]:
-        gone = [plane in self.remove for plane in self.planes]
-        P = len(gone)
+        P = len(self.planes)
         blocks = np.einsum("papb->pab", self.covariance.reshape(P, 2, P, 2))
-        return (
-            *weight_columns(self.labels, self.planes, self.weights),
+        errors = (
             Column("mass_std", self.mass_std * self.labels.weight_scale),
             Column("angle_std_deg", np.degrees(self.angle_std)),
             Column("covariance", self.labels.weight_covariance(blocks) if self.region_known else [None] * P),
-            Column("action", ["remove" if away else "add" for away in gone]),
-            Column("remove_at_deg", np.where(gone, self.places(self.planes, self.weights), np.nan)),
+            self._actions(self.planes),
         )
+        return self._work_columns(self.planes, self.weights, errors)
 
     def _residual_columns(self) -> tuple[Column, ...]:
         covariance = self.after_covariance if self.errors_known else None
@@ -528,76 +555,50 @@ class Correction(Answered):
             },
         }
 
-    def _other_places(self, other: OtherReading) -> FloatArray:
-        influence = replace(self.influence, labels=other.labels)
-        return replace(self, influence=influence).places(self.planes, other.weights)
-
-    def _other_rows(self, other: OtherReading) -> list[dict[str, Any]]:
-        n = len(self.planes)
-        gone = [plane in self.remove for plane in self.planes]
-        return rows(
-            (
-                Column("if", (other.words,) * n),
-                Column("phase", (other.labels.phase,) * n),
-                Column("angles", (other.labels.angle_words,) * n),
-                *weight_columns(other.labels, self.planes, other.weights),
-                Column("remove_at_deg", np.where(gone, self._other_places(other), np.nan)),
-            )
-        )
-
-    def _other_columns(self, shown: FloatArray) -> list[Column]:
-        """The angles if a convention is otherwise, and the mass where that is another than the one shown."""
-        columns = []
-        for other in self.others:
-            places = map(degrees, self._other_places(other))
-            masses = map(figures, other.labels.weight(other.weights)[0])
-            cells = [
-                place if mass == figures(here) else f"{mass} at {place}"
-                for place, mass, here in zip(places, masses, shown, strict=True)
-            ]
-            columns.append(Column(f"if {other.words}", cells, str))
-        return columns
-
     def _weights_text(self) -> str:
-        unit, mass = self.labels.weight_in, self.labels.weight(self.weights)[0]
-        removed = set(self.planes) & set(self.remove)
+        labels, removed = self.labels, set(self.planes) & set(self.remove)
+        plane, mass, *_ = weight_columns(labels, self.planes, self.weights)
         work = [Column("", ["(remove)" if p in removed else "(add)" for p in self.planes], str)]
         columns = [
-            Column("plane", self.planes, str),
+            plane,
             *(work if removed else []),
-            Column(unit, mass, figures),
+            mass,
             Column("angle", self.places(self.planes, self.weights), degrees),
-            *self._width_columns(unit),
-            *self._other_columns(mass),
+            *self._width_columns(),
         ]
-        taken = f" ({' and '.join(self.labels.assumed)} assumed)" if self.labels.assumed else ""
-        conventions = f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}"
+        for other in self.others:  # the mass where that is another than the one shown
+            cells = [
+                degrees(at)
+                if figures(row["mass"]) == figures(here)
+                else f"{figures(row['mass'])} at {degrees(at)}"
+                for row, at, here in zip(other.rows, other.places, mass.values, strict=True)
+            ]
+            columns.append(Column(f"if {other.words}", cells, str))
+        taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
+        conventions = f"{capital(labels.turning_in_words())}; phases as {labels.phase}{taken}"
         lines = [f"{conventions}; weights for the bare rotor."]
         if self.mounted.weights.any():
-            stays = self._in_planes(self.to_add)
+            planes, run = self.mounted.planes, self.mounted.run
+            sizes, places = labels.weight(self.to_add)[0], self.places(planes, self.to_add)
+            each = zip(planes, sizes, places, strict=True)
+            stays = {plane: f"{figures(size)} at {degrees(at)}" for plane, size, at in each if size}
+            word = "remove" if removed == set(self.planes) else "add"
             cells = [stays.pop(plane, "nothing") for plane in self.planes]
-            word = "remove" if set(self.planes) <= set(self.remove) else "add"
-            columns.append(Column(f"{word} if {cut(self.mounted.run, _NAME)!r} stays", cells, str))
+            columns.append(Column(f"{word} if {cut(run, _NAME)!r} stays", cells, str))
             also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
-            lines += [f"If {self.mounted.run!r} stays mounted, also {listing(also, 'and')}."] if also else []
+            lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
         return "\n".join([text(columns, width=COLUMNS), *lines])
 
-    def _width_columns(self, unit: str) -> list[Column]:
+    def _width_columns(self) -> list[Column]:
         if not self.region_known:
             return []
-        sizes, angles = self.half_widths()
-        widths = [f"± {figures(width * self.labels.weight_scale, 2)} {unit}" for width in sizes]
+        (sizes, angles), labels = self.half_widths(), self.labels
+        widths = [f"± {figures(width * labels.weight_scale, 2)} {labels.weight_in}" for width in sizes]
         return [
             Column("95 %", ["at its limit" if h else w for h, w in zip(self.held, widths, strict=True)], str),
             Column("", [_angle_width(half) for half in np.degrees(angles)], str),
         ]
-
-    def _in_planes(self, weights: ComplexArray) -> dict[str, str]:
-        """Weights in the planes of the runs, where there are any, and where to work."""
-        planes, mass = self.mounted.planes, self.labels.weight(weights)[0]
-        places = self.places(planes, weights)
-        return {p: f"{figures(m)} at {degrees(a)}" for p, m, a in zip(planes, mass, places, strict=True) if m}
 
     def _vibration_text(self) -> str:
         columns = [*self.vibration_columns(INVISIBLE)]
@@ -612,27 +613,19 @@ class Correction(Answered):
     def _rms_words(self) -> str:
         """Before and after, and what a check run will show."""
         scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        old, new = np.abs(self.before) * scale, np.abs(self.after) * scale
-        before = f"rms {three_figures(rms(old))}"
+        old, new = np.abs(self.before).max(), np.abs(self.after).max()
+        before = f"rms {three_figures(rms(self.before) * scale)}"
         checked = figures(self.check_rms * scale, 2) if self.errors_known else ""
-        if new.max() <= ROUNDING * old.max():
-            if not checked:
-                return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
+        if checked and new <= ROUNDING * old:
             return " ".join(f"{before} → below {checked} {unit} in 95 of 100 check runs".split())
-        words = f"{before} → {small(rms(new), old.max())} {unit}".rstrip()
+        left = "0 by arithmetic," if new <= ROUNDING * old else small(rms(self.after) * scale, old * scale)
+        words = f"{before} → {left} {unit}".rstrip(" ,")
         return f"{words}; a check run stays below {checked} in 95 of 100" if checked else words
 
     def _quality_text(self) -> str:
-        n, rank = len(self.planes), self.conditioning.rank
-        planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
-        numbers = f"rank {rank} of {n}, condition number {self.conditioning.condition_number:.3g}"
-        lines = [self.method_in_words]
-        fitted = self.fitted
+        fitted, lines = self.fitted, [self.method_in_words, self.conditioning.sentence()]
         if fitted.gap is not None:
             lines[0] += f" The optimum is certified: at most {max(fitted.gap, 0.0):.1e} better is possible."
-        lines.append(
-            f"{planes.capitalize()} determined ({numbers})." if self.method != "ridge" else f"{numbers}."
-        )
         if fitted.chi_square is not None and fitted.dof:
             lines.append(
                 f"What is left of the vibration is {np.sqrt(fitted.chi_square / fitted.dof):.2g} times what "

@@ -66,9 +66,6 @@ def test_frames(correction):
     frame = correction.to_frame()
     assert list(frame["plane"]) == ["A", "B"]
     assert frame["mass_std"].isna().all() == (not correction.region_known)
-    residuals = correction.residuals_frame()
-    assert list(residuals.columns[:3]) == ["speed_rpm", "sensor", "before"]
-    assert len(residuals) == 2
 
 
 def test_the_text_fits_a_terminal(correction):
