@@ -243,9 +243,7 @@ def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLE
             return Optimum(start, unit, 0.0, (shares * np.abs(left) >= unit).astype(float))
         if not len(none):
             raise InfeasibleError("no plane may carry a weight")
-        out = np.abs(left) > limit
-        unit = float(np.abs(rows @ solution(E[out], -left[out])).max()) if out.any() else 0.0
-    unit = unit or float(np.abs(rows).max()) or 1.0
+        unit = objective(none) or 1.0
     size = np.maximum(np.maximum(limit, np.abs(left)), TINY)[limited]
     scaled = np.concatenate((rows / unit, E[limited] / size[:, None]))
     values, vectors = np.linalg.eigh(scaled.conj().T @ scaled)
@@ -419,55 +417,25 @@ def explain(
     L, M, used = bounds.residual, bounds.max_weight, bounds.used
     planes = planes or [str(p + 1) for p in range(len(M))]
     readings = readings or [f"reading {i + 1}" for i in range(len(L))]
-    rounding = "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
-    if not L.all():
-        return rounding
-    relaxed = _relaxed(bounds)
-    factor, best = relaxed.objective, np.abs(bounds.Y + bounds.W[:, used] @ relaxed.weights)
+    part, factor = bounds.part(used), 0.0
+    if L.all():
+        free = part._replace(residual=L + np.inf)
+        relaxed = smallest_maximum(free, np.append(1 / L, np.zeros(used.sum())))
+        factor, best = relaxed.objective, np.abs(bounds.Y + part.W @ relaxed.weights)
     if factor < 1 - PRICED:
-        return rounding
-
-    def matters(plane: int) -> bool:
-        """Whether the factor would be smaller if the plane need not be empty, or at any angle."""
-        free = np.arange(len(M)) == plane
-        sectors = tuple(None if p == plane else s for p, s in enumerate(bounds.sectors))
-        wider = bounds._replace(max_weight=np.where(free & (M == 0), np.inf, M), sectors=sectors)
-        return _relaxed(wider).objective < factor * (1 - PRICED)
-
+        return "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
     order = np.argsort(-relaxed.prices)
     priced = order[relaxed.prices[order] > PRICED * relaxed.prices.sum()]
     heavy, high = np.flatnonzero(used)[priced[priced >= len(L)] - len(L)], priced[priced < len(L)]
     conditions = [f"at most {weight(M[p])} in plane {planes[p]!r}" for p in heavy]
-    for p, sectors in enumerate(bounds.sectors):
-        if (M[p] == 0 or sectors is not None) and matters(p):
-            what = "the forbidden angles of plane {}" if M[p] else "plane {} left empty"
-            conditions.append(what.format(repr(planes[p])))
+    for plane, most, sectors in zip(planes, M, bounds.sectors, strict=True):
+        conditions += [f"plane {plane!r} left empty"] if most == 0 else []
+        conditions += [f"the forbidden angles of plane {plane!r}"] if most and sectors is not None else []
     stays = [f"{readings[i]} (limit {amplitude(L[i])}) stays at {amplitude(best[i])}" for i in high[:3]]
-    text = (
+    digits = 10.0 ** (2 - int(np.floor(np.log10(factor))))
+    enough = np.ceil((1 + 1e-4) * factor * digits) / digits  # three digits that leave room for the weights
+    return (
         f"the limits cannot be met: {'with ' if conditions else 'whatever the weights'}"
         f"{listing(conditions, 'and')}, {listing(stays, 'and')} at best; "
-        f"relaxing all amplitude limits {_up(factor)} times works"
+        f"relaxing all amplitude limits {enough:.6g} times works"
     )
-    part = bounds.part(used)
-    try:
-        optimum = smallest_maximum(
-            part._replace(max_weight=np.full(used.sum(), np.inf)),
-            np.append(np.zeros(len(L)), 1 / part.max_weight),
-        )
-    except ValueError:  # more weight does not help
-        return text
-    return text + (f", or all weight limits {_up(optimum.objective)} times" if optimum.objective else "")
-
-
-def _relaxed(bounds: Bounds) -> Optimum:
-    """The least factor of all limits of amplitudes with which the others can be kept, of the planes used."""
-    part = bounds.part(bounds.used)
-    free = part._replace(residual=part.residual + np.inf)
-    return smallest_maximum(free, np.append(1 / part.residual, np.zeros(len(part.max_weight))))
-
-
-def _up(factor: float) -> str:
-    """Three digits, rounded up so that the factor leaves room for the weights."""
-    factor *= 1 + 1e-4
-    digits = 10.0 ** (2 - int(np.floor(np.log10(factor))))
-    return f"{np.ceil(factor * digits) / digits:.6g}"

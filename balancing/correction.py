@@ -418,7 +418,7 @@ class Correction(Answered):
         *numbers, _, action, _ = self._weight_columns()
         shown = frame(numbers)
         if self.remove:
-            shown.insert(1, "action", action.values)
+            shown.insert(1, "action", list(action.values))
             shown["equivalent_added_deg"] = shown["angle_deg"]
             shown["angle_deg"] = self.places(self.planes, self.weights)
         for other in self.others:

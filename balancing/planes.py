@@ -37,7 +37,6 @@ Criterion = Literal["rms", "max"]
 
 MOST = 20_000
 """More choices of planes than this are not tried."""
-_BATCH = 1000
 _NAMED = 3
 
 
@@ -128,15 +127,15 @@ class Subsets(Answered):
     @property
     def answer(self) -> Answer:
         """The best choices in words; then their table."""
-        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        by = f"{self._criterion_words} after correction{f' ({unit})' if unit else ''}"
+        scale, largest = self.labels.vibration_scale, self.criterion == "max"
+        of = "weighted " if self.weighted else ""
+        by = f"largest {of}amplitude" if largest else f"{of}rms"
+        unit = f" ({self.labels.vibration_in})" if self.labels.vibration_in else ""
         choices = f"{counted(self.choices, 'choice')} of {counted(self.weights.shape[1], 'plane')}"
-        head = f"The best of {choices}, by {by}"
-        size = self.largest if self.criterion == "max" else self.rms
-        each = [
-            f"{', '.join(planes)}: {three_figures(value * scale)}"
-            for planes, value in zip(self.planes[:_NAMED], size, strict=False)
-        ]
+        head = f"The best of {choices}, by {by} after correction{unit}"
+        sizes = self.largest if largest else self.rms
+        best = list(zip(self.planes, sizes, strict=True))[:_NAMED]
+        each = [f"{', '.join(planes)}: {three_figures(size * scale)}" for planes, size in best]
         before = three_figures(self.rms_before * scale), three_figures(self.largest_before * scale)
         lines = [head, text(self._columns()), f"Before: rms {before[0]}, largest {before[1]}."]
         if self.dependent:
@@ -157,11 +156,6 @@ class Subsets(Answered):
             Column("largest_weight", mass, three_figures, heaviest),
             Column("condition_number", self.condition_number, three_figures, "condition"),
         )
-
-    @property
-    def _criterion_words(self) -> str:
-        word = "weighted " if self.weighted else ""
-        return f"{word}rms" if self.criterion == "rms" else f"largest {word}amplitude"
 
 
 def best_subsets(  # noqa: PLR0913
@@ -202,7 +196,7 @@ def best_subsets(  # noqa: PLR0913
     Raises
     ------
     ValueError
-        For k out of range, more than `MOST` choices, an unknown criterion, NaN, shapes that do not fit.
+        For k out of range, more than `MOST` choices, NaN, shapes that do not fit.
     UndeterminedError
         If the planes of every choice act alike.
 
@@ -214,51 +208,69 @@ def best_subsets(  # noqa: PLR0913
     """
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
-    _check(planes, P, int(np.count_nonzero(w)), k, criterion, show)
-    chosen = np.array(list(combinations(range(P), k)), dtype=np.int64)
+    if len(planes) != P or len(set(planes)) != P:
+        raise ValueError(f"{P} different names of planes are needed; got {list(planes)}")
+    if not 1 <= k <= P:
+        raise ValueError(f"choose between 1 and {P} planes; got {k}")
+    if k > np.count_nonzero(w):
+        raise ValueError(
+            f"{k} planes need at least {k} readings (sensors × speeds); there are {np.count_nonzero(w)}"
+        )
+    if comb(P, k) > MOST:
+        raise ValueError(
+            f"there are {comb(P, k)} choices of {k} out of {P} planes, more than the {MOST} that are tried: "
+            "leave planes out first, or choose fewer (or nearly all) of them"
+        )
+    chosen = np.array(list(combinations(range(P), k)))
     Q, R = np.linalg.qr(w[:, None] * K)
     right = Q.conj().T @ (w * y)
-    D, misfit, condition = _least_squares(R, right, chosen)
-    solid = np.isfinite(condition)
+    columns = np.moveaxis(R[:, chosen], 1, 0)
+    lengths = np.linalg.norm(columns, axis=1, keepdims=True)
+    s = np.linalg.svd(columns / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
+    solid = s[:, -1] > RCOND * s[:, 0]
     if not solid.any():
         raise UndeterminedError(
             f"the planes of every choice of {k} act alike: choose fewer, or add readings or speeds"
         )
+    chosen, columns, s = chosen[solid], columns[solid], s[solid]
+    D = -gain(columns) @ right
+    left = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D), axis=1)
+    least = (left**2 + np.linalg.norm(w * y - Q @ right) ** 2) / N
     F, unweighted = (
         np.zeros((P + 1, P + 1), dtype=complex) if covariance is None else error_form(covariance, each) / N
         for each in (w, np.ones(N))
     )
-    least = (misfit + np.linalg.norm(w * y - Q @ right) ** 2) / N
-    rank = least if criterion == "max" else least + error_square(F, chosen, D)
-    order = np.flatnonzero(solid)[np.argsort(rank[solid], kind="stable")]
-    if criterion == "max":
+    if criterion == "rms":
+        order = np.argsort(least + error_square(F, chosen, D), kind="stable")[:show]
+    else:
         best: list[tuple[float, int]] = []
-        for m in order:
+        for m in np.argsort(least, kind="stable"):
             if len(best) == show and np.sqrt(least[m]) >= best[-1][0]:
                 break
             D[m] = solve(K[:, chosen[m]], y, "minmax", row_weights=w).weights
             largest = np.abs(w * (y + K[:, chosen[m]] @ D[m])).max()
             errors = error_square(F, chosen[[m]], D[[m]])[0]
             best = sorted([*best, (float(np.hypot(largest, np.sqrt(errors))), int(m))])[:show]
-        order = np.array([m for _, m in best], dtype=np.int64)
-    order = order[:show]
-    after = y + np.einsum("nmk,mk->mn", K[:, chosen[order]], D[order])
+        order = np.array([m for _, m in best])
+    dependent, condition = int(np.count_nonzero(~solid)), s[order, 0] / s[order, -1]
+    choices, chosen, D = len(chosen), chosen[order], D[order]
+    after = y + np.einsum("nmk,mk->mn", K[:, chosen], D)
     size = np.abs(after * w)
     size = size.max(axis=1) if criterion == "max" else np.sqrt(np.mean(size**2, axis=1))
     square = np.mean(np.abs(after) ** 2, axis=1)
     return Subsets(
-        planes=tuple(tuple(planes[p] for p in chosen[m]) for m in order),
-        weights=D[order],
+        planes=tuple(tuple(planes[p] for p in each) for each in chosen),
+        weights=D,
         rms=np.sqrt(square),
         largest=np.abs(after).max(axis=1),
-        expected=np.sqrt(square + error_square(unweighted, chosen[order], D[order])),
-        objective=np.sqrt(size**2 + error_square(F, chosen[order], D[order])),
-        condition_number=condition[order],
+        expected=np.sqrt(square + error_square(unweighted, chosen, D)),
+        objective=np.sqrt(size**2 + error_square(F, chosen, D)),
+        condition_number=condition,
         criterion=criterion,
         rms_before=rms(y),
         largest_before=float(np.abs(y).max()),
-        choices=int(np.count_nonzero(solid)),
-        dependent=int(np.count_nonzero(~solid)),
+        choices=choices,
+        dependent=dependent,
         labels=labels or Labels(),
         weighted=bool(np.ptp(w) > 0),
     )
@@ -299,43 +311,6 @@ def compare_planes(
     )
 
 
-def _check(planes: Sequence[str], P: int, N: int, k: int, criterion: str, show: int) -> None:
-    if len(planes) != P or len(set(planes)) != P:
-        raise ValueError(f"{P} different names of planes are needed; got {list(planes)}")
-    if criterion not in ("rms", "max"):
-        raise ValueError(f"planes are chosen by 'rms' or by 'max', not by {criterion!r}")
-    if not 1 <= k <= P:
-        raise ValueError(f"choose between 1 and {P} planes; got {k}")
-    if k > N:
-        raise ValueError(
-            f"{k} planes need at least {k} readings (sensors × speeds); there are {N}: choose fewer planes"
-        )
-    if show < 1:
-        raise ValueError(f"show at least one choice; got {show}")
-    if comb(P, k) > MOST:
-        raise ValueError(
-            f"there are {comb(P, k)} choices of {k} out of {P} planes, more than the {MOST} that are tried: "
-            "leave planes out first, or choose fewer (or nearly all) of them"
-        )
-
-
-def _least_squares(
-    R: ComplexArray, right: ComplexArray, chosen: IntArray
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Weights (M, k), squared residual (M,) and condition number (M,; infinite: dependent planes)."""
-    D, misfit, condition = np.zeros(chosen.shape, dtype=complex), *np.full((2, len(chosen)), np.inf)
-    for part in np.array_split(np.arange(len(chosen)), -(-len(chosen) // _BATCH)):
-        columns = np.moveaxis(R[:, chosen[part]], 1, 0)
-        lengths = np.linalg.norm(columns, axis=1, keepdims=True)
-        s = np.linalg.svd(columns / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
-        solid = s[:, -1] > RCOND * s[:, 0]
-        columns, part = columns[solid], part[solid]
-        D[part] = -gain(columns) @ right
-        misfit[part] = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D[part]), axis=1) ** 2
-        condition[part] = s[solid, 0] / s[solid, -1]
-    return D, misfit, condition
-
-
 def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
     """Weights of the readings at the speeds used, relative to the largest; None where all are alike.
 
@@ -367,14 +342,12 @@ def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[in
     """
     if planes is None:
         return list(range(len(influence.planes)))
-    if isinstance(planes, str):
-        planes = [planes]
-    unknown = [p for p in planes if p not in influence.planes]
-    if unknown:
-        asked = ", ".join(f"{name!r}{did_you_mean(str(name), influence.planes)}" for name in unknown)
-        raise ValueError(
-            f"there is no plane {asked}; the planes are {', '.join(map(repr, influence.planes))}"
-        )
+    for name in planes:
+        if name not in influence.planes:
+            raise ValueError(
+                f"there is no plane {name!r}{did_you_mean(str(name), influence.planes)}; "
+                f"the planes are {', '.join(map(repr, influence.planes))}"
+            )
     if not planes or len(set(planes)) < len(planes):
         raise ValueError("choose at least one plane, each once")
     return [influence.planes.index(p) for p in planes]

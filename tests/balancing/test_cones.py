@@ -170,7 +170,7 @@ def words(*given, **limits):
             [40e-6, 3e-6, 3e-6],
             {"most": [5e-3, 5e-3], "residual": [20e-6, 20e-6, np.inf]},
             "with at most 5 g in plane 'left', sensor 'A' (limit 20 um) stays at 30 um at best; relaxing all "
-            "amplitude limits 1.51 times works, or all weight limits 2.01 times",
+            "amplitude limits 1.51 times works",
         ),
         (
             [[1, 0], [1, 0], [0, 1]],
@@ -197,8 +197,8 @@ def words(*given, **limits):
             np.eye(2),
             [40e-6, 1e-6],
             {"residual": 20e-6, "most": 0},
-            "with plane 'left' left empty, sensor 'A' (limit 20 um) stays at 40 um at best; relaxing all "
-            "amplitude limits 2.01 times works",
+            "with plane 'left' left empty and plane 'right' left empty, sensor 'A' (limit 20 um) stays at 40 um "
+            "at best; relaxing all amplitude limits 2.01 times works",
         ),
     ],
 )
@@ -232,8 +232,3 @@ def test_the_least_relaxation_works_and_less_does_not(seed, forbid, heavy):
         assert within(wide, solved(wide, minmax=minmax).weights)
         with pytest.raises(InfeasibleError):
             solved(bounds(W, Y, most, 0.988 * factor * L, arcs), minmax=minmax)
-    if " or all weight limits " in text:
-        more = float(text.split(" or all weight limits ")[1].split(" times")[0])
-        solved(bounds(W, Y, more * most, L, arcs), minmax=True)
-        with pytest.raises(InfeasibleError):
-            solved(bounds(W, Y, 0.988 * more * most, L, arcs), minmax=True)

@@ -111,7 +111,9 @@ def test_what_cannot_be():
 
 def test_limits_in_conflict_are_explained():
     most = limits(2, 2, max_weight=[1.0, 0.0], residual=[2.0, np.inf])
-    with pytest.raises(InfeasibleError, match=r"with at most 1 in plane '1', reading 1 .limit 2. stays at 3"):
+    with pytest.raises(
+        InfeasibleError, match=r"plane '1' and plane '2' left empty, reading 1 .limit 2. stays at 3"
+    ):
         solve(np.eye(2), [4.0, 1.0], limits=most)
     with pytest.raises(InfeasibleError, match="with at most 1 in plane '1'"):
         solve(np.eye(2), [4.0, 1.0], "weighted", channels=np.zeros((2, 6, 6)) + np.eye(6), limits=most)
