@@ -350,11 +350,12 @@ def _sides(
     chosen: tuple[Arc | None, ...], start: ComplexArray, T: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Rows, of length 1, with right + rows y ≥ 0: left of a sector's start and right of its end."""
-    arcs = [(p, sector) for p, sector in enumerate(chosen) if sector is not None]
-    inward = np.zeros((len(arcs), 2, len(start)), dtype=complex)
-    for k, (p, (first, width)) in enumerate(arcs):
-        inward[k, :, p] = -1j * np.exp(-1j * first), 1j * np.exp(-1j * (first + width))
-    normals = inward.reshape(-1, len(start))
+    inward = [
+        unit * (np.arange(len(start)) == p)
+        for p, arc in enumerate(chosen)
+        for unit in (() if arc is None else (-1j * np.exp(-1j * arc[0]), 1j * np.exp(-1j * sum(arc))))
+    ]
+    normals = np.reshape(np.array(inward, dtype=complex), (-1, len(start)))
     rows = stretch(normals)[::2] @ T
     length = np.linalg.norm(rows, axis=1)
     return rows / length[:, None], (normals @ start).real / length

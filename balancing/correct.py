@@ -134,22 +134,19 @@ def correct(  # noqa: PLR0913
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
     """Refuse planes that the coefficients tell apart only by their errors, or say so."""
-    part, P = case.part, len(case.names)
-    check_planes(case.W[counts], part.planes)
+    part, W, n = case.part, case.W[counts], 2 * len(case.names)
+    check_planes(W, part.planes)
     known, every = (
-        V[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts] for V in (part.known_channels(), part.channels())
+        V[..., 2:, 2:].reshape(-1, n, n)[counts] for V in (part.known_channels(), part.channels())
     )
-    words = ""
-    if part.trials is not None or part.known_errors:
-        words = unresolved(case.W[counts], part.planes, known)
+    measured = part.trials is not None or part.known_errors
+    words = unresolved(W, part.planes, known) if measured else ""
     if words and refuse:
-        rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in part.remarks.contradictions]
         first = part.remarks.contradictions
+        rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in first]
         so = f"so {words}" if first else words
         raise UndeterminedError("\n".join((*first, so, *remedies(case), *rest)))
-    if not words and every.any():
-        words = unresolved(case.W[counts], part.planes, every)
-    return words
+    return words or (unresolved(W, part.planes, every) if every.any() else "")
 
 
 def fit_part(

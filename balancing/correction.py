@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from itertools import compress
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -35,7 +36,7 @@ from balancing.tables import (
 from balancing.trials import Limits
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.json import cell, plain
+from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, counted, cut, figures, listing, wrap
 
@@ -315,27 +316,25 @@ class Correction(Answered):
     @property
     def active(self) -> tuple[str, ...]:
         """Limits that bind, in words."""
-        limits, labels, fitted = self.limits, self.labels, self.fitted
+        limits, fitted = self.limits, self.fitted
         if limits is None:
             return ()
-        names = reading_names(labels, self.sensors, self.speeds)
-        words = [
-            f"plane {name!r} has its largest weight, {labels.weight_words(float(limit))}"
-            for name, limit, at in zip(self.planes, limits.max_weight, fitted.active_weights, strict=True)
-            if at
+        names = reading_names(self.labels, self.sensors, self.speeds)
+        at = np.exp(-1j * np.angle(self.weights))
+        ends = [
+            bool(D)
+            and any(np.abs(np.angle(u * np.exp([1j * a, 1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
+            for D, u, arcs in zip(self.weights, at, limits.forbidden, strict=True)
         ]
-        highest = zip(names, limits.residual.ravel(), fitted.active_residuals, strict=True)
-        words += [
-            f"{name} has its largest amplitude, {labels.amplitude_words(float(limit))}"
-            for name, limit, at in highest
-            if at
-        ]
-        words += [
-            f"plane {name!r} stands at the end of a forbidden arc"
-            for name, D, arcs in zip(self.planes, self.weights, limits.forbidden, strict=True)
-            if D and any(np.abs(np.angle(D * np.exp([-1j * a, -1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
-        ]
-        return tuple(words)
+        words = (
+            *(
+                f"plane {name!r} has its largest weight"
+                for name in compress(self.planes, fitted.active_weights)
+            ),
+            *(f"{name} has its largest amplitude" for name in compress(names, fitted.active_residuals)),
+            *(f"plane {name!r} stands at the end of a forbidden arc" for name in compress(self.planes, ends)),
+        )
+        return words
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -397,7 +396,7 @@ class Correction(Answered):
                 "duality_gap": self.fitted.gap,
                 "chi_square": self.fitted.chi_square,
                 "chi_square_dof": self.fitted.dof,
-                "limits": self._limits(),
+                "limits": self.limits_document(),
                 "limits_that_bind": self.active,
                 "errors": error_document(self.influence.reading, self.influence.run_errors, self.labels),
                 "convention_test": None if self.convention_test is None else asdict(self.convention_test),
@@ -446,21 +445,21 @@ class Correction(Answered):
     @property
     def answer(self) -> Answer:
         """Whether to mount the weights, these with their 95 %, the largest readings left; then the tables."""
-        test = self.convention_test
-        assumed = assumptions(self.labels, test, self.others)
-        sure = test is not None and test.verdict == "confirmed"
-        taken = (" ".join(assumed),) if assumed else ()
-        first, promised = self.sentence(), self._rms_words()
-        promised = "" if promised in first else f"Predicted: {promised}."
-        tables = (promised, self._vibration_text(), self._quality_text())
+        first, test = self.sentence(), self.convention_test
+        warnings = list(self.warnings[len(self.contradictions) :])
+        notes = [note for note in self.notes if note != self.combination]
+        if assumed := " ".join(assumptions(self.labels, test, self.others)):
+            (notes if test is not None and test.verdict == "confirmed" else warnings).insert(0, assumed)
+        predicted = self._rms_words()
+        tables = [] if predicted in first else [f"Predicted: {predicted}."]
         within = self.within if self.errors_known else None
         left = largest_readings(self.labels, self.speeds, self.sensors, self.before, self.after, within)
         return Answer(
             first,
             f"{self._weights_text()}\n\nLargest left{left}",
-            (() if sure else taken) + self.warnings[len(self.contradictions) :],
-            (taken if sure else ()) + tuple(note for note in self.notes if note != self.combination),
-            tuple(table for table in tables if table),
+            tuple(warnings),
+            tuple(notes),
+            (*tables, self._vibration_text(), self._quality_text()),
             "every reading, method and errors",
         )
 
@@ -478,8 +477,9 @@ class Correction(Answered):
         """What a correction under other conventions notes of this one; in words, what is otherwise in it."""
         labels, planes = self.labels, self.planes
         head = {"if": words, "phase": labels.phase, "angles": labels.angle_words}
-        each = rows(self._work_columns(planes, self.weights, ()))
-        return OtherReading(words, [head | row for row in each], self.places(planes, self.weights).tolist())
+        *columns, _, at = self._work_columns(planes, self.weights)
+        each = [head | row for row in rows((*columns, at))]
+        return OtherReading(words, each, self.places(planes, self.weights).tolist())
 
     def vibration_columns(
         self, rounding: float = INVISIBLE, after: ComplexArray | None = None
@@ -502,58 +502,54 @@ class Correction(Answered):
 
     def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
         """Weights of planes as JSON types, and where to take material away from some."""
-        action = (self._actions(planes),) if self.remove else ()
-        columns = self._work_columns(planes, weights, action)
-        return rows(columns if self.remove else columns[:-1])
+        columns = self._work_columns(planes, weights)
+        return rows(columns if self.remove else columns[:-2])
 
-    def plane_limits(self, p: int) -> dict[str, Any]:
-        """Largest weight and forbidden arcs of a plane as the job writes them: where to work, from and to."""
+    def limits_document(self) -> dict[str, Any] | None:
+        """Of weights and angles, where to work, and of readings in the order of `residuals`; None: no limits.
+
+        In the job's own units; an infinite limit is None.
+        """
         if self.limits is None:
-            return {"max_weight": None, "forbidden_deg": []}
-        opposite = self.planes[p] in self.remove
-        return {
-            "max_weight": cell(self.limits.max_weight[p] * self.labels.weight_scale),
-            "forbidden_deg": [self.labels.arc(*a, opposite=opposite) for a in self.limits.forbidden[p]],
+            return None
+        arcs = {
+            plane: [self.labels.arc(*arc, opposite=plane in self.remove) for arc in forbidden]
+            for plane, forbidden in zip(self.planes, self.limits.forbidden, strict=True)
         }
+        most = self.limits.max_weight * self.labels.weight_scale
+        return plain(
+            {
+                "max_weight": dict(zip(self.planes, most.tolist(), strict=True)),
+                "amplitude": self.limits.residual.ravel() * self.labels.vibration_scale,
+                "forbidden_deg": {plane: each for plane, each in arcs.items() if each},
+            }
+        )
 
-    def _actions(self, planes: Sequence[str]) -> Column:
-        return Column("action", ["remove" if plane in self.remove else "add" for plane in planes])
-
-    def _work_columns(
-        self, planes: Sequence[str], weights: ComplexArray, between: Sequence[Column]
-    ) -> tuple[Column, ...]:
+    def _work_columns(self, planes: Sequence[str], weights: ComplexArray) -> tuple[Column, ...]:
         gone = [plane in self.remove for plane in planes]
-        at = Column("remove_at_deg", np.where(gone, self.places(planes, weights), np.nan))
-        return (*weight_columns(self.labels, planes, weights), *between, at)
+        return (
+            *weight_columns(self.labels, planes, weights),
+            Column("action", ["remove" if away else "add" for away in gone]),
+            Column("remove_at_deg", np.where(gone, self.places(planes, weights), np.nan)),
+        )
 
     def _weight_columns(self) -> tuple[Column, ...]:
         P = len(self.planes)
         blocks = np.einsum("papb->pab", self.covariance.reshape(P, 2, P, 2))
-        errors = (
+        *columns, action, at = self._work_columns(self.planes, self.weights)
+        return (
+            *columns,
             Column("mass_std", self.mass_std * self.labels.weight_scale),
             Column("angle_std_deg", np.degrees(self.angle_std)),
             Column("covariance", self.labels.weight_covariance(blocks) if self.region_known else [None] * P),
-            self._actions(self.planes),
+            action,
+            at,
         )
-        return self._work_columns(self.planes, self.weights, errors)
 
     def _residual_columns(self) -> tuple[Column, ...]:
         covariance = self.after_covariance if self.errors_known else None
         last = covariance_column(self.labels, "after_covariance", covariance, self.before.size)
         return (*self.vibration_columns(ROUNDING), last)
-
-    def _limits(self) -> dict[str, Any] | None:
-        """Of the weights, and of each reading in the order of `residuals`; None where there is none."""
-        if self.limits is None:
-            return None
-        each = {plane: self.plane_limits(p) for p, plane in enumerate(self.planes)}
-        return {
-            "max_weight": {plane: limits["max_weight"] for plane, limits in each.items()},
-            "amplitude": self.limits.residual.ravel() * self.labels.vibration_scale,
-            "forbidden_deg": {
-                p: limits["forbidden_deg"] for p, limits in each.items() if limits["forbidden_deg"]
-            },
-        }
 
     def _weights_text(self) -> str:
         labels, removed = self.labels, set(self.planes) & set(self.remove)

@@ -197,8 +197,8 @@ def words(*given, **limits):
             np.eye(2),
             [40e-6, 1e-6],
             {"residual": 20e-6, "most": 0},
-            "with plane 'left' left empty and plane 'right' left empty, sensor 'A' (limit 20 um) stays at 40 um "
-            "at best; relaxing all amplitude limits 2.01 times works",
+            "with plane 'left' left empty and plane 'right' left empty, sensor 'A' (limit 20 um) stays at "
+            "40 um at best; relaxing all amplitude limits 2.01 times works",
         ),
     ],
 )
