@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import listing
 from rotorid.regression import RCOND, WORD_TOLERANCE, solution
 
 NEARLY_ALIKE = 30.0
@@ -159,18 +160,12 @@ def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray
         return
     with_baseline = np.vstack((A, np.eye(1, A.shape[1])))
     alone = [f"plane {planes[i - 1]!r}" for i in conditioning(with_baseline, ("", *planes)).undetermined]
-    words = f"the runs do not separate {', '.join(alone)}: add runs with a weight in only one of them, "
-    words += "for each of them but one"
-    if not alone:
+    words = f"no run separates {listing(alone, 'from')}: add runs with a weight in only one of them"
+    if lost[0] == 0:
+        baseline = "add a baseline run, a run that has no rows in the weights table"
         words = (
-            "the runs do not determine the vibration without weights: add a baseline run, a run that has no "
-            "rows in the weights table (or one more run with other weights)"
+            f"{words}, and {baseline}" if alone else f"the vibration without weights is unknown: {baseline}"
         )
-    elif len(alone) == 2:
-        words = f"no run separates {alone[0]} from {alone[1]}: their weights always stand in the same "
-        words += "proportion; add a run with a weight in only one of them"
-    if alone and lost[0] == 0:
-        words += "; and no run without weights is there either"
     raise UndeterminedError(words)
 
 
@@ -216,7 +211,7 @@ def check_stack(
         raise ValueError(f"the vibration must have shape {K.shape[:1]}; got {y.shape}")
     if not (np.isfinite(K).all() and np.isfinite(y).all()):
         raise ValueError("influence coefficients and vibration must be finite; found NaN or infinity")
-    if w.shape != y.shape or not np.isfinite(w).all() or (w < 0).any() or not w.any():
+    if w.shape != y.shape or not (w.min() >= 0 and 0 < w.max() < np.inf):
         raise ValueError(f"the row weights must be {len(K)} finite numbers ≥ 0, not all zero")
     return K, y, w
 
@@ -301,19 +296,17 @@ def check_effects(
             )
         block = covariance[..., 2 + 2 * p : 4 + 2 * p, 2 + 2 * p : 4 + 2 * p].reshape(-1, 2, 2)
         variance = np.trace(block, axis1=1, axis2=2) / 2
-        there = variance > 0
-        each = np.abs(w[there]) ** 2 / variance[there]
-        if there.any() and not significant(each, 2 * len(each)):
+        each = np.abs(w[variance > 0]) ** 2 / variance[variance > 0]
+        if len(each) and not significant(each, 2 * len(each)):
             larger = size * CLEAR * np.sqrt(2 * variance.sum() / np.sum(np.abs(w) ** 2))
-            least = trials.labels.weight_words(float(f"{larger:.2g}"))
-            remedy = f"repeat the run with a larger trial weight, at least {least}"
+            remedy = "repeat the run with a larger trial weight, at least "
+            remedy += trials.labels.weight_words(float(f"{larger:.2g}"))
+            if contradictions:
+                remedy = "mend the table, or measure these runs again until they agree"
             words += (
                 " changed the readings by no more than their errors explain: its effect is not determined; "
             )
-            words += (
-                "mend the table, or measure these runs again until they agree" if contradictions else remedy
-            )
-            raise UndeterminedError("\n".join((*contradictions, words)))
+            raise UndeterminedError("\n".join((*contradictions, words + remedy)))
 
 
 def clear_change(before: complex, after: complex) -> bool:

@@ -38,7 +38,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import capital, counted, cut, figures, listing, wrap
+from rotorid.base.text import capital, cut, figures, listing, wrap
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -326,15 +326,12 @@ class Correction(Answered):
             and any(np.abs(np.angle(u * np.exp([1j * a, 1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
             for D, u, arcs in zip(self.weights, at, limits.forbidden, strict=True)
         ]
-        words = (
-            *(
-                f"plane {name!r} has its largest weight"
-                for name in compress(self.planes, fitted.active_weights)
-            ),
-            *(f"{name} has its largest amplitude" for name in compress(names, fitted.active_residuals)),
+        heavy, high = compress(self.planes, fitted.active_weights), compress(names, fitted.active_residuals)
+        return (
+            *(f"plane {name!r} has its largest weight" for name in heavy),
+            *(f"{name} has its largest amplitude" for name in high),
             *(f"plane {name!r} stands at the end of a forbidden arc" for name in compress(self.planes, ends)),
         )
-        return words
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -349,12 +346,7 @@ class Correction(Answered):
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user may want to know."""
-        within = [
-            f"the weight in plane {plane!r} lies within its own error: its angle is not determined"
-            for plane, clear, weight in zip(self.planes, self._clear, self.weights, strict=True)
-            if weight and not clear and self.region_known
-        ]
-        together = [self.combination] if self.combination else within
+        together = (self.combination,) if self.combination else ()
         return (*self.influence.remarks.notes, *together, *self.decision.notes)
 
     @property
@@ -622,12 +614,6 @@ class Correction(Answered):
         fitted, lines = self.fitted, [self.method_in_words, self.conditioning.sentence()]
         if fitted.gap is not None:
             lines[0] += f" The optimum is certified: at most {max(fitted.gap, 0.0):.1e} better is possible."
-        if fitted.chi_square is not None and fitted.dof:
-            lines.append(
-                f"What is left of the vibration is {np.sqrt(fitted.chi_square / fitted.dof):.2g} times what "
-                f"the errors of the readings explain (χ² {fitted.chi_square:.1f} with "
-                f"{counted(fitted.dof, 'degree')} of freedom)."
-            )
         if self.errors_known:
             lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))
         return "\n".join(wrap(line, "") for line in lines)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import UndeterminedError, check_stack
 from balancing.conventions import Labels
 from balancing.influence import Influence, match_speeds
-from balancing.methods import solve
 from balancing.tables import rms, three_figures, weight_rows
 from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
@@ -32,8 +31,6 @@ from rotorid.regression import RCOND, gain
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Criterion = Literal["rms", "max"]
 
 MOST = 20_000
 """More choices of planes than this are not tried."""
@@ -71,12 +68,9 @@ class Subsets(Answered):
     expected
         Root mean square in a check run, (M,): with the errors of coefficients and of the vibration before.
     objective
-        What they are ranked by: rms or largest of the readings times their row weights, and their errors (in
-        quadrature), shape (M,).
+        What they are ranked by: rms of the readings times their row weights, and of their errors, shape (M,).
     condition_number
         Of each choice, shape (M,).
-    criterion
-        "rms": least squares; "max": the largest reading made as small as it can be.
     rms_before, largest_before
         Of the readings without weights.
     choices
@@ -96,7 +90,6 @@ class Subsets(Answered):
     expected: FloatArray
     objective: FloatArray
     condition_number: FloatArray
-    criterion: Criterion
     rms_before: float
     largest_before: float
     choices: int
@@ -110,7 +103,7 @@ class Subsets(Answered):
         weights = [weight_rows(self.labels, *pair) for pair in zip(self.planes, self.weights, strict=True)]
         return plain(
             {
-                "criterion": self.criterion,
+                "criterion": "rms",
                 "conventions": self.labels.conventions(),
                 "rms_before": self.rms_before * scale,
                 "max_before": self.largest_before * scale,
@@ -127,14 +120,11 @@ class Subsets(Answered):
     @property
     def answer(self) -> Answer:
         """The best choices in words; then their table."""
-        scale, largest = self.labels.vibration_scale, self.criterion == "max"
-        of = "weighted " if self.weighted else ""
-        by = f"largest {of}amplitude" if largest else f"{of}rms"
+        scale, of = self.labels.vibration_scale, "weighted " if self.weighted else ""
         unit = f" ({self.labels.vibration_in})" if self.labels.vibration_in else ""
         choices = f"{counted(self.choices, 'choice')} of {counted(self.weights.shape[1], 'plane')}"
-        head = f"The best of {choices}, by {by} after correction{unit}"
-        sizes = self.largest if largest else self.rms
-        best = list(zip(self.planes, sizes, strict=True))[:_NAMED]
+        head = f"The best of {choices}, by {of}rms after correction{unit}"
+        best = list(zip(self.planes, self.rms, strict=True))[:_NAMED]
         each = [f"{', '.join(planes)}: {three_figures(size * scale)}" for planes, size in best]
         before = three_figures(self.rms_before * scale), three_figures(self.largest_before * scale)
         lines = [head, text(self._columns()), f"Before: rms {before[0]}, largest {before[1]}."]
@@ -158,19 +148,18 @@ class Subsets(Answered):
         )
 
 
-def best_subsets(  # noqa: PLR0913
+def best_subsets(
     W: ArrayLike,
     Y: ArrayLike,
     planes: Sequence[str],
     k: int,
     *,
-    criterion: Criterion = "rms",
     row_weights: ArrayLike | None = None,
     covariance: FloatArray | None = None,
     show: int = 10,
     labels: Labels | None = None,
 ) -> Subsets:
-    """Compare all choices of k planes, each with its own best weights.
+    """Compare all choices of k planes, each with its own weights by least squares.
 
     Parameters
     ----------
@@ -180,9 +169,6 @@ def best_subsets(  # noqa: PLR0913
         Names, P.
     k
         How many to use, 1 … P, at most N.
-    criterion
-        "rms": least squares; "max": the smallest largest amplitude (a cone program for every choice that can
-        still be among the best).
     row_weights
         How much each reading counts, (N,), ≥ 0; default all alike.
     covariance
@@ -202,9 +188,7 @@ def best_subsets(  # noqa: PLR0913
 
     Notes
     -----
-    With the QR factorisation of diag(w) W the residual of every choice follows from P rows instead of N. The
-    largest amplitude a choice can reach is at least its least rms: choices are looked at in this order, until
-    no further one can be among the best `show`. So the ranking is exact for both criteria.
+    With the QR factorisation of diag(w) (W Y) the residual of every choice follows from P + 1 rows.
     """
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
@@ -222,9 +206,8 @@ def best_subsets(  # noqa: PLR0913
             "leave planes out first, or choose fewer (or nearly all) of them"
         )
     chosen = np.array(list(combinations(range(P), k)))
-    Q, R = np.linalg.qr(w[:, None] * K)
-    right = Q.conj().T @ (w * y)
-    columns = np.moveaxis(R[:, chosen], 1, 0)
+    R = np.linalg.qr(w[:, None] * np.column_stack((K, y)), mode="r")
+    right, columns = R[:, P], np.moveaxis(R[:, chosen], 1, 0)
     lengths = np.linalg.norm(columns, axis=1, keepdims=True)
     s = np.linalg.svd(columns / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
     solid = s[:, -1] > RCOND * s[:, 0]
@@ -234,29 +217,15 @@ def best_subsets(  # noqa: PLR0913
         )
     chosen, columns, s = chosen[solid], columns[solid], s[solid]
     D = -gain(columns) @ right
-    left = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D), axis=1)
-    least = (left**2 + np.linalg.norm(w * y - Q @ right) ** 2) / N
     F, unweighted = (
         np.zeros((P + 1, P + 1), dtype=complex) if covariance is None else error_form(covariance, each) / N
         for each in (w, np.ones(N))
     )
-    if criterion == "rms":
-        order = np.argsort(least + error_square(F, chosen, D), kind="stable")[:show]
-    else:
-        best: list[tuple[float, int]] = []
-        for m in np.argsort(least, kind="stable"):
-            if len(best) == show and np.sqrt(least[m]) >= best[-1][0]:
-                break
-            D[m] = solve(K[:, chosen[m]], y, "minmax", row_weights=w).weights
-            largest = np.abs(w * (y + K[:, chosen[m]] @ D[m])).max()
-            errors = error_square(F, chosen[[m]], D[[m]])[0]
-            best = sorted([*best, (float(np.hypot(largest, np.sqrt(errors))), int(m))])[:show]
-        order = np.array([m for _, m in best])
-    dependent, condition = int(np.count_nonzero(~solid)), s[order, 0] / s[order, -1]
-    choices, chosen, D = len(chosen), chosen[order], D[order]
+    left = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D), axis=1) ** 2 / N
+    rank = left + error_square(F, chosen, D)
+    order = np.argsort(rank, kind="stable")[:show]
+    chosen, D = chosen[order], D[order]
     after = y + np.einsum("nmk,mk->mn", K[:, chosen], D)
-    size = np.abs(after * w)
-    size = size.max(axis=1) if criterion == "max" else np.sqrt(np.mean(size**2, axis=1))
     square = np.mean(np.abs(after) ** 2, axis=1)
     return Subsets(
         planes=tuple(tuple(planes[p] for p in each) for each in chosen),
@@ -264,13 +233,12 @@ def best_subsets(  # noqa: PLR0913
         rms=np.sqrt(square),
         largest=np.abs(after).max(axis=1),
         expected=np.sqrt(square + error_square(unweighted, chosen, D)),
-        objective=np.sqrt(size**2 + error_square(F, chosen, D)),
-        condition_number=condition,
-        criterion=criterion,
+        objective=np.sqrt(rank[order]),
+        condition_number=s[order, 0] / s[order, -1],
         rms_before=rms(y),
         largest_before=float(np.abs(y).max()),
-        choices=choices,
-        dependent=dependent,
+        choices=len(rank),
+        dependent=int(np.count_nonzero(~solid)),
         labels=labels or Labels(),
         weighted=bool(np.ptp(w) > 0),
     )
@@ -283,7 +251,6 @@ def compare_planes(
     k: int,
     *,
     speeds: ArrayLike | None = None,
-    criterion: Criterion = "rms",
     row_weights: FloatArray | None = None,
 ) -> Subsets:
     """Compare all choices of k of these planes, without limits.
@@ -292,7 +259,7 @@ def compare_planes(
     ----------
     influence, baseline, speeds, row_weights
         As `balancing.correct` takes them.
-    planes, k, criterion
+    planes, k
         As `best_subsets` does.
     """
     today = influence if baseline is None else influence.rebased(baseline)
@@ -304,7 +271,6 @@ def compare_planes(
         part.baseline.ravel(),
         part.planes,
         k,
-        criterion=criterion,
         row_weights=rows_of(row_weights, today.baseline.shape, used),
         covariance=part.channels().reshape(N, 2 * P + 2, 2 * P + 2) if part.known_errors else None,
         labels=today.labels,
@@ -322,7 +288,7 @@ def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) ->
     if given is None:
         return None
     weights = np.asarray(given, dtype=np.float64)
-    if weights.shape != shape or not (np.isfinite(weights) & (weights >= 0)).all():
+    if weights.shape != shape or not (weights >= 0).all():
         raise ValueError(
             f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
         )
