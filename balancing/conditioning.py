@@ -162,10 +162,8 @@ def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray
     alone = [f"plane {planes[i - 1]!r}" for i in conditioning(with_baseline, ("", *planes)).undetermined]
     words = f"no run separates {listing(alone, 'from')}: add runs with a weight in only one of them"
     if lost[0] == 0:
-        baseline = "add a baseline run, a run that has no rows in the weights table"
-        words = (
-            f"{words}, and {baseline}" if alone else f"the vibration without weights is unknown: {baseline}"
-        )
+        words = f"{words}; and " if alone else "the vibration without weights is unknown: "
+        words += "add a baseline run, a run that has no rows in the weights table"
     raise UndeterminedError(words)
 
 

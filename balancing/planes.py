@@ -206,7 +206,7 @@ def best_subsets(
             "leave planes out first, or choose fewer (or nearly all) of them"
         )
     chosen = np.array(list(combinations(range(P), k)))
-    R = np.linalg.qr(w[:, None] * np.column_stack((K, y)), mode="r")
+    R = np.asarray(np.linalg.qr(w[:, None] * np.column_stack((K, y)), mode="r"))
     right, columns = R[:, P], np.moveaxis(R[:, chosen], 1, 0)
     lengths = np.linalg.norm(columns, axis=1, keepdims=True)
     s = np.linalg.svd(columns / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
