@@ -87,7 +87,7 @@ class Optimum(NamedTuple):
 
 
 class _Goal(NamedTuple):
-    """D₀ (P,), T (2P, 2P), wᵢ of min–max (N + P,) or zeros; the objective of weights, and of a dual value."""
+    """D₀ (P,), T (2P, 2P), wᵢ of min–max (N,) or zeros; the objective of weights, and of a dual value."""
 
     start: ComplexArray
     transform: FloatArray
@@ -206,19 +206,19 @@ def nearest(
     def bound(value: float) -> float:
         return float(np.sqrt(floor**2 + 2 * max(value, 0.0)))
 
-    shares = np.zeros(len(bounds.Y) + len(target))
-    return _best(bounds, _Goal(target, np.linalg.inv(root), shares, objective, bound), tolerance)
+    goal = _Goal(target, np.linalg.inv(root), np.zeros(len(bounds.Y)), objective, bound)
+    return _best(bounds, goal, tolerance)
 
 
 def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLERANCE) -> Optimum:
-    """Weights within limits that minimise max wᵢ |Yᵢ + Wᵢ D|, and wₚ |Dₚ| where that counts, too.
+    """Weights within limits that minimise max wᵢ |Yᵢ + Wᵢ D|.
 
     Parameters
     ----------
     bounds
         Of planes that may all carry a weight.
     shares
-        w ≥ 0 of the readings and of the weights, (N + P,).
+        w ≥ 0 of the readings, (N,).
     tolerance
         Of the solver, relative.
 
@@ -227,25 +227,25 @@ def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLE
     InfeasibleError
         Where no weights are within the limits.
     """
-    E, e, limit = bounds.stacked()
-    on, limited, none = shares > 0, np.isfinite(limit), np.zeros(E.shape[1], dtype=complex)
-    rows = shares[on, None] * E[on]
+    W, Y, none = bounds.W, bounds.Y, np.zeros(bounds.W.shape[1], dtype=complex)
+    rows = shares[:, None] * W
 
     def objective(weights: ComplexArray) -> float:
-        return float((shares * np.abs(e + E @ weights)).max())
+        return float((shares * np.abs(Y + W @ weights)).max())
 
-    start = _shortened(_levelled(rows, shares[on] * e[on]), bounds.max_weight)
+    start = _shortened(_levelled(rows, shares * Y), bounds.max_weight)
     if objective(start) >= objective(none):
         start = none
-    left, unit = e + E @ start, objective(start)
+    unit = objective(start)
     if unit <= 1e-12 * objective(none) or not len(none):
         if within(bounds, start):  # nothing is left to minimise
-            return Optimum(start, unit, 0.0, (shares * np.abs(left) >= unit).astype(float))
+            return Optimum(start, unit, 0.0, (shares * np.abs(Y + W @ start) >= unit).astype(float))
         if not len(none):
             raise InfeasibleError("no plane may carry a weight")
         unit = objective(none) or 1.0
-    size = np.maximum(np.maximum(limit, np.abs(left)), TINY)[limited]
-    scaled = np.concatenate((rows / unit, E[limited] / size[:, None]))
+    E, e, limit = bounds.stacked()
+    limited, size = np.isfinite(limit), np.maximum(np.maximum(limit, np.abs(e + E @ start)), TINY)
+    scaled = np.concatenate((rows / unit, (E / size[:, None])[limited]))
     values, vectors = np.linalg.eigh(scaled.conj().T @ scaled)
     transform = stretch(vectors * np.sqrt(len(scaled) / np.maximum(values, 1e-12 * values[-1])))
     return _best(bounds, _Goal(start, transform, shares / unit, objective, lambda t: unit * t), tolerance)
@@ -421,7 +421,7 @@ def explain(
     part, factor = bounds.part(used), 0.0
     if L.all():
         free = part._replace(residual=L + np.inf)
-        relaxed = smallest_maximum(free, np.append(1 / L, np.zeros(used.sum())))
+        relaxed = smallest_maximum(free, 1 / L)
         factor, best = relaxed.objective, np.abs(bounds.Y + part.W @ relaxed.weights)
     if factor < 1 - PRICED:
         return "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"

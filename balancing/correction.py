@@ -160,8 +160,9 @@ class Correction(Prediction, Answered):
         old = np.abs(self.before) * scale
         residuals = self._residual_columns()
         new = np.array(residuals[4].values)
-        there = bool(self.mounted.weights.any())
-        planes, work = self.mounted.planes, weight_rows
+        run, planes, weights = self.mounted
+        there = bool(weights.any())
+        mounted = {"run": run, "weights": weight_rows(self.labels, planes, weights)}
         return plain(
             {
                 "judgement": self.decision.to_dict(self.labels),
@@ -169,12 +170,7 @@ class Correction(Prediction, Answered):
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
                 "corrections": rows(self._weight_columns()),
-                "mounted_in_last_run": {
-                    "run": self.mounted.run,
-                    "weights": work(self.labels, planes, self.mounted.weights),
-                }
-                if there
-                else None,
+                "mounted_in_last_run": mounted if there else None,
                 "add_to_mounted": self.work_rows(planes, self.to_add) if there else None,
                 "residuals": rows(residuals),
                 "rms_before": rms(old),

@@ -264,7 +264,7 @@ def _fit_plain(job: Job, *_: Any) -> Solution:  # noqa: ANN401
 
     def again(bounds: Bounds, target: ComplexArray, tolerance: float = DRAWN) -> Optimum:
         if minmax or not len(target):
-            return smallest_maximum(bounds, np.append(job.w, np.zeros(len(target))), tolerance)
+            return smallest_maximum(bounds, job.w, tolerance)
         root = stretch(np.linalg.qr(job.w[:, None] * bounds.W)[1])
         left = float(np.linalg.norm(job.w * (bounds.Y + bounds.W @ target)))
         return nearest(bounds, target, root, left, tolerance)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +24,10 @@ from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.result import Column, rows, text
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 from rotorid.regression import RCOND, gain
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST = 20_000
 """More choices of planes than this are not tried."""
@@ -112,10 +109,6 @@ class Subsets(Answered):
                 "rows": rows((*self._columns(), Column("weights", weights))),
             }
         )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per choice: planes ("A, C"), rms_after, rms_expected, max_after, largest_weight, …"""
-        return frame((Column("planes", list(map(", ".join, self.planes))), *self._columns()[1:]))
 
     @property
     def answer(self) -> Answer:

@@ -44,10 +44,9 @@ def bounds(W, Y, most=None, residual=None, forbidden=None):
 
 def solved(whole, *, minmax, row_weights=None, **more):
     """By min–max, or by least squares as the nearest weights to those without limits."""
-    N, P = whole.W.shape
-    w = np.ones(N) if row_weights is None else row_weights
+    w = np.ones(len(whole.Y)) if row_weights is None else row_weights
     if minmax:
-        return smallest_maximum(whole, np.append(w, np.zeros(P)), **more)
+        return smallest_maximum(whole, w, **more)
     A = w[:, None] * whole.W
     best = np.linalg.lstsq(A, -w * whole.Y, rcond=None)[0]
     left = np.linalg.norm(w * (whole.Y + whole.W @ best))
