@@ -162,7 +162,7 @@ class Correction(Prediction, Answered):
         new = np.array(residuals[4].values)
         run, planes, weights = self.mounted
         there = bool(weights.any())
-        mounted = {"run": run, "weights": weight_rows(self.labels, planes, weights)}
+        mounted = {"run": run, "weights": weight_rows(self.labels, planes, weights)} if there else None
         return plain(
             {
                 "judgement": self.decision.to_dict(self.labels),
@@ -170,7 +170,7 @@ class Correction(Prediction, Answered):
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
                 "corrections": rows(self._weight_columns()),
-                "mounted_in_last_run": mounted if there else None,
+                "mounted_in_last_run": mounted,
                 "add_to_mounted": self.work_rows(planes, self.to_add) if there else None,
                 "residuals": rows(residuals),
                 "rms_before": rms(old),

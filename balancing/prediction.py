@@ -219,17 +219,20 @@ class Prediction:
         limits, fitted = self.limits, self.fitted
         if limits is None:
             return ()
-        names = reading_names(self.labels, self.sensors, self.speeds)
+        labels = self.labels
+        weights = zip(self.planes, map(labels.weight_words, limits.max_weight), strict=True)
+        names = reading_names(labels, self.sensors, self.speeds)
+        readings = zip(names, map(labels.amplitude_words, limits.residual.ravel()), strict=True)
         at = np.exp(-1j * np.angle(self.weights))
         ends = [
             bool(D)
             and any(np.abs(np.angle(u * np.exp([1j * a, 1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
             for D, u, arcs in zip(self.weights, at, limits.forbidden, strict=True)
         ]
-        heavy, high = compress(self.planes, fitted.active_weights), compress(names, fitted.active_residuals)
+        heavy, high = compress(weights, fitted.active_weights), compress(readings, fitted.active_residuals)
         return (
-            *(f"plane {name!r} has its largest weight" for name in heavy),
-            *(f"{name} has its largest amplitude" for name in high),
+            *(f"plane {name!r} has its largest weight, {most}" for name, most in heavy),
+            *(f"{name} has its largest amplitude, {most}" for name, most in high),
             *(f"plane {name!r} stands at the end of a forbidden arc" for name in compress(self.planes, ends)),
         )
 
