@@ -117,10 +117,35 @@ class MountDecision:
 
 @dataclass(frozen=True, eq=False)
 class Correction(Prediction, Answered):
-    """Weights to mount, the vibration they should leave (`Prediction`), and whether to mount them.
+    """Weights to mount, the vibration they should leave, and whether to mount them.
 
     Attributes
     ----------
+    influence
+        Coefficients of the planes at the speeds in question, with the vibration to correct as baseline.
+    weights
+        Total correction weights for the bare rotor (every weight of the runs removed), angle with the
+        rotation, shape (P,).
+    draws
+        The same for every draw of the errors, (n, P); none where errors are unknown.
+    after_covariance
+        Of a reading in a check run around its prediction, (S, C, 2, 2); NaN where errors are unknown.
+    check_rms
+        Root mean square below which 95 of 100 check runs stay; NaN where errors are unknown.
+    mounted
+        What is mounted now, in all planes of the runs.
+    conditioning
+        What the readings tell of the planes (those of weight 0 left out).
+    fitted
+        What the method says of its solution.
+    method
+        One of `balancing.METHODS`, or "ridge".
+    row_weights
+        How much each reading counts, relative to the largest, (S·C,); None: all alike.
+    limits
+        What the correction had to keep to; None: nothing.
+    remove
+        Planes where material is taken away, opposite to the weight that would be added.
     decision
         Whether to mount the weights, and what to do instead.
     convention_test
