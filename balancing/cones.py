@@ -4,10 +4,11 @@ With weights D = D₀ + T y (stretched), every limit is a disc: |r₀ᵢ + Wᵢ 
 reading, |D₀ₚ + Tₚ y| ≤ Mₚ for a weight; in min–max wᵢ |r₀ᵢ + Wᵢ T y| ≤ t, t the smallest. A sector in which
 a weight must stand is two half planes. T makes what is minimised a length: |y| for `nearest`, and for min–max
 the columns of all scaled rows orthogonal; so the solver's tolerances mean the same in any unit. The program
-starts from the few discs that D₀ is farthest out of and adds those that its solution violates, hence the
-dual value of the last program is a lower bound for all. Weights are within every limit exactly: limits are
-made tighter by 3e-9 of themselves, more where many digits cancel, and what that costs is in the gap.
-Where a plane may stand in several sectors, branch and bound chooses among them.
+starts from the few discs that D₀ is farthest out of (for min–max the largest amplitudes that least squares
+leaves, with rows reweighted by these a few times: C. L. Lawson, 1961) and adds those that its solution
+violates, hence the dual value of the last program is a lower bound for all. Weights are within every limit
+exactly: limits are made tighter by 3e-9 of themselves, more where many digits cancel, and what that costs is
+in the gap. Where a plane may stand in several sectors, branch and bound chooses among them.
 """
 
 from __future__ import annotations
@@ -31,12 +32,14 @@ PLAIN: Words = "{:.4g}".format
 TOLERANCE = 1e-9
 TIGHTER = (0.3, 3.0, 30.0, 300.0, 3000.0)
 """By how many tolerances limits are tightened, one after the other until all are kept."""
-AT_LIMIT = 1e-5
-"""A limit is reached where less than this share of it is left."""
+AT_LIMIT = 2e-3
+"""A limit is reached where less than this share of it is left: solvers stay a little inside."""
 PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""
-FIRST, MORE = 5, 3
+FIRST, MORE = 3, 3
 """Discs a plane that a program starts from, and that are added to it."""
+STEPS = 4
+"""Of reweighting before min–max."""
 TURN, TINY = 2 * np.pi, 1e-300
 
 
@@ -84,7 +87,7 @@ class Optimum(NamedTuple):
 
 
 class _Goal(NamedTuple):
-    """D₀ (P,), T (2P, 2P), wᵢ of min–max (N + P,) or zeros; the objective of weights, and of a dual value."""
+    """D₀ (P,), T (2P, 2P), wᵢ of min–max (N,) or zeros; the objective of weights, and of a dual value."""
 
     start: ComplexArray
     transform: FloatArray
@@ -203,25 +206,19 @@ def nearest(
     def bound(value: float) -> float:
         return float(np.sqrt(floor**2 + 2 * max(value, 0.0)))
 
-    goal = _Goal(
-        target, np.asarray(np.linalg.inv(root)), np.zeros(bounds.W.shape[0] + len(target)), objective, bound
-    )
-    return _best(bounds, goal, None, tolerance)
+    goal = _Goal(target, np.linalg.inv(root), np.zeros(len(bounds.Y)), objective, bound)
+    return _best(bounds, goal, tolerance)
 
 
-def smallest_maximum(
-    bounds: Bounds, shares: FloatArray, first: BoolArray | None = None, tolerance: float = TOLERANCE
-) -> Optimum:
-    """Weights within limits that minimise max wᵢ |Yᵢ + Wᵢ D|, and wₚ |Dₚ| where that counts, too.
+def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLERANCE) -> Optimum:
+    """Weights within limits that minimise max wᵢ |Yᵢ + Wᵢ D|.
 
     Parameters
     ----------
     bounds
         Of planes that may all carry a weight.
     shares
-        w ≥ 0 of the readings and of the weights, (N + P,).
-    first
-        Those of them to start from; default the largest ones that least squares leaves.
+        w ≥ 0 of the readings, (N,).
     tolerance
         Of the solver, relative.
 
@@ -230,52 +227,61 @@ def smallest_maximum(
     InfeasibleError
         Where no weights are within the limits.
     """
-    E, e, limit = bounds.stacked()
-    on, limited, none = shares > 0, np.isfinite(limit), np.zeros(E.shape[1], dtype=complex)
+    W, Y, none = bounds.W, bounds.Y, np.zeros(bounds.W.shape[1], dtype=complex)
+    rows = shares[:, None] * W
 
     def objective(weights: ComplexArray) -> float:
-        return float((shares * np.abs(e + E @ weights)).max())
+        return float((shares * np.abs(Y + W @ weights)).max())
 
-    rows = shares[on, None] * E[on]
-    start = _shortened(solution(rows, -shares[on] * e[on]), bounds.max_weight)
+    start = _shortened(_levelled(rows, shares * Y), bounds.max_weight)
     if objective(start) >= objective(none):
         start = none
-    left, unit = e + E @ start, objective(start)
-    out = np.abs(left) > limit
+    unit = objective(start)
     if unit <= 1e-12 * objective(none) or not len(none):
         if within(bounds, start):  # nothing is left to minimise
-            return Optimum(start, unit, 0.0, (shares * np.abs(left) >= unit).astype(float))
+            return Optimum(start, unit, 0.0, (shares * np.abs(Y + W @ start) >= unit).astype(float))
         if not len(none):
             raise InfeasibleError("no plane may carry a weight")
-        unit = float(np.abs(rows @ solution(E[out], -left[out])).max()) if out.any() else 0.0
-    unit = unit or float(np.abs(rows).max()) or 1.0
-    size = np.maximum(np.maximum(limit, np.abs(left)), TINY)[limited]
-    scaled = np.concatenate((rows / unit, E[limited] / size[:, None]))
+        unit = objective(none) or 1.0
+    E, e, limit = bounds.stacked()
+    limited, size = np.isfinite(limit), np.maximum(np.maximum(limit, np.abs(e + E @ start)), TINY)
+    scaled = np.concatenate((rows / unit, (E / size[:, None])[limited]))
     values, vectors = np.linalg.eigh(scaled.conj().T @ scaled)
     transform = stretch(vectors * np.sqrt(len(scaled) / np.maximum(values, 1e-12 * values[-1])))
-    goal = _Goal(start, transform, shares / unit, objective, lambda value: unit * value)
-    return _best(bounds, goal, first, tolerance)
+    return _best(bounds, _Goal(start, transform, shares / unit, objective, lambda t: unit * t), tolerance)
 
 
-def _best(bounds: Bounds, goal: _Goal, first: BoolArray | None, tolerance: float) -> Optimum:
+def _levelled(rows: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Unknowns x that leave nearly the least maximum of |right + rows x|."""
+    Q, R = np.linalg.qr(rows)
+    x, counts = -(Q.conj().T @ right), np.ones(len(rows))
+    for _ in range(STEPS):
+        counts = counts * np.abs(right + Q @ x) ** 2
+        counts = counts / counts.max(initial=TINY) + 1e-8
+        weighed = counts * Q.conj().T
+        x = np.linalg.solve(weighed @ Q, -(weighed @ right))
+    return np.asarray(solution(R, x))
+
+
+def _best(bounds: Bounds, goal: _Goal, tolerance: float) -> Optimum:
     """Branch and bound: a plane whose weight stands at a forbidden angle is tried in each of its sectors."""
-
-    def branch(chosen: tuple[Arc | None, ...], best: Optimum | None) -> Optimum | None:
+    best: Optimum | None = None
+    branches: list[tuple[Arc | None, ...]] = [(None,) * len(goal.start)]
+    while branches:
+        chosen = branches.pop()
         try:
-            optimum = _convex(bounds, chosen, goal, first, tolerance)
+            optimum = _convex(bounds, chosen, goal, tolerance)
         except InfeasibleError:
-            return best
+            continue
         if best is not None and optimum.objective * (1 - optimum.gap) >= best.objective:
-            return best
-        pairs = enumerate(zip(optimum.weights.tolist(), bounds.sectors, strict=True))
-        plane = next((p for p, pair in pairs if not stands_in(*pair)), None)
+            continue
+        inside = map(stands_in, optimum.weights.tolist(), bounds.sectors)
+        plane = next((p for p, stands in enumerate(inside) if not stands), None)
         if plane is None:
-            return optimum
-        for sector in bounds.sectors[plane] or ():
-            best = branch((*chosen[:plane], sector, *chosen[plane + 1 :]), best)
-        return best
-
-    best = branch((None,) * len(goal.start), None)
+            best = optimum
+            continue
+        sectors = reversed(bounds.sectors[plane] or ())
+        branches += [(*chosen[:plane], sector, *chosen[plane + 1 :]) for sector in sectors]
     if best is None:
         raise InfeasibleError("no weights are within the limits")
     if best.gap > 1e-3:
@@ -286,33 +292,30 @@ def _best(bounds: Bounds, goal: _Goal, first: BoolArray | None, tolerance: float
     return best
 
 
-def _convex(
-    bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, first: BoolArray | None, tolerance: float
-) -> Optimum:
+def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, tolerance: float) -> Optimum:
     """The best weights with at most one sector for each plane."""
     E, e, limit = bounds.stacked()
     start, T, shares = goal.start, goal.transform, goal.shares
     P, left = len(start), e + E @ start
-    rising = np.flatnonzero(shares > 0)
-    index = np.concatenate((rising, np.flatnonzero(np.isfinite(limit))))
-    rises = np.arange(len(index)) < len(rising)
+    index = np.concatenate((np.flatnonzero(shares), np.flatnonzero(np.isfinite(limit))))
+    rises = np.arange(len(index)) < np.count_nonzero(shares)
     # discs |known + rows y| ≤ head, or t where it rises, each divided by its size
-    size = np.where(rises, 1 / np.maximum(shares, TINY)[index], np.maximum(limit, np.abs(left))[index])
+    size = np.maximum(limit, np.abs(left))[index]
+    size[rises] = 1 / shares[shares > 0]
     size = np.maximum(size, TINY)
     head, known = np.where(rises, 0.0, limit[index]) / size, left[index] / size
     rows = (stretch(E) @ T).reshape(-1, 2, 2 * P)[index] / size[:, None, None]
     sides, right = _sides(chosen, start, T)
     excess, scale = np.where(rises, 0.0, np.abs(known) - head), 1.0
-    if not len(rising):  # the way to go is about as long as the way to the farthest disc or side
+    if not rises.any():  # the way to go is about as long as the way to the farthest disc or side
         reach = np.linalg.norm(rows, axis=(1, 2))
         steps = excess / np.maximum(reach, 1e-9 * reach.max(initial=0.0))
         scale = float(np.concatenate((steps, -right)).max(initial=0.0))
         if not scale > 0:
             return Optimum(start, goal.objective(start), 0.0, np.zeros(len(e)))
         rows, sides, T = scale * rows, scale * sides, scale * T
-    active = (excess > 0) if first is None else first[index]
-    if first is None:
-        active[np.argsort(-np.abs(known[rises]))[: FIRST * P]] = True
+    active = excess > 0
+    active[np.argsort(-np.abs(known[rises]))[: FIRST * P]] = True
     for tighter in TIGHTER:
         inner = head * (1 - tighter * tolerance)
         while True:
@@ -323,8 +326,8 @@ def _convex(
             if not len(more):
                 break
             active[more[np.argsort(-out[more])[: MORE * P]]] = True
-        pairs = zip((start + unstretch(T @ y)).tolist(), chosen, strict=True)
-        weights = _shortened(np.array([project(*pair) for pair in pairs]), bounds.max_weight)
+        weights = np.array(list(map(project, (start + unstretch(T @ y)).tolist(), chosen)))
+        weights = _shortened(weights, bounds.max_weight)
         if (np.abs(e + E @ weights) <= limit).all():
             break
     else:
@@ -347,11 +350,12 @@ def _sides(
     chosen: tuple[Arc | None, ...], start: ComplexArray, T: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Rows, of length 1, with right + rows y ≥ 0: left of a sector's start and right of its end."""
-    arcs = [(p, sector) for p, sector in enumerate(chosen) if sector is not None]
-    inward = np.zeros((len(arcs), 2, len(start)), dtype=complex)
-    for k, (p, (first, width)) in enumerate(arcs):
-        inward[k, :, p] = -1j * np.exp(-1j * first), 1j * np.exp(-1j * (first + width))
-    normals = inward.reshape(-1, len(start))
+    inward = [
+        unit * (np.arange(len(start)) == p)
+        for p, arc in enumerate(chosen)
+        for unit in (() if arc is None else (-1j * np.exp(-1j * arc[0]), 1j * np.exp(-1j * sum(arc))))
+    ]
+    normals = np.reshape(np.array(inward, dtype=complex), (-1, len(start)))
     rows = stretch(normals)[::2] @ T
     length = np.linalg.norm(rows, axis=1)
     return rows / length[:, None], (normals @ start).real / length
@@ -382,7 +386,11 @@ def _program(
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.presolve_enable, settings.max_threads = False, False, 1
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
-    solved = clarabel.DefaultSolver(curvature, q, csc_matrix(A), b, cones, settings).solve()
+    for refined in (False, True):  # steps of full accuracy take half as long again, and are hardly needed
+        settings.iterative_refinement_enable = refined
+        solved = clarabel.DefaultSolver(curvature, q, csc_matrix(A), b, cones, settings).solve()
+        if str(solved.status) == "Solved":
+            break
     if "PrimalInfeasible" in str(solved.status):
         raise InfeasibleError("no weights are within the limits")
     x = np.append(solved.x, 0.0)
@@ -391,8 +399,8 @@ def _program(
 
 def explain(
     bounds: Bounds,
-    planes: Sequence[str],
-    readings: Sequence[str],
+    planes: Sequence[str] = (),
+    readings: Sequence[str] = (),
     amplitude: Words = PLAIN,
     weight: Words = PLAIN,
 ) -> str:
@@ -403,60 +411,32 @@ def explain(
     bounds
         Limits that no weights meet, some of them of amplitudes.
     planes, readings
-        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm".
+        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm"; default "1", … and "reading 1", ….
     amplitude, weight
         Write a number with its unit.
     """
     L, M, used = bounds.residual, bounds.max_weight, bounds.used
-    rounding = "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
-    if not L.all():
-        return rounding
-    relaxed = _relaxed(bounds)
-    factor, best = relaxed.objective, np.abs(bounds.Y + bounds.W[:, used] @ relaxed.weights)
+    planes = planes or [str(p + 1) for p in range(len(M))]
+    readings = readings or [f"reading {i + 1}" for i in range(len(L))]
+    part, factor = bounds.part(used), 0.0
+    if L.all():
+        free = part._replace(residual=L + np.inf)
+        relaxed = smallest_maximum(free, 1 / L)
+        factor, best = relaxed.objective, np.abs(bounds.Y + part.W @ relaxed.weights)
     if factor < 1 - PRICED:
-        return rounding
-
-    def matters(plane: int) -> bool:
-        """Whether the factor would be smaller if the plane need not be empty, or at any angle."""
-        free = np.arange(len(M)) == plane
-        sectors = tuple(None if p == plane else s for p, s in enumerate(bounds.sectors))
-        wider = bounds._replace(max_weight=np.where(free & (M == 0), np.inf, M), sectors=sectors)
-        return _relaxed(wider).objective < factor * (1 - PRICED)
-
+        return "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
     order = np.argsort(-relaxed.prices)
     priced = order[relaxed.prices[order] > PRICED * relaxed.prices.sum()]
     heavy, high = np.flatnonzero(used)[priced[priced >= len(L)] - len(L)], priced[priced < len(L)]
     conditions = [f"at most {weight(M[p])} in plane {planes[p]!r}" for p in heavy]
-    for p, sectors in enumerate(bounds.sectors):
-        if (M[p] == 0 or sectors is not None) and matters(p):
-            what = "the forbidden angles of plane {}" if M[p] else "plane {} left empty"
-            conditions.append(what.format(repr(planes[p])))
+    for plane, most, sectors in zip(planes, M, bounds.sectors, strict=True):
+        conditions += [f"plane {plane!r} left empty"] if most == 0 else []
+        conditions += [f"the forbidden angles of plane {plane!r}"] if most and sectors is not None else []
     stays = [f"{readings[i]} (limit {amplitude(L[i])}) stays at {amplitude(best[i])}" for i in high[:3]]
-    text = (
+    digits = 10.0 ** (2 - int(np.floor(np.log10(factor))))
+    enough = np.ceil((1 + 1e-4) * factor * digits) / digits  # three digits that leave room for the weights
+    return (
         f"the limits cannot be met: {'with ' if conditions else 'whatever the weights'}"
         f"{listing(conditions, 'and')}, {listing(stays, 'and')} at best; "
-        f"relaxing all amplitude limits {_up(factor)} times works"
+        f"relaxing all amplitude limits {enough:.6g} times works"
     )
-    part = bounds.part(used)
-    try:
-        optimum = smallest_maximum(
-            part._replace(max_weight=np.full(used.sum(), np.inf)),
-            np.append(np.zeros(len(L)), 1 / part.max_weight),
-        )
-    except ValueError:  # more weight does not help
-        return text
-    return text + (f", or all weight limits {_up(optimum.objective)} times" if optimum.objective else "")
-
-
-def _relaxed(bounds: Bounds) -> Optimum:
-    """The least factor of all limits of amplitudes with which the others can be kept, of the planes used."""
-    part = bounds.part(bounds.used)
-    free = part._replace(residual=part.residual + np.inf)
-    return smallest_maximum(free, np.append(1 / part.residual, np.zeros(len(part.max_weight))))
-
-
-def _up(factor: float) -> str:
-    """Three digits, rounded up so that the factor leaves room for the weights."""
-    factor *= 1 + 1e-4
-    digits = 10.0 ** (2 - int(np.floor(np.log10(factor))))
-    return f"{np.ceil(factor * digits) / digits:.6g}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -77,16 +77,15 @@ class OtherReading:
     ----------
     words
         What is otherwise: "lag", "lag or against" (either of both alone).
-    labels
-        To print in: the angles are those that the job would write.
-    weights, to_add
-        As in `Correction`.
+    rows
+        Weights (P) as JSON has them: the angles are those that the job would write.
+    places
+        Where to work, degrees as the job would count them, P.
     """
 
     words: str
-    labels: Labels
-    weights: ComplexArray
-    to_add: ComplexArray | None = None
+    rows: list[dict[str, Any]]
+    places: list[float]
 
 
 def convention_test(trials: Trials) -> ConventionTest:

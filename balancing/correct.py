@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, check_planes, conditioning, unresolved
+from balancing.cones import Bounds, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
 from balancing.influence import Influence, Whitening, match_speeds
@@ -133,22 +134,19 @@ def correct(  # noqa: PLR0913
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
     """Refuse planes that the coefficients tell apart only by their errors, or say so."""
-    part, P = case.part, len(case.names)
-    check_planes(case.W[counts], part.planes)
+    part, W, n = case.part, case.W[counts], 2 * len(case.names)
+    check_planes(W, part.planes)
     known, every = (
-        part.channels(known=only)[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts] for only in (True, False)
+        part.channels(known=only)[..., 2:, 2:].reshape(-1, n, n)[counts] for only in (True, False)
     )
-    words = ""
-    if part.trials is not None or part.known_errors:
-        words = unresolved(case.W[counts], part.planes, known)
+    measured = part.trials is not None or part.known_errors
+    words = unresolved(W, part.planes, known) if measured else ""
     if words and refuse:
-        rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in part.remarks.contradictions]
         first = part.remarks.contradictions
+        rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in first]
         so = f"so {words}" if first else words
         raise UndeterminedError("\n".join((*first, so, *remedies(case), *rest)))
-    if not words and every.any():
-        words = unresolved(case.W[counts], part.planes, every)
-    return words
+    return words or (unresolved(W, part.planes, every) if every.any() else "")
 
 
 def fit_part(
@@ -162,6 +160,10 @@ def fit_part(
     errors, N = part.known_errors, part.baseline.size
     asked = method or ("weighted" if errors and strength is None else "least-squares")
 
+    def conflict(bounds: Bounds) -> str:
+        labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
+        return explain(bounds, part.planes, readings, labels.amplitude_words, labels.weight_words)
+
     def by(name: str) -> Solution:
         P = len(part.planes)
         return solve(
@@ -174,9 +176,7 @@ def fit_part(
             limits=limits,
             strength=strength,
             names=part.planes,
-            readings=reading_names(part.labels, part.sensors, part.speeds),
-            amplitude=part.labels.amplitude_words,
-            weight=part.labels.weight_words,
+            conflict=conflict,
             explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
         )
 

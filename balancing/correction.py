@@ -1,19 +1,16 @@
-"""Correction weights with the vibration they should leave: numbers, errors, tables and text."""
+"""A correction as it is judged and told: whether to mount its weights, JSON, tables and text."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from balancing.conditioning import Conditioning
 from balancing.convention_test import ConventionTest, OtherReading, assumptions
 from balancing.conventions import Labels
-from balancing.influence import Influence, Mounted
-from balancing.methods import Solution, method_words
-from balancing.regions import NORMAL_RADIUS, Region, half_width, reach, real_parts
+from balancing.prediction import HELD, Prediction
+from balancing.regions import NORMAL_RADIUS
 from balancing.tables import (
     INVISIBLE,
     ROUNDING,
@@ -22,29 +19,21 @@ from balancing.tables import (
     error_document,
     error_words,
     largest_readings,
-    reading_columns,
-    reading_names,
     rms,
     small,
     three_figures,
-    vector_columns,
     weight_columns,
     weight_rows,
 )
-from balancing.trials import Limits
 from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.json import cell, plain
+from rotorid.base.arrays import ComplexArray
+from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import capital, counted, cut, figures, listing, wrap
+from rotorid.base.text import capital, cut, figures, listing, wrap
 
 if TYPE_CHECKING:
     import pandas as pd
 
-HELD = 1e-5
-"""Relative scatter of a weight below which a limit holds it."""
-_TOUCHES = 2e-3
-"""Relative distance from a limit that counts as none (the solver stays a little inside)."""
 _NAME = 16
 """So many letters of the name of a run stand over a column."""
 
@@ -127,8 +116,8 @@ class MountDecision:
 
 
 @dataclass(frozen=True, eq=False)
-class Correction(Answered):
-    """Weights to mount, and the vibration they should leave.
+class Correction(Prediction, Answered):
+    """Weights to mount, the vibration they should leave, and whether to mount them.
 
     Attributes
     ----------
@@ -165,158 +154,9 @@ class Correction(Answered):
         What the same numbers give if a convention that is assumed is otherwise.
     """
 
-    influence: Influence
-    weights: ComplexArray
-    draws: ComplexArray
-    after_covariance: FloatArray
-    check_rms: float
-    mounted: Mounted
-    conditioning: Conditioning
-    fitted: Solution
-    method: str
-    row_weights: FloatArray | None = None
-    limits: Limits | None = None
-    remove: tuple[str, ...] = ()
     decision: MountDecision = field(default_factory=MountDecision)
     convention_test: ConventionTest | None = None
     others: tuple[OtherReading, ...] = ()
-
-    @property
-    def speeds(self) -> FloatArray:
-        """rad/s, (S,)."""
-        return self.influence.speeds
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Names, C."""
-        return self.influence.sensors
-
-    @property
-    def planes(self) -> tuple[str, ...]:
-        """Names, P."""
-        return self.influence.planes
-
-    @property
-    def labels(self) -> Labels:
-        """Units and conventions to print in."""
-        return self.influence.labels
-
-    @property
-    def before(self) -> ComplexArray:
-        """Vibration of the bare rotor, (S, C)."""
-        return self.influence.baseline
-
-    @property
-    def after(self) -> ComplexArray:
-        """Its prediction with the corrections mounted, (S, C)."""
-        return np.asarray(self.before + self.influence.W @ self.weights)
-
-    @property
-    def errors_known(self) -> bool:
-        """Whether it is known how far a check run may be from its prediction."""
-        return bool(np.isfinite(self.check_rms))
-
-    @property
-    def region_known(self) -> bool:
-        """Whether it is known how far the weights may be from the best ones; not for a biased ridge."""
-        return len(self.draws) > 2 * len(self.planes)
-
-    def region(self, planes: Sequence[int] | None = None) -> Region:
-        """Where the weights of these planes (by index; None: all) are jointly with 95 %."""
-        chosen = list(range(len(self.planes)) if planes is None else planes)
-        return Region.of(self.draws[:, chosen], self.weights[chosen])
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Of (Re D₁, Im D₁, …), (2P, 2P); NaN where errors are unknown."""
-        if not self.region_known:
-            return np.full((2 * len(self.planes),) * 2, np.nan)
-        return np.asarray(np.cov(real_parts(self.draws).T))
-
-    @property
-    def _turned(self) -> ComplexArray:
-        """Draws seen along each weight, (n, P): size and angle off in real and imaginary part."""
-        size = np.abs(self.weights)
-        unit = np.where(size > 0, self.weights, 1.0) / np.where(size > 0, size, 1.0)
-        return np.asarray(self.draws / unit)
-
-    @property
-    def _sizes(self) -> FloatArray:
-        """Sizes of draws (n, P); along the weight where it is within its own error."""
-        return np.where(self._clear, np.abs(self.draws), self._turned.real)
-
-    @property
-    def mass_std(self) -> FloatArray:
-        """Standard deviation (P,) of the weights' sizes; NaN where errors are unknown."""
-        return self._sizes.std(axis=0) if self.region_known else np.full(len(self.planes), np.nan)
-
-    @property
-    def angle_std(self) -> FloatArray:
-        """Standard deviation (P,) of the weights' angles, rad; NaN for a weight within its own error.
-
-        Within its own error is a weight whose 95 % region holds zero: its angle is not determined.
-        """
-        if not self.region_known:
-            return np.full(len(self.planes), np.nan)
-        return np.where(self._clear, np.angle(self._turned).std(axis=0), np.nan)
-
-    @property
-    def _clear(self) -> BoolArray:
-        nothing = np.zeros(1, dtype=complex)
-        if not self.region_known:
-            return np.ones(len(self.planes), dtype=bool)
-        clear = [bool(w) and not self.region([p]).holds(nothing) for p, w in enumerate(self.weights)]
-        return np.array(clear)
-
-    def half_widths(self) -> tuple[FloatArray, FloatArray]:
-        """Half widths (P,) of 95 % intervals of the weights' sizes and angles (rad); NaN: not known."""
-        if not self.region_known:
-            return self.mass_std, self.angle_std
-        angles = np.where(self._clear, half_width(np.angle(self._turned)), np.nan)
-        return half_width(self._sizes - np.abs(self.weights)), angles
-
-    @property
-    def to_add(self) -> ComplexArray:
-        """What to add to the weights mounted now, one per plane of `mounted`."""
-        total = dict(zip(self.planes, self.weights, strict=True))
-        planes = [total.get(plane, 0.0) for plane in self.mounted.planes]
-        return np.array(planes, dtype=complex) - self.mounted.weights
-
-    def places(self, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
-        """Where to work, degrees as the job counts them: opposite to a weight where material is removed."""
-        turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
-        return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
-
-    @property
-    def within(self) -> FloatArray:
-        """Radius (S, C) of the 95 % region of each reading in a check run, in the job's unit."""
-        if not self.errors_known:
-            return np.full(self.before.shape, np.nan)
-        return reach(self.after_covariance) * self.labels.vibration_scale
-
-    @property
-    def active(self) -> tuple[str, ...]:
-        """Limits that bind, in words."""
-        if self.limits is None:
-            return ()
-        weight, amplitude = self.labels.weight_words, self.labels.amplitude_words
-        words = [
-            f"plane {name!r} has its largest weight, {weight(float(limit))}"
-            for name, D, limit in zip(self.planes, self.weights, self.limits.max_weight, strict=True)
-            if abs(D) >= limit * (1 - _TOUCHES)
-        ]
-        names = reading_names(self.labels, self.sensors, self.speeds)
-        words += [
-            f"{name} has its largest amplitude, {amplitude(float(limit))}"
-            for name, z, limit in zip(names, self.after.ravel(), self.limits.residual.ravel(), strict=True)
-            if abs(z) >= limit * (1 - _TOUCHES)
-        ]
-        words += [
-            f"plane {name!r} stands at the end of a forbidden arc"
-            for name, D, arcs in zip(self.planes, self.weights, self.limits.forbidden, strict=True)
-            if D and any(np.abs(np.angle(D * np.exp([-1j * a, -1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
-        ]
-        return tuple(words)
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -331,12 +171,8 @@ class Correction(Answered):
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user may want to know."""
-        within = [
-            f"the weight in plane {plane!r} lies within its own error: its angle is not determined"
-            for plane, clear, weight in zip(self.planes, self._clear, self.weights, strict=True)
-            if weight and not clear
-        ]
-        return (*self.influence.remarks.notes, *within, *self.decision.notes)
+        together = (self.combination,) if self.combination else ()
+        return (*self.influence.remarks.notes, *together, *self.decision.notes)
 
     @property
     def sound(self) -> bool:
@@ -349,8 +185,9 @@ class Correction(Answered):
         old = np.abs(self.before) * scale
         residuals = self._residual_columns()
         new = np.array(residuals[4].values)
-        there = bool(self.mounted.weights.any())
-        planes, work = self.mounted.planes, weight_rows
+        run, planes, weights = self.mounted
+        there = bool(weights.any())
+        mounted = {"run": run, "weights": weight_rows(self.labels, planes, weights)} if there else None
         return plain(
             {
                 "judgement": self.decision.to_dict(self.labels),
@@ -358,12 +195,7 @@ class Correction(Answered):
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
                 "corrections": rows(self._weight_columns()),
-                "mounted_in_last_run": {
-                    "run": self.mounted.run,
-                    "weights": work(self.labels, planes, self.mounted.weights),
-                }
-                if there
-                else None,
+                "mounted_in_last_run": mounted,
                 "add_to_mounted": self.work_rows(planes, self.to_add) if there else None,
                 "residuals": rows(residuals),
                 "rms_before": rms(old),
@@ -377,11 +209,11 @@ class Correction(Answered):
                 "duality_gap": self.fitted.gap,
                 "chi_square": self.fitted.chi_square,
                 "chi_square_dof": self.fitted.dof,
-                "limits": self._limits(),
+                "limits": self.limits_document(),
                 "limits_that_bind": self.active,
                 "errors": error_document(self.influence.reading, self.influence.run_errors, self.labels),
                 "convention_test": None if self.convention_test is None else asdict(self.convention_test),
-                "other_readings": [row for other in self.others for row in self._other_rows(other)],
+                "other_readings": [row for other in self.others for row in other.rows],
                 "assumptions": assumptions(self.labels, self.convention_test, self.others),
                 "warnings": self.warnings,
                 "notes": self.notes,
@@ -395,119 +227,37 @@ class Correction(Answered):
         `equivalent_added_deg` the angle of the added weight that would do the same. Where a convention is
         assumed, `mass_if_…` and `angle_deg_if_…` say what the other reading gives.
         """
-        shown = frame([column for column in self._weight_columns() if column.name != "covariance"])
-        action, at = shown.pop("action"), shown.pop("remove_at_deg")
+        *numbers, _, action, _ = self._weight_columns()
+        shown = frame(numbers)
         if self.remove:
-            shown.insert(1, "action", action)
+            shown.insert(1, "action", list(action.values))
             shown["equivalent_added_deg"] = shown["angle_deg"]
-            shown["angle_deg"] = at.fillna(shown["angle_deg"])
+            shown["angle_deg"] = self.places(self.planes, self.weights)
         for other in self.others:
             word = other.words.replace(" ", "_")
-            shown[f"mass_if_{word}"] = other.labels.weight(other.weights)[0]
-            shown[f"angle_deg_if_{word}"] = self._other_places(other)
+            shown[f"mass_if_{word}"] = [row["mass"] for row in other.rows]
+            shown[f"angle_deg_if_{word}"] = other.places
         return shown
-
-    def residuals_frame(self) -> pd.DataFrame:
-        """One row per speed and sensor: amplitude and phase before and after (NaN: after is nothing)."""
-        return frame(self._residual_columns()[:-1])
-
-    def sentence(self) -> str:
-        """Whether to mount what, and what a check run will read."""
-        if not self.sound:
-            first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
-            return "\n".join([*first, *self.decision.lines()])
-        if not self.weights.any():
-            return "Mount nothing: the limits leave no plane a weight."
-        what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
-        ways = {"phase": f"phases {self.labels.phase}", "angles": f"angles count {self.labels.angle_words}"}
-        taken = " and ".join(ways[name] for name in self.labels.assumed) if self.others else ""
-        return f"{what}{f', if {taken} as assumed' if taken else ''}: {self._rms_words()}."
-
-    @property
-    def answer(self) -> Answer:
-        """Whether to mount the weights, these with their 95 %, the largest readings left; then the tables."""
-        test = self.convention_test
-        assumed = assumptions(self.labels, test, self.others)
-        sure = test is not None and test.verdict == "confirmed"
-        taken = (" ".join(assumed),) if assumed else ()
-        first, promised = self.sentence(), self._rms_words()
-        promised = "" if promised in first else f"Predicted: {promised}."
-        tables = (promised, self._vibration_text(), self._quality_text())
-        within = self.within if self.errors_known else None
-        left = largest_readings(self.labels, self.speeds, self.sensors, self.before, self.after, within)
-        return Answer(
-            first,
-            f"{self._weights_text()}\n\nLargest left{left}",
-            (() if sure else taken) + self.warnings[len(self.contradictions) :],
-            (taken if sure else ()) + self.notes,
-            tuple(table for table in tables if table),
-            "every reading, method and errors",
-        )
-
-    @property
-    def held(self) -> BoolArray:
-        """Which weights (P,) limits hold, so that errors do not move their sizes."""
-        return np.asarray(self.half_widths()[0] < HELD * np.abs(self.weights))
-
-    @property
-    def method_in_words(self) -> str:
-        """What the method makes small, a sentence."""
-        return method_words(self.method, weighted=self.row_weights is not None)
 
     def otherwise(self, words: str) -> OtherReading:
         """What a correction under other conventions notes of this one; in words, what is otherwise in it."""
-        return OtherReading(words, self.labels, self.weights, self.to_add)
-
-    def vibration_columns(
-        self, rounding: float = INVISIBLE, after: ComplexArray | None = None
-    ) -> tuple[Column, ...]:
-        """Speed, sensor, vibration before and after, one row a reading.
-
-        Parameters
-        ----------
-        rounding
-            Amplitudes after, up to this share of the largest one before, are nothing.
-        after
-            In place of the prediction, (S, C).
-        """
-        nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
-        return (
-            *reading_columns(self.labels, self.speeds, self.sensors),
-            *vector_columns(self.labels, "before", self.before),
-            *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
-        )
-
-    def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
-        """Weights of planes as JSON types, and where to take material away from some."""
-        added = weight_rows(self.labels, planes, weights)
-        for row, at in zip(added, self.places(planes, weights).tolist(), strict=True):
-            if row["plane"] in self.remove:
-                row.update(action="remove", remove_at_deg=at)
-            elif self.remove:
-                row.update(action="add", remove_at_deg=None)
-        return added
-
-    def plane_limits(self, p: int) -> dict[str, Any]:
-        """Largest weight and forbidden arcs of a plane as the job writes them: where to work, from and to."""
-        if self.limits is None:
-            return {"max_weight": None, "forbidden_deg": []}
-        opposite = self.planes[p] in self.remove
-        return {
-            "max_weight": cell(self.limits.max_weight[p] * self.labels.weight_scale),
-            "forbidden_deg": [self.labels.arc(*a, opposite=opposite) for a in self.limits.forbidden[p]],
-        }
+        labels, planes = self.labels, self.planes
+        head = {"if": words, "phase": labels.phase, "angles": labels.angle_words}
+        *columns, _, at = self.work_columns(planes, self.weights)
+        each = [head | row for row in rows((*columns, at))]
+        return OtherReading(words, each, self.places(planes, self.weights).tolist())
 
     def _weight_columns(self) -> tuple[Column, ...]:
-        gone = [plane in self.remove for plane in self.planes]
-        P = len(gone)
+        P = len(self.planes)
         blocks = np.einsum("papb->pab", self.covariance.reshape(P, 2, P, 2))
+        *columns, action, at = self.work_columns(self.planes, self.weights)
         return (
-            *weight_columns(self.labels, self.planes, self.weights),
+            *columns,
             Column("mass_std", self.mass_std * self.labels.weight_scale),
             Column("angle_std_deg", np.degrees(self.angle_std)),
             Column("covariance", self.labels.weight_covariance(blocks) if self.region_known else [None] * P),
-            Column("action", ["remove" if away else "add" for away in gone]),
-            Column("remove_at_deg", np.where(gone, self.places(self.planes, self.weights), np.nan)),
+            action,
+            at,
         )
 
     def _residual_columns(self) -> tuple[Column, ...]:
@@ -515,129 +265,109 @@ class Correction(Answered):
         last = covariance_column(self.labels, "after_covariance", covariance, self.before.size)
         return (*self.vibration_columns(ROUNDING), last)
 
-    def _limits(self) -> dict[str, Any] | None:
-        """Of the weights, and of each reading in the order of `residuals`; None where there is none."""
-        if self.limits is None:
-            return None
-        each = {plane: self.plane_limits(p) for p, plane in enumerate(self.planes)}
-        return {
-            "max_weight": {plane: limits["max_weight"] for plane, limits in each.items()},
-            "amplitude": self.limits.residual.ravel() * self.labels.vibration_scale,
-            "forbidden_deg": {
-                p: limits["forbidden_deg"] for p, limits in each.items() if limits["forbidden_deg"]
-            },
-        }
+    def sentence(self) -> str:
+        """Whether to mount what, what is determined, and what a check run will read."""
+        labels = self.labels
+        if not self.sound:
+            first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
+            stop, *instead = self.decision.lines() or ("",)
+            together = f"{capital(self.combination)}." if self.combination else ""
+            return "\n".join(filter(None, (*first, stop, together, *instead)))
+        if not self.weights.any():
+            return "Mount nothing: the limits leave no plane a weight."
+        what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
+        if self.others:
+            ways = {"phase": f"phases {labels.phase}", "angles": f"angles count {labels.angle_words}"}
+            what += f", if {' and '.join(ways[name] for name in labels.assumed)} as assumed"
+        return f"{what}: {f'{self.combination}. Predicted: ' if self.combination else ''}{self._left()}."
 
-    def _other_places(self, other: OtherReading) -> FloatArray:
-        influence = replace(self.influence, labels=other.labels)
-        return replace(self, influence=influence).places(self.planes, other.weights)
-
-    def _other_rows(self, other: OtherReading) -> list[dict[str, Any]]:
-        n = len(self.planes)
-        gone = [plane in self.remove for plane in self.planes]
-        return rows(
-            (
-                Column("if", (other.words,) * n),
-                Column("phase", (other.labels.phase,) * n),
-                Column("angles", (other.labels.angle_words,) * n),
-                *weight_columns(other.labels, self.planes, other.weights),
-                Column("remove_at_deg", np.where(gone, self._other_places(other), np.nan)),
-            )
+    @property
+    def answer(self) -> Answer:
+        """Whether to mount the weights, these with their 95 %, the largest readings left; then the tables."""
+        first, test, predicted = self.sentence(), self.convention_test, self._left()
+        warnings = list(self.warnings[len(self.contradictions) :])
+        notes = [note for note in self.notes if note != self.combination]
+        if assumed := " ".join(assumptions(self.labels, test, self.others)):
+            (notes if test is not None and test.verdict == "confirmed" else warnings).insert(0, assumed)
+        largest = largest_readings(
+            self.labels, self.speeds, self.sensors, self.before, self.after, self.within
+        )
+        tables = self._vibration_text(), self._quality_text()
+        return Answer(
+            first,
+            f"{self._weights_text()}\n\nLargest left{largest}",
+            tuple(warnings),
+            tuple(notes),
+            tables if predicted in first else (f"Predicted: {predicted}.", *tables),
+            "every reading, method and errors",
         )
 
-    def _other_columns(self, shown: FloatArray) -> list[Column]:
-        """The angles if a convention is otherwise, and the mass where that is another than the one shown."""
-        columns = []
-        for other in self.others:
-            places = map(degrees, self._other_places(other))
-            masses = map(figures, other.labels.weight(other.weights)[0])
-            cells = [
-                place if mass == figures(here) else f"{mass} at {place}"
-                for place, mass, here in zip(places, masses, shown, strict=True)
-            ]
-            columns.append(Column(f"if {other.words}", cells, str))
-        return columns
+    def _left(self) -> str:
+        """Root mean square before and after, and what a check run will show."""
+        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
+        old, new = np.abs(self.before).max(), np.abs(self.after).max()
+        before = f"rms {three_figures(rms(self.before) * scale)}"
+        checked = figures(self.check_rms * scale, 2) if self.errors_known else ""
+        exact = new <= ROUNDING * old
+        if checked and exact:
+            return " ".join(f"{before} → below {checked} {unit} in 95 of 100 check runs".split())
+        left = "0 by arithmetic," if exact else small(rms(self.after) * scale, old * scale)
+        words = f"{before} → {left} {unit}".rstrip(" ,")
+        return f"{words}; a check run stays below {checked} in 95 of 100" if checked else words
 
     def _weights_text(self) -> str:
-        unit, mass = self.labels.weight_in, self.labels.weight(self.weights)[0]
-        removed = set(self.planes) & set(self.remove)
-        work = [Column("", ["(remove)" if p in removed else "(add)" for p in self.planes], str)]
-        columns = [
-            Column("plane", self.planes, str),
-            *(work if removed else []),
-            Column(unit, mass, figures),
-            Column("angle", self.places(self.planes, self.weights), degrees),
-            *self._width_columns(unit),
-            *self._other_columns(mass),
-        ]
-        taken = f" ({' and '.join(self.labels.assumed)} assumed)" if self.labels.assumed else ""
-        conventions = f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}"
+        """Weights and their 95 %, in each plane; under other conventions, and beside what is mounted."""
+        labels, removed = self.labels, set(self.planes) & set(self.remove)
+        plane, mass, *_ = weight_columns(labels, self.planes, self.weights)
+        columns = [plane, mass, Column("angle", self.places(self.planes, self.weights), degrees)]
+        if removed:
+            columns.insert(1, Column("", ["(remove)" if p in removed else "(add)" for p in self.planes], str))
+        if self.region_known:
+            sizes, angles = self.half_widths()
+            widths = [f"± {figures(width * labels.weight_scale, 2)} {labels.weight_in}" for width in sizes]
+            for p in np.flatnonzero(self.held):
+                widths[p] = "at its limit"
+            turns = list(map(_angle_width, np.degrees(angles)))
+            columns += [Column("95 %", widths, str), Column("", turns, str)]
+        for other in self.others:  # the mass where that is another than the one shown
+            places = map(degrees, other.places)
+            masses = [figures(row["mass"]) for row in other.rows]
+            cells = [
+                place if size == figures(here) else f"{size} at {place}"
+                for size, place, here in zip(masses, places, mass.values, strict=True)
+            ]
+            columns.append(Column(f"if {other.words}", cells, str))
+        taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
+        conventions = f"{capital(labels.turning_in_words())}; phases as {labels.phase}{taken}"
         lines = [f"{conventions}; weights for the bare rotor."]
         if self.mounted.weights.any():
-            stays = self._in_planes(self.to_add)
-            cells = [stays.pop(plane, "nothing") for plane in self.planes]
-            word = "remove" if set(self.planes) <= set(self.remove) else "add"
-            columns.append(Column(f"{word} if {cut(self.mounted.run, _NAME)!r} stays", cells, str))
-            also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
-            lines += [f"If {self.mounted.run!r} stays mounted, also {listing(also, 'and')}."] if also else []
+            run, planes, _ = self.mounted
+            sizes, places = labels.weight(self.to_add)[0], map(degrees, self.places(planes, self.to_add))
+            each = zip(planes, sizes, places, strict=True)
+            stays = {name: f"{figures(size)} at {place}" for name, size, place in each if size}
+            cells = [stays.pop(name, "nothing") for name in self.planes]
+            word = "remove" if removed == set(self.planes) else "add"
+            columns.append(Column(f"{word} if {cut(run, _NAME)!r} stays", cells, str))
+            also = [f"{words} in plane {name!r}" for name, words in stays.items()]
+            lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
         return "\n".join([text(columns, width=COLUMNS), *lines])
 
-    def _width_columns(self, unit: str) -> list[Column]:
-        if not self.region_known:
-            return []
-        sizes, angles = self.half_widths()
-        widths = [f"± {figures(width * self.labels.weight_scale, 2)} {unit}" for width in sizes]
-        return [
-            Column("95 %", ["at its limit" if h else w for h, w in zip(self.held, widths, strict=True)], str),
-            Column("", [_angle_width(half) for half in np.degrees(angles)], str),
-        ]
-
-    def _in_planes(self, weights: ComplexArray) -> dict[str, str]:
-        """Weights in the planes of the runs, where there are any, and where to work."""
-        planes, mass = self.mounted.planes, self.labels.weight(weights)[0]
-        places = self.places(planes, weights)
-        return {p: f"{figures(m)} at {degrees(a)}" for p, m, a in zip(planes, mass, places, strict=True) if m}
-
     def _vibration_text(self) -> str:
-        columns = [*self.vibration_columns(INVISIBLE)]
+        columns, scale = list(self.vibration_columns(INVISIBLE)), self.labels.vibration_scale
         if self.errors_known:
-            within = self.within.ravel()
-            columns.append(Column("95 % within", within, lambda reach: f"± {figures(reach, 2)}"))
+            columns.append(Column("95 % within", self.within.ravel(), lambda width: f"± {figures(width, 2)}"))
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        old, new = (np.abs(z).max() * self.labels.vibration_scale for z in (self.before, self.after))
+        old, new = np.abs(self.before).max() * scale, np.abs(self.after).max() * scale
         head = f"Vibration{unit}, bare rotor before and predicted after"
         return f"{head}\n{text(columns, left=2)}\nlargest {three_figures(old)} → {small(new, old)}"
 
-    def _rms_words(self) -> str:
-        """Before and after, and what a check run will show."""
-        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        old, new = np.abs(self.before) * scale, np.abs(self.after) * scale
-        before = f"rms {three_figures(rms(old))}"
-        checked = figures(self.check_rms * scale, 2) if self.errors_known else ""
-        if new.max() <= ROUNDING * old.max():
-            if not checked:
-                return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
-            return " ".join(f"{before} → below {checked} {unit} in 95 of 100 check runs".split())
-        words = f"{before} → {small(rms(new), old.max())} {unit}".rstrip()
-        return f"{words}; a check run stays below {checked} in 95 of 100" if checked else words
-
     def _quality_text(self) -> str:
-        n, rank = len(self.planes), self.conditioning.rank
-        planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
-        numbers = f"rank {rank} of {n}, condition number {self.conditioning.condition_number:.3g}"
-        lines = [self.method_in_words]
-        fitted = self.fitted
-        if fitted.gap is not None:
-            lines[0] += f" The optimum is certified: at most {max(fitted.gap, 0.0):.1e} better is possible."
-        lines.append(
-            f"{planes.capitalize()} determined ({numbers})." if self.method != "ridge" else f"{numbers}."
-        )
-        if fitted.chi_square is not None and fitted.dof:
-            lines.append(
-                f"What is left of the vibration is {np.sqrt(fitted.chi_square / fitted.dof):.2g} times what "
-                f"the errors of the readings explain (χ² {fitted.chi_square:.1f} with "
-                f"{counted(fitted.dof, 'degree')} of freedom)."
+        """What the method makes small, what is determined, and with what errors."""
+        lines = [self.method_in_words, self.conditioning.sentence()]
+        if self.fitted.gap is not None:
+            lines[0] += (
+                f" The optimum is certified: at most {max(self.fitted.gap, 0.0):.1e} better is possible."
             )
         if self.errors_known:
             lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))

@@ -376,6 +376,8 @@ def coarse(influence: Influence) -> tuple[str, ...]:
 
 
 def _not_determined(result: Correction, case: Case, unclear: Sequence[str]) -> tuple[str, ...]:
+    if result.combination:
+        return ()
     if unclear:
         together = "; each weight alone is uncertain, what they leave together is not"
         return tuple(words.removesuffix(REMEDY) + together for words in unclear)

@@ -33,13 +33,11 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import UndeterminedError, check_planes, check_stack
 from balancing.cones import (
     AT_LIMIT,
-    PLAIN,
     TINY,
     TOLERANCE,
     Bounds,
     InfeasibleError,
     Optimum,
-    Words,
     bounds_of,
     explain,
     nearest,
@@ -81,12 +79,10 @@ class Solution:
         Shape (P,), within every limit.
     residual
         Y + W D, shape (N,).
-    method
-        Its name.
     objective
         max wᵢ|rᵢ| of min–max, else sqrt(Σ wᵢ²|rᵢ|²).
     active_weights, active_residuals
-        Planes (P,) at their largest weight; readings (N,) at their limit or, for min–max, at the maximum.
+        Planes (P,) at their largest weight, and readings (N,) at their limit.
     resolve
         (W (B, N, P), Y (B, N)) → weights (B, P) of the same problem with redrawn data, NaN where it has no
         solution; further errors of the size `model_error` are drawn in it. NaN for a ridge, whose scatter
@@ -104,7 +100,6 @@ class Solution:
 
     weights: ComplexArray
     residual: ComplexArray
-    method: str
     objective: float
     active_weights: BoolArray
     active_residuals: BoolArray
@@ -136,14 +131,12 @@ class Job(NamedTuple):
 
     def fitted(self, D: ComplexArray, resolve: Resolve, **more: Any) -> Solution:  # noqa: ANN401
         """The result."""
-        residual, limit, share = self.Y + self.W @ D, self.bounds.residual, 1 - AT_LIMIT
+        residual, share = self.Y + self.W @ D, 1 - AT_LIMIT
         left = self.w * np.abs(residual)
-        objective = float(np.linalg.norm(left))
-        if self.method == "minmax":
-            objective = float(left.max())
-            limit = np.minimum(limit, objective / np.maximum(self.w, TINY))
-        active = np.abs(D) >= share * self.bounds.max_weight, np.abs(residual) >= share * limit
-        return Solution(D, residual, self.method, objective, *active, resolve, **more)
+        objective = float(left.max() if self.method == "minmax" else np.linalg.norm(left))
+        heavy = np.abs(D) >= share * self.bounds.max_weight
+        high = np.abs(residual) >= share * self.bounds.residual
+        return Solution(D, residual, objective, heavy, high, resolve, **more)
 
 
 Solver = Callable[[Job, FloatArray, ComplexArray], Solution]
@@ -168,9 +161,7 @@ def solve(  # noqa: PLR0913
     channels: FloatArray | None = None,
     columns: ComplexArray | None = None,
     names: Sequence[str] | None = None,
-    readings: Sequence[str] | None = None,
-    amplitude: Words = PLAIN,
-    weight: Words = PLAIN,
+    conflict: Callable[[Bounds], str] = explain,
     explained: Explained | None = None,
 ) -> Solution:
     """Weights D that make Y + W D small, within limits, and how to solve the same problem for redrawn data.
@@ -195,10 +186,10 @@ def solve(  # noqa: PLR0913
     columns
         What of it the readings have in common, as `balancing.Influence.columns`, (M, …, P + 1). The weighted
         fit weighs readings by the rest, and its χ² allows for them.
-    names, readings
-        Of planes (P) and readings (N), for messages; default "1", "2", … and "reading 1", ….
-    amplitude, weight
-        Write an amplitude or a weight with its unit, for messages; default plain numbers.
+    names
+        Of the planes (P), for messages; default "1", "2", ….
+    conflict
+        Says which limits cannot be met together; default with plain numbers.
     explained
         Of the weighted fit: whether errors alone may leave what weights (P,) leave; default: by χ² at typical
         sizes of the errors.
@@ -227,10 +218,9 @@ def solve(  # noqa: PLR0913
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
     planes = names or [str(p + 1) for p in range(P)]
-    if len(planes) != P or (readings and len(readings) != N):
-        raise ValueError(f"{P} planes and {N} readings need as many names")
-    bounds = bounds_of(K, y, limits)
-    n = 2 * P + 2
+    if len(planes) != P:
+        raise ValueError(f"{P} planes need as many names")
+    bounds, n = bounds_of(K, y, limits), 2 * P + 2
     channels = np.zeros((N, n, n)) if channels is None else channels.reshape(N, n, n)
     columns = np.zeros((0, N, P + 1), complex) if columns is None else columns.reshape(-1, N, P + 1)
     job = Job(method, K, y, w, bounds, planes, explained)
@@ -251,8 +241,7 @@ def solve(  # noqa: PLR0913
         part = Job(method, K[:, used], y, w, bounds.part(used), planes, asked)
         fitted = function(part, channels[:, index[:, None], index], columns[..., index[::2] // 2])
     except InfeasibleError:
-        labels = readings or [f"reading {n + 1}" for n in range(N)]
-        raise InfeasibleError(explain(bounds, job.planes, labels, amplitude, weight)) from None
+        raise InfeasibleError(conflict(bounds)) from None
     return replace(
         fitted,
         weights=fitted.weights @ whole,
@@ -271,11 +260,11 @@ def _closed_form(job: Job) -> ComplexArray:
 
 
 def _fit_plain(job: Job, *_: Any) -> Solution:  # noqa: ANN401
-    D, minmax, first = _closed_form(job), job.method == "minmax", None
+    best, minmax = _closed_form(job), job.method == "minmax"
 
     def again(bounds: Bounds, target: ComplexArray, tolerance: float = DRAWN) -> Optimum:
         if minmax or not len(target):
-            return smallest_maximum(bounds, np.append(job.w, np.zeros(len(target))), first, tolerance)
+            return smallest_maximum(bounds, job.w, tolerance)
         root = stretch(np.linalg.qr(job.w[:, None] * bounds.W)[1])
         left = float(np.linalg.norm(job.w * (bounds.Y + bounds.W @ target)))
         return nearest(bounds, target, root, left, tolerance)
@@ -283,13 +272,10 @@ def _fit_plain(job: Job, *_: Any) -> Solution:  # noqa: ANN401
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
         return _within_limits(job.bounds, W, Y, _normal(W, Y, job.w), again, always=minmax)
 
-    if not minmax and within(job.bounds, D):
-        return job.fitted(D, resolve)
-    optimum = again(job.bounds, D, TOLERANCE)
-    fitted = job.fitted(optimum.weights, resolve, gap=optimum.gap)
-    high = job.w * np.abs(fitted.residual) >= 0.8 * fitted.objective
-    first = np.append(high, fitted.active_weights)  # where redrawn data start from
-    return fitted
+    if not minmax and within(job.bounds, best):
+        return job.fitted(best, resolve)
+    optimum = again(job.bounds, best, TOLERANCE)
+    return job.fitted(optimum.weights, resolve, gap=optimum.gap)
 
 
 def _normal(W: ComplexArray, Y: ComplexArray, w: FloatArray, strength: float = 0.0) -> ComplexArray:

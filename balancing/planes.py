@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,25 +19,18 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import UndeterminedError, check_stack
 from balancing.conventions import Labels
 from balancing.influence import Influence, match_speeds
-from balancing.methods import solve
 from balancing.tables import rms, three_figures, weight_rows
 from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.result import Column, rows, text
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 from rotorid.regression import RCOND, gain
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-Criterion = Literal["rms", "max"]
-
 MOST = 20_000
 """More choices of planes than this are not tried."""
-_BATCH = 1000
 _NAMED = 3
 
 
@@ -72,12 +65,9 @@ class Subsets(Answered):
     expected
         Root mean square in a check run, (M,): with the errors of coefficients and of the vibration before.
     objective
-        What they are ranked by: rms or largest of the readings times their row weights, and their errors (in
-        quadrature), shape (M,).
+        What they are ranked by: rms of the readings times their row weights, and of their errors, shape (M,).
     condition_number
         Of each choice, shape (M,).
-    criterion
-        "rms": least squares; "max": the largest reading made as small as it can be.
     rms_before, largest_before
         Of the readings without weights.
     choices
@@ -97,7 +87,6 @@ class Subsets(Answered):
     expected: FloatArray
     objective: FloatArray
     condition_number: FloatArray
-    criterion: Criterion
     rms_before: float
     largest_before: float
     choices: int
@@ -111,7 +100,7 @@ class Subsets(Answered):
         weights = [weight_rows(self.labels, *pair) for pair in zip(self.planes, self.weights, strict=True)]
         return plain(
             {
-                "criterion": self.criterion,
+                "criterion": "rms",
                 "conventions": self.labels.conventions(),
                 "rms_before": self.rms_before * scale,
                 "max_before": self.largest_before * scale,
@@ -121,22 +110,15 @@ class Subsets(Answered):
             }
         )
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per choice: planes ("A, C"), rms_after, rms_expected, max_after, largest_weight, …"""
-        return frame((Column("planes", list(map(", ".join, self.planes))), *self._columns()[1:]))
-
     @property
     def answer(self) -> Answer:
         """The best choices in words; then their table."""
-        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        by = f"{self._criterion_words} after correction{f' ({unit})' if unit else ''}"
+        scale, of = self.labels.vibration_scale, "weighted " if self.weighted else ""
+        unit = f" ({self.labels.vibration_in})" if self.labels.vibration_in else ""
         choices = f"{counted(self.choices, 'choice')} of {counted(self.weights.shape[1], 'plane')}"
-        head = f"The best of {choices}, by {by}"
-        size = self.largest if self.criterion == "max" else self.rms
-        each = [
-            f"{', '.join(planes)}: {three_figures(value * scale)}"
-            for planes, value in zip(self.planes[:_NAMED], size, strict=False)
-        ]
+        head = f"The best of {choices}, by {of}rms after correction{unit}"
+        best = list(zip(self.planes, self.rms, strict=True))[:_NAMED]
+        each = [f"{', '.join(planes)}: {three_figures(size * scale)}" for planes, size in best]
         before = three_figures(self.rms_before * scale), three_figures(self.largest_before * scale)
         lines = [head, text(self._columns()), f"Before: rms {before[0]}, largest {before[1]}."]
         if self.dependent:
@@ -158,25 +140,19 @@ class Subsets(Answered):
             Column("condition_number", self.condition_number, three_figures, "condition"),
         )
 
-    @property
-    def _criterion_words(self) -> str:
-        word = "weighted " if self.weighted else ""
-        return f"{word}rms" if self.criterion == "rms" else f"largest {word}amplitude"
 
-
-def best_subsets(  # noqa: PLR0913
+def best_subsets(
     W: ArrayLike,
     Y: ArrayLike,
     planes: Sequence[str],
     k: int,
     *,
-    criterion: Criterion = "rms",
     row_weights: ArrayLike | None = None,
     covariance: FloatArray | None = None,
     show: int = 10,
     labels: Labels | None = None,
 ) -> Subsets:
-    """Compare all choices of k planes, each with its own best weights.
+    """Compare all choices of k planes, each with its own weights by least squares.
 
     Parameters
     ----------
@@ -186,9 +162,6 @@ def best_subsets(  # noqa: PLR0913
         Names, P.
     k
         How many to use, 1 … P, at most N.
-    criterion
-        "rms": least squares; "max": the smallest largest amplitude (a cone program for every choice that can
-        still be among the best).
     row_weights
         How much each reading counts, (N,), ≥ 0; default all alike.
     covariance
@@ -202,62 +175,62 @@ def best_subsets(  # noqa: PLR0913
     Raises
     ------
     ValueError
-        For k out of range, more than `MOST` choices, an unknown criterion, NaN, shapes that do not fit.
+        For k out of range, more than `MOST` choices, NaN, shapes that do not fit.
     UndeterminedError
         If the planes of every choice act alike.
 
     Notes
     -----
-    With the QR factorisation of diag(w) W the residual of every choice follows from P rows instead of N. The
-    largest amplitude a choice can reach is at least its least rms: choices are looked at in this order, until
-    no further one can be among the best `show`. So the ranking is exact for both criteria.
+    With the QR factorisation of diag(w) (W Y) the residual of every choice follows from P + 1 rows.
     """
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
-    _check(planes, P, int(np.count_nonzero(w)), k, criterion, show)
-    chosen = np.array(list(combinations(range(P), k)), dtype=np.int64)
-    Q, R = np.linalg.qr(w[:, None] * K)
-    right = Q.conj().T @ (w * y)
-    D, misfit, condition = _least_squares(R, right, chosen)
-    solid = np.isfinite(condition)
+    if len(planes) != P or len(set(planes)) != P:
+        raise ValueError(f"{P} different names of planes are needed; got {list(planes)}")
+    if not 1 <= k <= P:
+        raise ValueError(f"choose between 1 and {P} planes; got {k}")
+    if k > np.count_nonzero(w):
+        raise ValueError(
+            f"{k} planes need at least {k} readings (sensors × speeds); there are {np.count_nonzero(w)}"
+        )
+    if comb(P, k) > MOST:
+        raise ValueError(
+            f"there are {comb(P, k)} choices of {k} out of {P} planes, more than the {MOST} that are tried: "
+            "leave planes out first, or choose fewer (or nearly all) of them"
+        )
+    chosen = np.array(list(combinations(range(P), k)))
+    R = np.asarray(np.linalg.qr(w[:, None] * np.column_stack((K, y)), mode="r"))
+    right, columns = R[:, P], np.moveaxis(R[:, chosen], 1, 0)
+    lengths = np.linalg.norm(columns, axis=1, keepdims=True)
+    s = np.linalg.svd(columns / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
+    solid = s[:, -1] > RCOND * s[:, 0]
     if not solid.any():
         raise UndeterminedError(
             f"the planes of every choice of {k} act alike: choose fewer, or add readings or speeds"
         )
+    chosen, columns, s = chosen[solid], columns[solid], s[solid]
+    D = -gain(columns) @ right
     F, unweighted = (
         np.zeros((P + 1, P + 1), dtype=complex) if covariance is None else error_form(covariance, each) / N
         for each in (w, np.ones(N))
     )
-    least = (misfit + np.linalg.norm(w * y - Q @ right) ** 2) / N
-    rank = least if criterion == "max" else least + error_square(F, chosen, D)
-    order = np.flatnonzero(solid)[np.argsort(rank[solid], kind="stable")]
-    if criterion == "max":
-        best: list[tuple[float, int]] = []
-        for m in order:
-            if len(best) == show and np.sqrt(least[m]) >= best[-1][0]:
-                break
-            D[m] = solve(K[:, chosen[m]], y, "minmax", row_weights=w).weights
-            largest = np.abs(w * (y + K[:, chosen[m]] @ D[m])).max()
-            errors = error_square(F, chosen[[m]], D[[m]])[0]
-            best = sorted([*best, (float(np.hypot(largest, np.sqrt(errors))), int(m))])[:show]
-        order = np.array([m for _, m in best], dtype=np.int64)
-    order = order[:show]
-    after = y + np.einsum("nmk,mk->mn", K[:, chosen[order]], D[order])
-    size = np.abs(after * w)
-    size = size.max(axis=1) if criterion == "max" else np.sqrt(np.mean(size**2, axis=1))
+    left = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D), axis=1) ** 2 / N
+    rank = left + error_square(F, chosen, D)
+    order = np.argsort(rank, kind="stable")[:show]
+    chosen, D = chosen[order], D[order]
+    after = y + np.einsum("nmk,mk->mn", K[:, chosen], D)
     square = np.mean(np.abs(after) ** 2, axis=1)
     return Subsets(
-        planes=tuple(tuple(planes[p] for p in chosen[m]) for m in order),
-        weights=D[order],
+        planes=tuple(tuple(planes[p] for p in each) for each in chosen),
+        weights=D,
         rms=np.sqrt(square),
         largest=np.abs(after).max(axis=1),
-        expected=np.sqrt(square + error_square(unweighted, chosen[order], D[order])),
-        objective=np.sqrt(size**2 + error_square(F, chosen[order], D[order])),
-        condition_number=condition[order],
-        criterion=criterion,
+        expected=np.sqrt(square + error_square(unweighted, chosen, D)),
+        objective=np.sqrt(rank[order]),
+        condition_number=s[order, 0] / s[order, -1],
         rms_before=rms(y),
         largest_before=float(np.abs(y).max()),
-        choices=int(np.count_nonzero(solid)),
+        choices=len(rank),
         dependent=int(np.count_nonzero(~solid)),
         labels=labels or Labels(),
         weighted=bool(np.ptp(w) > 0),
@@ -271,7 +244,6 @@ def compare_planes(
     k: int,
     *,
     speeds: ArrayLike | None = None,
-    criterion: Criterion = "rms",
     row_weights: FloatArray | None = None,
 ) -> Subsets:
     """Compare all choices of k of these planes, without limits.
@@ -280,7 +252,7 @@ def compare_planes(
     ----------
     influence, baseline, speeds, row_weights
         As `balancing.correct` takes them.
-    planes, k, criterion
+    planes, k
         As `best_subsets` does.
     """
     today = influence if baseline is None else influence.rebased(baseline)
@@ -292,48 +264,10 @@ def compare_planes(
         part.baseline.ravel(),
         part.planes,
         k,
-        criterion=criterion,
         row_weights=rows_of(row_weights, today.baseline.shape, used),
         covariance=part.channels().reshape(N, 2 * P + 2, 2 * P + 2) if part.known_errors else None,
         labels=today.labels,
     )
-
-
-def _check(planes: Sequence[str], P: int, N: int, k: int, criterion: str, show: int) -> None:
-    if len(planes) != P or len(set(planes)) != P:
-        raise ValueError(f"{P} different names of planes are needed; got {list(planes)}")
-    if criterion not in ("rms", "max"):
-        raise ValueError(f"planes are chosen by 'rms' or by 'max', not by {criterion!r}")
-    if not 1 <= k <= P:
-        raise ValueError(f"choose between 1 and {P} planes; got {k}")
-    if k > N:
-        raise ValueError(
-            f"{k} planes need at least {k} readings (sensors × speeds); there are {N}: choose fewer planes"
-        )
-    if show < 1:
-        raise ValueError(f"show at least one choice; got {show}")
-    if comb(P, k) > MOST:
-        raise ValueError(
-            f"there are {comb(P, k)} choices of {k} out of {P} planes, more than the {MOST} that are tried: "
-            "leave planes out first, or choose fewer (or nearly all) of them"
-        )
-
-
-def _least_squares(
-    R: ComplexArray, right: ComplexArray, chosen: IntArray
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Weights (M, k), squared residual (M,) and condition number (M,; infinite: dependent planes)."""
-    D, misfit, condition = np.zeros(chosen.shape, dtype=complex), *np.full((2, len(chosen)), np.inf)
-    for part in np.array_split(np.arange(len(chosen)), -(-len(chosen) // _BATCH)):
-        columns = np.moveaxis(R[:, chosen[part]], 1, 0)
-        lengths = np.linalg.norm(columns, axis=1, keepdims=True)
-        s = np.linalg.svd(columns / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
-        solid = s[:, -1] > RCOND * s[:, 0]
-        columns, part = columns[solid], part[solid]
-        D[part] = -gain(columns) @ right
-        misfit[part] = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D[part]), axis=1) ** 2
-        condition[part] = s[solid, 0] / s[solid, -1]
-    return D, misfit, condition
 
 
 def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
@@ -347,7 +281,7 @@ def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) ->
     if given is None:
         return None
     weights = np.asarray(given, dtype=np.float64)
-    if weights.shape != shape or not (np.isfinite(weights) & (weights >= 0)).all():
+    if weights.shape != shape or not (weights >= 0).all():
         raise ValueError(
             f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
         )
@@ -367,14 +301,12 @@ def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[in
     """
     if planes is None:
         return list(range(len(influence.planes)))
-    if isinstance(planes, str):
-        planes = [planes]
-    unknown = [p for p in planes if p not in influence.planes]
-    if unknown:
-        asked = ", ".join(f"{name!r}{did_you_mean(str(name), influence.planes)}" for name in unknown)
-        raise ValueError(
-            f"there is no plane {asked}; the planes are {', '.join(map(repr, influence.planes))}"
-        )
+    for name in planes:
+        if name not in influence.planes:
+            raise ValueError(
+                f"there is no plane {name!r}{did_you_mean(str(name), influence.planes)}; "
+                f"the planes are {', '.join(map(repr, influence.planes))}"
+            )
     if not planes or len(set(planes)) < len(planes):
         raise ValueError("choose at least one plane, each once")
     return [influence.planes.index(p) for p in planes]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from warnings import catch_warnings
 
 from rotorid.base.text import listing
@@ -115,13 +115,11 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
     if planes is None:
         planes = names(options.planes) or used_planes(job, known[0])
         if options.best_planes is not None:
-            criterion: Any = "max" if options.method == "minmax" else "rms"
             subsets = compare_planes(
                 *known,
                 planes,
                 options.best_planes,
                 speeds=_speeds(job, options),
-                criterion=criterion,
                 row_weights=job.row_weights,
             )
             planes = subsets.planes[0]

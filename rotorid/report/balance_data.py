@@ -48,9 +48,9 @@ def sheet_data(
 
 
 def _machine(c: Correction, job: Job) -> dict[str, Any]:
-    labels = c.labels
+    labels, limits = c.labels, c.limits_document() or {"max_weight": {}, "forbidden_deg": {}}
     planes = []
-    for p, plane in enumerate(c.planes):
+    for plane in c.planes:
         holes = job.holes.get(plane)
         planes.append(
             {
@@ -58,7 +58,8 @@ def _machine(c: Correction, job: Job) -> dict[str, Any]:
                 "action": "remove" if plane in c.remove else "add",
                 "radius_mm": _millimetres(job.radii.get(plane)),
                 "trial_radius_mm": _millimetres(job.trial_radii.get(plane)),
-                **c.plane_limits(p),
+                "max_weight": limits["max_weight"].get(plane),
+                "forbidden_deg": limits["forbidden_deg"].get(plane, []),
                 "holes": None if holes is None else len(holes.angles),
                 "node": job.plane_nodes.get(plane),
             }

@@ -23,7 +23,7 @@ def test_singular_values_of_scaled_columns(near):
     assert np.allclose(numbers.singular_values, s, atol=1e-12)
     assert numbers.rank == (3 if near else 2)
     assert near == 0 or numbers.condition_number == pytest.approx(s[0] / s[-1])
-    assert ("leave out" in numbers.sentence()) == (near < 1)
+    assert ("leave one out" in numbers.sentence()) == (near < 1)
 
 
 def test_planes_that_are_alike_are_mostly_told_within_their_errors():

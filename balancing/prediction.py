@@ -1,0 +1,271 @@
+"""Correction weights and the vibration they should leave, with their errors: numbers alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import compress
+from typing import Any
+
+import numpy as np
+
+from balancing.conditioning import Conditioning
+from balancing.conventions import Labels
+from balancing.influence import Influence, Mounted
+from balancing.methods import Solution, method_words
+from balancing.regions import Region, half_width, reach
+from balancing.tables import (
+    INVISIBLE,
+    degrees,
+    reading_columns,
+    reading_names,
+    three_figures,
+    vector_columns,
+    weight_columns,
+)
+from balancing.trials import Limits
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, rows
+from rotorid.base.text import figures
+
+HELD = 1e-5
+"""Relative scatter of a weight below which a limit holds it."""
+HARDLY_APART = 10.0
+"""Above this condition number two planes do the same but for a fifth of their effect."""
+STATIC = 0.2
+"""Difference of the effects of two planes, relative, below which their sum is called the static part."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Weights to mount, and the vibration they should leave. Its fields: `balancing.Correction`."""
+
+    influence: Influence
+    weights: ComplexArray
+    draws: ComplexArray
+    after_covariance: FloatArray
+    check_rms: float
+    mounted: Mounted
+    conditioning: Conditioning
+    fitted: Solution
+    method: str
+    row_weights: FloatArray | None = None
+    limits: Limits | None = None
+    remove: tuple[str, ...] = ()
+
+    @property
+    def speeds(self) -> FloatArray:
+        """rad/s, (S,)."""
+        return self.influence.speeds
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names, C."""
+        return self.influence.sensors
+
+    @property
+    def planes(self) -> tuple[str, ...]:
+        """Names, P."""
+        return self.influence.planes
+
+    @property
+    def labels(self) -> Labels:
+        """Units and conventions to print in."""
+        return self.influence.labels
+
+    @property
+    def before(self) -> ComplexArray:
+        """Vibration of the bare rotor, (S, C)."""
+        return self.influence.baseline
+
+    @property
+    def after(self) -> ComplexArray:
+        """Its prediction with the corrections mounted, (S, C)."""
+        return np.asarray(self.before + self.influence.W @ self.weights)
+
+    @property
+    def errors_known(self) -> bool:
+        """Whether it is known how far a check run may be from its prediction."""
+        return bool(np.isfinite(self.check_rms))
+
+    @property
+    def region_known(self) -> bool:
+        """Whether it is known how far the weights may be from the best ones; not for a biased ridge."""
+        return len(self.draws) > 2 * len(self.planes)
+
+    def region(self, planes: Sequence[int] | None = None) -> Region:
+        """Where the weights of these planes (by index; None: all) are jointly with 95 %."""
+        chosen = list(range(len(self.planes)) if planes is None else planes)
+        return Region.of(self.draws[:, chosen], self.weights[chosen])
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of (Re D₁, Im D₁, …), (2P, 2P); NaN where errors are unknown."""
+        return self.region().covariance
+
+    @cached_property
+    def _off(self) -> tuple[FloatArray, FloatArray]:
+        """How far draws (n, P) are off in size, along a weight within its own error, and in angle (rad)."""
+        size = np.abs(self.weights)
+        draws = self.draws if self.region_known else np.full((1, len(size)), np.nan)
+        along = draws / np.exp(1j * np.angle(self.weights))
+        sizes = np.where(self._clear, np.abs(draws), along.real) - size
+        return sizes, np.where(self._clear, np.angle(along), np.nan)
+
+    @cached_property
+    def _clear(self) -> BoolArray:
+        """Whether the 95 % region of each weight (P,) leaves zero out, so that its angle is determined."""
+        if not self.region_known:
+            return np.asarray(self.weights != 0)
+        return np.array([bool(w) and not self.region([p]).holds(0 * w) for p, w in enumerate(self.weights)])
+
+    @property
+    def mass_std(self) -> FloatArray:
+        """Standard deviation (P,) of the weights' sizes; NaN where errors are unknown."""
+        return np.asarray(self._off[0].std(axis=0))
+
+    @property
+    def angle_std(self) -> FloatArray:
+        """Standard deviation (P,) of the weights' angles, rad; NaN for one whose 95 % region holds zero."""
+        return np.asarray(self._off[1].std(axis=0))
+
+    def half_widths(self) -> tuple[FloatArray, FloatArray]:
+        """Half widths (P,) of 95 % intervals of the weights' sizes and angles (rad); NaN: not known."""
+        return half_width(self._off[0]), half_width(self._off[1])
+
+    @property
+    def combination(self) -> str:
+        """What is determined of two planes that are hardly told apart, and what is not; else empty.
+
+        The columns w of both planes, scaled to length 1, differ by little but a factor: w₂ ≈ ρ w₁. Then
+        D₁ + ρ D₂, the weight in the first plane that does the same, is determined, and
+        (D₁ − ρ D₂) / 2 is not. With ρ ≈ 1 they are the static part and the couple.
+        """
+        apart, labels = self.conditioning, self.labels
+        if len(self.planes) != 2 or not self.region_known or apart.condition_number <= HARDLY_APART:
+            return ""
+        v = apart.directions[:, 0].conj() * apart.lengths
+        ratio = v[1] / v[0]
+        static = bool(abs(ratio - 1) < STATIC)
+        ways = np.array([[1, 0.5], [1, -0.5]]) if static else np.array([[1, 0.5], [ratio, -0.5 * ratio]])
+        both, widths = self.weights @ ways, half_width((self.draws - self.weights) @ ways)
+        if abs(both[1]) > widths[1]:
+            return ""
+        size, angle = map(float, labels.weight(both[0]))
+        sure, open_ = (figures(width * labels.weight_scale, 2) for width in widths)
+        unit = labels.weight_in
+        shown = f"{three_figures(size)} ± {sure} {unit} at {degrees(angle)}"
+        if static:
+            return f"static part {shown}; couple not determined: ± {open_} {unit}"
+        first, second = map(repr, self.planes)
+        return (
+            f"planes {first} and {second} together do what {shown} would in {first} alone; "
+            f"how it is shared between them is not determined: ± {open_} {unit}"
+        )
+
+    @property
+    def to_add(self) -> ComplexArray:
+        """What to add to the weights mounted now, one per plane of `mounted`."""
+        total = dict(zip(self.planes, self.weights, strict=True))
+        planes = [total.get(plane, 0.0) for plane in self.mounted.planes]
+        return np.array(planes, dtype=complex) - self.mounted.weights
+
+    def places(self, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
+        """Where to work, degrees as the job counts them: opposite to a weight where material is removed."""
+        turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
+        return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
+
+    @property
+    def within(self) -> FloatArray:
+        """Radius (S, C) of the 95 % region of each reading in a check run, in the job's unit."""
+        if not self.errors_known:
+            return np.full(self.before.shape, np.nan)
+        return reach(self.after_covariance) * self.labels.vibration_scale
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Limits that bind, in words."""
+        limits, fitted = self.limits, self.fitted
+        if limits is None:
+            return ()
+        labels = self.labels
+        weights = zip(self.planes, map(labels.weight_words, limits.max_weight), strict=True)
+        names = reading_names(labels, self.sensors, self.speeds)
+        readings = zip(names, map(labels.amplitude_words, limits.residual.ravel()), strict=True)
+        at = np.exp(-1j * np.angle(self.weights))
+        ends = [
+            bool(D)
+            and any(np.abs(np.angle(u * np.exp([1j * a, 1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
+            for D, u, arcs in zip(self.weights, at, limits.forbidden, strict=True)
+        ]
+        heavy, high = compress(weights, fitted.active_weights), compress(readings, fitted.active_residuals)
+        return (
+            *(f"plane {name!r} has its largest weight, {most}" for name, most in heavy),
+            *(f"{name} has its largest amplitude, {most}" for name, most in high),
+            *(f"plane {name!r} stands at the end of a forbidden arc" for name in compress(self.planes, ends)),
+        )
+
+    @property
+    def held(self) -> BoolArray:
+        """Which weights (P,) limits hold, so that errors do not move their sizes."""
+        return np.asarray(self.half_widths()[0] < HELD * np.abs(self.weights))
+
+    @property
+    def method_in_words(self) -> str:
+        """What the method makes small, a sentence."""
+        return method_words(self.method, weighted=self.row_weights is not None)
+
+    def vibration_columns(
+        self, rounding: float = INVISIBLE, after: ComplexArray | None = None
+    ) -> tuple[Column, ...]:
+        """Speed, sensor, vibration before and after, one row a reading.
+
+        Parameters
+        ----------
+        rounding
+            Amplitudes after, up to this share of the largest one before, are nothing.
+        after
+            In place of the prediction, (S, C).
+        """
+        nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
+        return (
+            *reading_columns(self.labels, self.speeds, self.sensors),
+            *vector_columns(self.labels, "before", self.before),
+            *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
+        )
+
+    def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
+        """Weights of planes as JSON types, and where to take material away from some."""
+        columns = self.work_columns(planes, weights)
+        return rows(columns if self.remove else columns[:-2])
+
+    def limits_document(self) -> dict[str, Any] | None:
+        """Of weights and angles, where to work, and of readings in the order of `residuals`; None: no limits.
+
+        In the job's own units; an infinite limit is None.
+        """
+        if self.limits is None:
+            return None
+        arcs = {
+            plane: [self.labels.arc(*arc, opposite=plane in self.remove) for arc in forbidden]
+            for plane, forbidden in zip(self.planes, self.limits.forbidden, strict=True)
+        }
+        most = self.limits.max_weight * self.labels.weight_scale
+        return plain(
+            {
+                "max_weight": dict(zip(self.planes, most.tolist(), strict=True)),
+                "amplitude": self.limits.residual.ravel() * self.labels.vibration_scale,
+                "forbidden_deg": {plane: each for plane, each in arcs.items() if each},
+            }
+        )
+
+    def work_columns(self, planes: Sequence[str], weights: ComplexArray) -> tuple[Column, ...]:
+        """Weights of planes, and where to take material away from some."""
+        gone = [plane in self.remove for plane in planes]
+        return (
+            *weight_columns(self.labels, planes, weights),
+            Column("action", ["remove" if away else "add" for away in gone]),
+            Column("remove_at_deg", np.where(gone, self.places(planes, weights), np.nan)),
+        )
