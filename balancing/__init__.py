@@ -16,15 +16,14 @@ from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.holes import Holes, equal_holes, from_list
-from balancing.influence import Influence, change_of_run, estimate_influence
+from balancing.influence import Influence, change_of_run, estimate_influence, match_speeds
 from balancing.iso21940 import Tolerance, tolerance
-from balancing.machine_type import MachineRecord, MachineType, fit_type
 from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian, white_rows
 from balancing.pieces import Discrete, solve_discrete
 from balancing.planes import Subsets, best_subsets, compare_planes
-from balancing.regions import Region
+from balancing.regions import Region, region_edge
 from balancing.trial_weight import (
     Lag,
     TrialWeight,
@@ -54,8 +53,6 @@ __all__ = [
     "Lag",
     "LeftToDo",
     "Limits",
-    "MachineRecord",
-    "MachineType",
     "Mounted",
     "Placement",
     "Reading",
@@ -86,14 +83,15 @@ __all__ = [
     "estimate_influence",
     "estimate_unbalance",
     "expected_lag",
-    "fit_type",
     "from_list",
+    "match_speeds",
     "model_influence",
     "mount",
     "mounted_in",
     "plane_load",
     "reading_of",
     "refine",
+    "region_edge",
     "solve",
     "solve_discrete",
     "tolerance",

@@ -19,8 +19,8 @@ import balancing
 import fem
 from rotorid import read_job, read_rotor
 from rotorid.calibration import CalibratedRotor
-from rotorid.commands.coefficients import choose
 from rotorid.commands.calibrate import CalibrateOptions, calibrate
+from rotorid.commands.coefficients import choose
 
 sys.path.insert(0, str(Path(__file__).parent))
 from rk4 import BARE, FEW, FOLDER, estimated, lines, of

@@ -19,11 +19,11 @@ from balancing import (
     UndeterminedError,
     correct,
     estimate_influence,
-    fit_type,
     update,
 )
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
+from rotorid.fleet import fit_type
 from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import experiments
 from rotorid.regression import stretch

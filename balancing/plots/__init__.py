@@ -3,7 +3,6 @@
 from balancing.plots.along_shaft import draw_tolerance, draw_unbalance, draw_verdict
 from balancing.plots.correction import correction_figure, draw_correction, residual_figure
 from balancing.plots.discs import draw_disc, mounted_discs, weight_figure
-from balancing.plots.machine_types import type_figure
 from balancing.plots.polar import draw_readings, draw_trial_weight, trial_figure
 
 __all__ = [
@@ -18,6 +17,5 @@ __all__ = [
     "mounted_discs",
     "residual_figure",
     "trial_figure",
-    "type_figure",
     "weight_figure",
 ]

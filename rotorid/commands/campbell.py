@@ -14,7 +14,6 @@ from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, percent
 from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.operating_range import Separation, unsearched
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
 
@@ -83,6 +82,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     from fem.parameters import band as error_band
     from fem.parameters import nearest_modes
     from fem.plots import campbell_figure
+    from rotorid.commands.operating_range import Separation, unsearched
 
     operating = band(options.operating)
     added = options.cross_coupling

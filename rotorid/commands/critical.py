@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.text import listing
 from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.operating_range import Separation, unsearched
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, band
 
@@ -69,6 +68,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     import fem
     from fem import critical_speeds_near
     from fem.parameters import band as error_band
+    from rotorid.commands.operating_range import Separation, unsearched
 
     options = options or CriticalOptions()
     operating = band(options.operating)

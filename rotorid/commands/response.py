@@ -14,7 +14,6 @@ from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, figures, listing
 from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.operating_range import critical_peaks, open_question
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import (
     Band,
@@ -262,6 +261,8 @@ class Vibration:
         first = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
         low, high = self.operating or (0.0, 0.0)
         speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
+        from rotorid.commands.operating_range import open_question
+
         question = open_question(chief, speeds[0], speeds[-1], (low, high)) if self.operating else ""
         if self.operating is None or not (chief or question):
             asked = (
@@ -418,6 +419,7 @@ def response(
     import fem
     from fem import as_sensor
     from fem.parameters import band as error_band
+    from rotorid.commands.operating_range import critical_peaks
     from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 

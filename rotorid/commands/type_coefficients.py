@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Influence, MachineRecord, Trials, update, with_check_runs
+from balancing import Influence, Trials, update, with_check_runs
 from rotorid.base.text import counted
 from rotorid.commands.outcome import hash_of
 from rotorid.commands.type_records import Grid, KnownType, known_type
+from rotorid.fleet import MachineRecord
 
 if TYPE_CHECKING:
-    from balancing import Correction, MachineType
+    from balancing import Correction
+    from rotorid.fleet import MachineType
     from rotorid.tables import Job
     from rotorid.tables.fleet.fleet_store import FleetStore
 

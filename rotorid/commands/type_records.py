@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from balancing import Labels, MachineRecord, MachineType, UndeterminedError, fit_type
+from balancing import Labels, UndeterminedError
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing
+from rotorid.fleet import MachineRecord, MachineType, fit_type
 from rotorid.tables.reader.units import vibration, weight
 from rotorid.tables.runs.stated_conventions import DEFAULT_TOLERANCE
 

@@ -20,9 +20,9 @@ from balancing.plots import (
     draw_readings,
     mounted_discs,
     trial_figure,
-    type_figure,
 )
 from balancing.plots.correction import weights
+from rotorid.fleet.plots import type_figure
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 AGAINST = replace(GRAMS, angles="against rotation")

@@ -19,17 +19,15 @@ from numpy.typing import NDArray
 from balancing import (
     Correction,
     Labels,
-    MachineRecord,
-    MachineType,
     ReadingErrors,
     Trials,
     UndeterminedError,
     correct,
-    fit_type,
     update,
 )
 from balancing.regions import NORMAL_RADIUS
 from rotorid.commands.type_coefficients import LEVEL
+from rotorid.fleet import MachineRecord, MachineType, fit_type
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]

@@ -3,7 +3,7 @@
 import coverage_fleet as example
 import numpy as np
 
-from balancing import fit_type
+from rotorid.fleet import fit_type
 
 
 def lower(share, n, deviations=3.0):

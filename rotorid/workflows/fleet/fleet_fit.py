@@ -115,7 +115,7 @@ class TypeFound(Delivered):
 
     def figure(self) -> Figure:
         """Coefficients of all machines over their mean, each plane and sensor for itself."""
-        from balancing.plots import type_figure
+        from rotorid.fleet.plots import type_figure
 
         return type_figure(self.known.kind)
 

@@ -7,13 +7,12 @@ import pytest
 
 from balancing import (
     Labels,
-    MachineRecord,
     ReadingErrors,
     Trials,
     UndeterminedError,
     estimate_influence,
-    fit_type,
 )
+from rotorid.fleet import MachineRecord, fit_type
 
 
 def drawn_type(seed=1, machines=30, S=1, C=2, P=2, noise=0.02):

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.regions import region_edge
+from balancing import region_edge
 from rotorid.base.plot_style import legend_below, look, new_figure, note, plain
 from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing.machine_type import MachineType
+    from rotorid.fleet.machine_type import MachineType
 
 _MOST = 4
 """Sensors and planes that are shown."""

@@ -21,11 +21,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.computed import with_parameters
-from balancing.conditioning import UndeterminedError
-from balancing.conventions import Labels
-from balancing.influence import Gaussian, Influence, estimate_influence, match_speeds
-from balancing.trials import Trials
+from balancing import (
+    Gaussian,
+    Influence,
+    Labels,
+    Trials,
+    UndeterminedError,
+    estimate_influence,
+    match_speeds,
+    with_parameters,
+)
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, listing
 from rotorid.regression import covariance_root, stretch, unstretch
