@@ -122,8 +122,8 @@ GALLERY = (
     Picture(
         "drill",
         "balancing",
-        "split 35g@120 --drill 8mm --depth 20mm --radius 100mm",
-        "Drill five holes of 8 mm, 19.2 mm deep, opposite the 35 g that are missing at 120°.",
+        "split 3g@120 --drill 8mm --radius 100mm",
+        "Drill a hole of 8 mm, 9.5 mm deep, opposite the 3 g that are missing at 120°.",
     ),
     Picture(
         "unbalance",

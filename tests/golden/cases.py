@@ -207,8 +207,7 @@ split-free                  split 35g@120 --holes 12 --first-hole 10 --step 0.5g
 split-two                   split 35g@120 --two 20g,30g
 split-sum                   split 35g@120+5g@200 --mounted 10g@30+20g@200 --holes 24
 split-scale                 split 35g@121.3 --step 0.5g --angle-step 15
-split-drill                 split 35g@120 --drill 8mm --depth 20mm --radius 100mm
-split-drill-axial           split 35g@120 --drill 8mm --depth 10mm --radius 100mm --axial --density 7800 --tip-angle 180
+split-drill                 split 3g@120 --drill 8mm --radius 100mm
 split-grind                 split 3500g_mm@120 --grind --radius 100mm
 split-wrong                 split 35g120 --holes 24
 tolerance                   tolerance --mass 500kg --speed 3000rpm --grade G2.5
