@@ -128,7 +128,7 @@ GALLERY = (
     Picture(
         "unbalance",
         "balancing",
-        f"unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2",
+        f"unbalance {MODEL_JOB} --stations 6,12,19",
         "Where the unbalance sits, how large and in which direction; the closed line at the tip of "
         "each is the region where it lies with 95 %.",
     ),

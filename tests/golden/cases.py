@@ -196,7 +196,7 @@ balance-no-plane            balance {TURBO}/job.toml --planes left,midle
 balance-ending              balance {TURBO}/job.toml --output corrections.txt
 balance-undetermined        balance {TURBO}/runs.csv alike.csv --amplitude-error 2 --phase-error 2
 unbalance-model-job         unbalance {MODEL_JOB} --stations 6,9,12,15,18
-unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2 --output u.csv --plot u.png --verbose
+unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --output u.csv --plot u.png --verbose
 unbalance-ridge             unbalance {MODEL_JOB} --stations 6,9,12,15,18 --method ridge
 unbalance-ridge-stated      unbalance {MODEL_JOB} --stations 6,12,18 --method ridge --ridge 0.1
 unbalance-no-rotor          unbalance {TURBO}/job.toml --stations 6,12
