@@ -106,7 +106,7 @@ def test_covariance_is_that_of_drawn_readings():
     W, U = complex_normal(rng, (8, 3)), np.array([1.0, 2j, -1.5])
     Y = W @ U
     covariance = reading_covariance(Y, ReadingErrors(0.01, 0.04))
-    errors = drawn(covariance)
+    errors = drawn(covariance, 4000)
     found = estimate_unbalance(W, Y, errors=errors)
     root = np.linalg.cholesky(covariance)
     again = []
