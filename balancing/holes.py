@@ -211,6 +211,13 @@ def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike |
     return Mounting(number, weight, complex(weight @ np.exp(1j * holes.angles)))
 
 
+def content(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
+    """What goes into a hole, in units of 1 / scale: "2 × 150 + 50", or a free amount."""
+    each = zip(mounting.counts[h], holes.pieces * scale, strict=False)
+    parts = [f"{n} × {size:.6g}" if n > 1 else f"{size:.6g}" for n, size in each if n]
+    return " + ".join(parts) or f"{mounting.amounts[h] * scale:.6g}"
+
+
 def lightest(holes: Holes, usable: BoolArray, z: complex, most: float) -> FloatArray:
     """Amounts (H,) of least sum, up to `most` in each usable hole, that come nearest to z."""
     from scipy.optimize import lsq_linear

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from balancing.conventions import Labels
-from balancing.holes import Holes, Mounting, equal_together, lightest
+from balancing.holes import Holes, Mounting, content, equal_together, lightest
 from balancing.pieces import FEW, HEAVIER, NOTHING, SPARE, PlaneVectors
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, percent
@@ -85,13 +85,10 @@ class Split:
     def in_holes(self, labels: Labels) -> list[str]:
         """Equal contents together, such as "10 g in holes 7 (120°), 9 (150°)"."""
         contents = []
-        for row in self._entries(labels)["holes"]:
-            each = [
-                (f"{one['count']} × " if one["count"] > 1 else "") + f"{one['mass']:.6g}"
-                for one in row["pieces"]
-            ]
-            what = f"{' + '.join(each) or format(row['mass'], '.6g')} {labels.weight_in}"
-            contents.append((what, f"{row['hole']} ({round(row['angle_deg'], 2) % 360:g}°)"))
+        for h in np.flatnonzero(self.mounting.amounts).tolist():
+            what = content(self.holes, self.mounting, h, labels.weight_scale)
+            (angle,) = labels.directions(self.holes.angles[[h]])
+            contents.append((f"{what} {labels.weight_in}", f"{self.holes.names[h]} ({angle:.6g}°)"))
         return equal_together(contents)
 
     def _entries(self, labels: Labels) -> dict[str, Any]:

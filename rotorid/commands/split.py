@@ -367,6 +367,4 @@ def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:
     if isinstance(placed, Rounded):
         return weight_figure(labels, target, (placed.weight,) if placed.weight else ())
     assert isinstance(placed, Removal)
-    grams, hole = f"{1e3 * placed.mass:.4g} g", f"\n{1e3 * placed.depth:.2f} mm deep"
-    words = [grams + hole] if placed.diameter else []
-    return weight_figure(labels, target, (target,), remove=True, words=words)
+    return weight_figure(labels, target, (target,), remove=True)
