@@ -114,7 +114,9 @@ class PlaneVectors:
             self.most, self.parts = 2 * steps, _neighbours(holes.angles, where)
         else:
             self.sizes, capacity = holes.pieces, holes.per_hole * len(where)
-            self.most = capacity if most is None else min(most, capacity)
+            light = np.inf if np.isinf(heaviest) else max(2.0, heaviest // self.sizes.min())
+            there = np.inf if holes.stock is None else float(holes.stock.sum())
+            self.most = int(min(capacity, capacity if most is None else most, light, there))
             steps = min(holes.per_hole, self.most)
             # holes 60°, 120° and 180° apart add up or cancel: the list of a half with both is shorter
             turned = np.round(np.mod(holes.angles[where] + 1e-7, np.pi / 3), 5)
@@ -160,8 +162,9 @@ class PlaneVectors:
         scarce = used[:, self.stock < self.most]
         # a hash of whole numbers: different ones are the same with a chance of 1e-7 in a list
         mixed = np.column_stack((*place, scarce)) @ _MIX[: 2 + scarce.shape[1]]
-        order = np.lexsort((used @ self.sizes, used.sum(axis=1)))
-        return np.asarray(order[np.unique(mixed[order], return_index=True)[1]])
+        cost = used.sum(axis=1) + used @ (0.5 * self.sizes / self.reach)
+        order = np.lexsort((cost, mixed))
+        return np.asarray(order[np.diff(mixed[order], prepend=np.iinfo(np.int64).min) != 0])
 
     def near(self, z: complex, count: int, number: int | None = None) -> Vectors:
         """About `count` vectors near z, the nearest first, of so many pieces or (None) of any number."""
@@ -183,8 +186,9 @@ class PlaneVectors:
             asked, beyond = count, self.reach * np.sqrt(count / (tree.n * other.n)) / 8
             while True:
                 radius = min(max(short, 0.0) + beyond, everything)
-                if radius < everything and tree.count_neighbors(other, radius) < asked:
-                    beyond *= 1.4
+                near = int(tree.count_neighbors(other, radius))
+                if radius < everything and near < asked:
+                    beyond *= min(max(np.sqrt(asked / (near + 1)), 1.1), 4.0)
                     continue
                 met = tree.sparse_distance_matrix(other, radius, output_type="ndarray")
                 i, j = met["i"], met["j"]
@@ -390,9 +394,6 @@ def solve_discrete(
     last = next(k for k, one in enumerate(each) if one.objective <= FEW * each[-1].objective)
     chosen = last if first is None else first
     return replace(each[chosen], enough=first is not None, fewer=tuple(each[:chosen]))
-
-
-fewest = solve_discrete
 
 
 def _leaves(
