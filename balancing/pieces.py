@@ -58,7 +58,7 @@ class Vectors(NamedTuple):
     """Vectors that can be mounted (n,), the pieces of each (n,), and what stands in every hole (n, H, K)."""
 
     d: ComplexArray
-    number: IntArray
+    number: FloatArray
     put: IntArray
 
 
@@ -66,7 +66,7 @@ class _Half(NamedTuple):
     """Sums of some holes (n,), their pieces of each size (n, K), and the content of each hole (n, holes)."""
 
     sums: ComplexArray
-    used: IntArray
+    used: FloatArray
     picks: IntArray
 
 
@@ -144,25 +144,25 @@ class PlaneVectors:
                 kept = kept[(used[kept] <= share).all(axis=1)]
                 aim = abs(self.wanted) * n / len(where) / 2
                 lost = used @ self.sizes - along + np.abs(along - aim)
-                lost[used.sum(axis=1) <= 2] = -1.0
+                lost[_number(used) <= 2] = -1.0
                 kept = kept[np.argsort(lost[kept])[:_LONGEST]]
             picks = np.column_stack((half.picks[row[kept]], pick[kept]))
             half = _Half(sums[kept], used[kept], picks)
         return half
 
-    def _fits(self, used: IntArray) -> BoolArray:
+    def _fits(self, used: FloatArray) -> BoolArray:
         """Whether so many pieces are there, and are not too heavy."""
-        number = used.sum(axis=1)
+        number = _number(used)
         light = (number <= 2) | (used @ self.sizes <= self.heaviest * KEPT)
         return np.asarray(light & (number <= self.most) & (used <= self.stock).all(axis=1))
 
-    def _distinct(self, sums: ComplexArray, used: IntArray) -> IndexArray:
+    def _distinct(self, sums: ComplexArray, used: FloatArray) -> IndexArray:
         """Of equal sums (that use the same of a stock) those of the fewest pieces, then the lightest."""
-        place = [np.rint(part / (SAME * self.reach)).astype(np.int64) for part in (sums.real, sums.imag)]
-        scarce = used[:, self.stock < self.most]
+        scarce = used[:, self.stock < self.most].T
         # a hash of whole numbers: different ones are the same with a chance of 1e-7 in a list
-        mixed = np.column_stack((*place, scarce)) @ _MIX[: 2 + scarce.shape[1]]
-        cost = used.sum(axis=1) + used @ (0.5 * self.sizes / self.reach)
+        parts = (*(np.rint(part / (SAME * self.reach)) for part in (sums.real, sums.imag)), *scarce)
+        mixed = np.add.reduce([part.astype(np.int64) * mix for part, mix in zip(parts, _MIX, strict=False)])
+        cost = used @ (1 + 0.5 * self.sizes / self.reach)
         order = np.lexsort((cost, mixed))
         return np.asarray(order[np.diff(mixed[order], prepend=np.iinfo(np.int64).min) != 0])
 
@@ -174,11 +174,9 @@ class PlaneVectors:
         most, everything = self.most if number is None else number, 2 * (abs(z) + self.reach)
         apart = 0.0 if number is None else 2 * everything  # another number is far away
         for where, halves in zip(self.parts, self.halves, strict=True):
-            first, second = (
-                _Half(*(part[half.used.sum(axis=1) <= most] for part in half)) for half in halves
-            )
-            tree = cKDTree(_points(z - first.sums, (most - first.used.sum(axis=1)) * apart))
-            other = cKDTree(_points(second.sums, second.used.sum(axis=1) * apart))
+            first, second = (_few(half, most) for half in halves)
+            tree = cKDTree(_points(z - first.sums, (most - _number(first.used)) * apart))
+            other = cKDTree(_points(second.sums, _number(second.used) * apart))
             # along the wanted weight both halves make so much at most
             short = (self.toward * z).real - sum(
                 (half.sums * self.toward).real.max() for half in (first, second)
@@ -203,10 +201,10 @@ class PlaneVectors:
             put[:, where] = self.contents[np.column_stack((first.picks[i[kept]], second.picks[j[kept]]))]
             found.append((d[kept], used[kept], put))
         d, used, put = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        order = np.lexsort(
-            (used @ self.sizes, used.sum(axis=1), np.rint(np.abs(d - z) / (SAME * self.reach)))
-        )[:count]
-        return Vectors(d[order], used[order].sum(axis=1) * (not self.holes.free_amounts), put[order])
+        order = np.lexsort((used @ self.sizes, _number(used), np.rint(np.abs(d - z) / (SAME * self.reach))))[
+            :count
+        ]
+        return Vectors(d[order], _number(used[order]) * (not self.holes.free_amounts), put[order])
 
     def mount(self, put: IntArray) -> Mounting:
         """What goes where, (H, K) as `Vectors` have it."""
@@ -250,7 +248,17 @@ class PlaneVectors:
         return mounting(self.holes, amounts=lightest(self.holes, self.usable, z, np.inf))
 
 
-def _points(d: ComplexArray, height: FloatArray | IntArray) -> FloatArray:
+def _few(half: _Half, most: int) -> _Half:
+    """Of so many pieces at most."""
+    kept = _number(half.used) <= most
+    return _Half(half.sums[kept], half.used[kept], half.picks[kept])
+
+
+def _number(used: FloatArray) -> FloatArray:
+    return np.asarray(used @ np.ones(used.shape[1]))
+
+
+def _points(d: ComplexArray, height: FloatArray) -> FloatArray:
     return np.column_stack((d.real, d.imag, height))
 
 
@@ -262,12 +270,12 @@ def _neighbours(angles: FloatArray, where: IndexArray) -> list[IndexArray]:
     return [pair if 0 < angle <= WIDEST else pair[:1] for pair, angle in zip(pairs, wide, strict=True)]
 
 
-def _contents(K: int, most: int) -> IntArray:
+def _contents(K: int, most: int) -> FloatArray:
     """Pieces of each of K sizes that one hole can hold, (m, K), nothing first."""
     if (most + 1) ** K > _CONTENTS:
         raise ValueError("too many combinations in one hole: allow fewer pieces, or take a larger step")
     grid = np.indices((most + 1,) * K).reshape(K, -1).T
-    return np.asarray(grid[grid.sum(axis=1) <= most])
+    return np.asarray(grid[grid.sum(axis=1) <= most], dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -398,13 +406,13 @@ def solve_discrete(
 
 def _leaves(
     known: ComplexArray, lists: Sequence[tuple[PlaneVectors, Vectors]]
-) -> tuple[IntArray, ComplexArray, IntArray]:
+) -> tuple[IntArray, ComplexArray, FloatArray]:
     """Choices with the least |A D + b|² for every number, [A b] known: rows of the lists, D, number."""
     P = len(lists)
     little = 1e-12 * (np.abs(known).max() or 1.0) * np.eye(P, P + 1)  # for full rank
     R = np.asarray(np.linalg.qr(np.vstack((known, little)), mode="r"))
     rows, D = np.zeros((1, P), dtype=int), np.zeros((1, P), dtype=complex)
-    number, cost = np.zeros(1, dtype=int), np.zeros(1)
+    number, cost = np.zeros(1), np.zeros(1)
     for k in range(P - 1, -1, -1):
         one, vectors = lists[k]
         centre = -(R[k, P] + D[:, k + 1 :] @ R[k, k + 1 : P]) / R[k, k]
