@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from balancing.conventions import Labels
-from balancing.holes import Holes, Mounting, content, equal_together, lightest
+from balancing.holes import Holes, Mounting, content, equal_together
 from balancing.pieces import FEW, HEAVIER, NOTHING, SPARE, PlaneVectors
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, percent
@@ -164,11 +164,9 @@ def split(
         raise ValueError(
             "the weight to be split must be finite, the number of pieces 1 or more, the error not negative"
         )
-    target, heaviest, few = complex(target), np.inf, good_enough > 0 and not holes.free_amounts
-    if few:
-        most = holes.per_hole * float(holes.pieces.max())
-        heaviest = HEAVIER * float(lightest(holes, holes.free, target, most).sum())
-    plane = PlaneVectors(holes, holes.free, holes.max_weight, target, most_pieces, heaviest)
+    target, few = complex(target), good_enough > 0 and not holes.free_amounts
+    heavier, most = HEAVIER if few else np.inf, np.inf if most_pieces is None else most_pieces
+    plane = PlaneVectors(holes, target, heavier=heavier, most=most)
     if plane.any_weight:
         return Split(target, holes, plane.place(target))
     nearest = plane.near(target, 1)

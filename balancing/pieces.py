@@ -77,35 +77,38 @@ class PlaneVectors:
     ----------
     holes
         Positions and pieces.
-    usable
-        Which holes can be used, shape (H,).
-    max_weight
-        Largest |mounted + d|.
     wanted
         The weight that is wanted: where not all sums can be listed, those stay that do most for it; free
         amounts without a step are thousandths of it.
+    arcs
+        First angle and width of arcs in which no hole is used.
+    max_weight
+        Largest |mounted + d|, beside that of the holes.
+    heavier
+        More than two pieces weigh at most so many times the least sum that makes what is wanted.
     most
-        Pieces altogether, at most; None: as many as fit.
-    heaviest
-        Weight of more than two pieces together, at most.
+        Pieces altogether, at most; None: four more than that sum needs.
 
     Raises
     ------
     ValueError
-        For more ways to fill one hole than can be listed.
+        Where no hole can be used, and for more ways to fill one than can be listed.
     """
 
     def __init__(
         self,
         holes: Holes,
-        usable: BoolArray,
-        max_weight: float,
         wanted: complex,
-        most: int | None = None,
-        heaviest: float = np.inf,
+        arcs: Sequence[tuple[float, float]] = (),
+        max_weight: float = np.inf,
+        heavier: float = np.inf,
+        most: float | None = None,
     ) -> None:
-        self.holes, self.max_weight, self.heaviest, self.wanted = holes, max_weight, heaviest, wanted
-        self.usable, where = usable, np.flatnonzero(usable)
+        self.holes, self.wanted, self.max_weight = holes, wanted, min(holes.max_weight, max_weight)
+        self.usable, self.heaviest = holes.outside(arcs), np.inf
+        where = np.flatnonzero(self.usable)
+        if not len(where):
+            raise ValueError("every hole is taken or at a forbidden angle, nothing can be mounted")
         self.toward = np.conj(wanted) / (abs(wanted) or 1.0)
         if holes.free_amounts:
             size = abs(wanted) + 2 * abs(holes.mounted) or 1.0
@@ -113,10 +116,17 @@ class PlaneVectors:
             steps = int(1.2 * size / self.sizes[0]) + 4
             self.most, self.parts = 2 * steps, _neighbours(holes.angles, where)
         else:
-            self.sizes, capacity = holes.pieces, holes.per_hole * len(where)
-            light = np.inf if np.isinf(heaviest) else max(2.0, heaviest // self.sizes.min())
-            there = np.inf if holes.stock is None else float(holes.stock.sum())
-            self.most = int(min(capacity, capacity if most is None else most, light, there))
+            self.sizes, largest = holes.pieces, holes.pieces.max()
+            least = float(lightest(holes, self.usable, wanted, holes.per_hole * largest).sum())
+            self.heaviest = heavier * (least or 1e-300)
+            self.most = int(
+                min(
+                    holes.per_hole * len(where),
+                    np.ceil(least / largest - SAME) + SPARE if most is None else most,
+                    np.inf if np.isinf(heavier) else max(2.0, self.heaviest // self.sizes.min()),
+                    np.inf if holes.stock is None else float(holes.stock.sum()),
+                )
+            )
             steps = min(holes.per_hole, self.most)
             # holes 60°, 120° and 180° apart add up or cancel: the list of a half with both is shorter
             turned = np.round(np.mod(holes.angles[where] + 1e-7, np.pi / 3), 5)
@@ -364,8 +374,7 @@ def solve_discrete(
     guides = _guides(W, Y, w, limits.residual.ravel(), minmax=method == "minmax")
     z = _optimum(guides[-1], W, Y)
     exact = np.asarray(z if wanted is None else wanted, dtype=complex)
-    of = zip(named.items(), limits.forbidden, limits.max_weight, exact, strict=True)
-    sets = [_plane(*item, arcs, largest, complex(d), heavier) for item, arcs, largest, d in of]
+    sets = _planes(named, limits, exact, heavier)
     fixed = [p for p in np.argsort(np.linalg.norm(W, axis=0)) if not sets[p].any_weight]
     free = [p for p in range(P) if p not in fixed]
     # planes of any weight cancel what they can of what the others leave
@@ -442,26 +451,21 @@ def _guides(
     return guides
 
 
-def _plane(
-    name: str,
-    holes: Holes | None,
-    arcs: Sequence[tuple[float, float]],
-    max_weight: float,
-    wanted: complex,
-    heavier: float,
-) -> PlaneVectors:
-    """What a plane can take."""
-    if holes is None and arcs:
-        raise ValueError(f"plane {name} has forbidden angles but no holes: list its holes")
-    holes = holes or from_list(equal_holes(4))
-    usable, number, heaviest = holes.outside(arcs), 0, np.inf
-    if not usable.any():
-        raise ValueError(f"plane {name}: every hole is taken or at a forbidden angle, nothing can be mounted")
-    if not holes.free_amounts:
-        largest = holes.pieces.max()
-        least = float(lightest(holes, usable, wanted, holes.per_hole * largest).sum())
-        number, heaviest = int(np.ceil(least / largest - SAME)) + SPARE, heavier * (least or 1e-300)
-    return PlaneVectors(holes, usable, min(holes.max_weight, max_weight), wanted, number, heaviest)
+def _planes(
+    named: Mapping[Any, Holes | None], limits: Limits, exact: ComplexArray, heavier: float
+) -> list[PlaneVectors]:
+    """What each plane can take."""
+    sets = []
+    for (name, holes), arcs, largest, d in zip(
+        named.items(), limits.forbidden, limits.max_weight, exact, strict=True
+    ):
+        if holes is None and arcs:
+            raise ValueError(f"plane {name} has forbidden angles but no holes: list its holes")
+        try:
+            sets.append(PlaneVectors(holes or from_list(equal_holes(4)), complex(d), arcs, largest, heavier))
+        except ValueError as error:
+            raise ValueError(f"plane {name}: {error}") from None
+    return sets
 
 
 def _optimum(guide: FloatArray, A: ComplexArray, y: ComplexArray) -> ComplexArray:

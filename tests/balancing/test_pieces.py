@@ -251,12 +251,12 @@ def test_forbidden_arcs_and_largest_weights():
 def test_many_holes_at_odd_angles_are_answered_within_seconds():
     angles = np.sort(np.random.default_rng(5).uniform(0, 2 * np.pi, 40))
     holes = from_list(angles[:28], [0.01, 0.02, 0.03], stock=[9, 9, 9])
-    plane = PlaneVectors(holes, holes.free, np.inf, 0.05j)
+    plane = PlaneVectors(holes, 0.05j, most=np.inf)
     near = plane.near(0.05j, 1)
     assert abs(near.d[0] - 0.05j) < 2e-3 * 0.05
     scarce = from_list(equal_holes(36), [1.5, 7.5], stock=[8, 2])
     z = complex([42.63, -9.0, -6.0] @ np.exp(1j * np.radians([20.0, 292.0, 200.0])))
-    far = PlaneVectors(scarce, scarce.free, np.inf, z).near(z, 1)
+    far = PlaneVectors(scarce, z, most=np.inf).near(z, 1)
     assert abs(far.d[0] - z) < 24.3  # all ten pieces, side by side
 
 
