@@ -381,6 +381,7 @@ class Removal:
         target = self.target / (1.0 if labels.unbalances else self.radius)
         document = _document("drilling" if self.diameter else "grinding", target, labels)
         document |= {"angle_deg": self._angle(labels), "radius_m": self.radius, "mass_kg": self.mass}
+        document["unbalance_kg_m"] = abs(self.target)
         hole = {"diameter_m": self.diameter, "depth_m": self.depth, "tip_depth_m": self.tip_depth}
         return document | (hole if self.diameter else {})
 
