@@ -36,6 +36,8 @@ def draw_tolerance(t: Tolerance, ax: Axes | None = None) -> Axes:
 def draw_verdict(v: Verdict, ax: Axes | None = None, t: Tolerance | None = None) -> Axes:
     """The residual unbalance of each plane, its 95 % and its limit, on a logarithmic scale.
 
+    Hollow where it is not decidable.
+
     Raises
     ------
     ValueError
@@ -56,7 +58,8 @@ def draw_verdict(v: Verdict, ax: Axes | None = None, t: Tolerance | None = None)
             # where 0 is within, the angle is not known either
             text = text if row.low else f"up to {figures(row.high * scale, 2)}"
         at = x - 0.3, max(size, bottom)
-        ax.plot(*at, "o", color="black", mfc=BLUE, clip_on=False, label="residual unbalance")
+        face = "white" if row.verdict == "not decidable" else BLUE
+        ax.plot(*at, "o", color="black", mfc=face, clip_on=False, label="residual unbalance")
         note(ax, f"{text}\n{row.verdict}", at, (8, 3))
     name = f"residual unbalance, {v.labels.weight_in} (log scale)"
     title = f"Residual unbalance and tolerance ({v.source}): {v.overall}"

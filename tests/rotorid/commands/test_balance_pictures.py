@@ -96,7 +96,7 @@ def test_permissible_unbalance_along_the_shaft():
 
 
 def test_unbalance_is_a_vector_at_each_station():
-    found = unbalance(MODEL, UnbalanceOptions("6,12,19", model_error=2.0))
+    found = unbalance(MODEL, UnbalanceOptions("6,12,19"))
     figure = found.figure()
     check_hygiene(figure)
     [ax] = figure.axes
