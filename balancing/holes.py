@@ -8,7 +8,7 @@ therefore not of the correction D; it counts only where the plane's total is lim
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ KEPT = 1 + 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Holes:
-    """Positions and pieces of one plane; checked when it is made.
+    """Positions and pieces of one plane, as `from_list` makes and checks them.
 
     Attributes
     ----------
@@ -45,43 +45,16 @@ class Holes:
         Of the holes; "1", "2", … by default.
     max_weight
         Largest |Σ weights e^{iφ}| of the plane, what is taken included.
-
-    Raises
-    ------
-    ValueError
-        Where numbers are not finite, negative, repeated or do not fit, or nothing at all can be mounted.
     """
 
     angles: FloatArray
     pieces: FloatArray
-    per_hole: int = 1
-    step: float = 0.0
-    taken: FloatArray = field(default_factory=lambda: np.zeros(0))
-    stock: IntArray | None = None
-    names: tuple[str, ...] = ()
-    max_weight: float = np.inf
-
-    def __post_init__(self) -> None:
-        def put(name: str, value: object) -> None:
-            object.__setattr__(self, name, value)  # the class is frozen
-
-        put("angles", _numbers(self.angles, "angles of the holes"))
-        put("pieces", _numbers(self.pieces, "pieces"))
-        put("taken", _numbers(self.taken, "weights already mounted"))
-        count = len(self.angles)
-        if not self.taken.size:
-            put("taken", np.zeros(count))
-        put("names", tuple(self.names) or tuple(str(k + 1) for k in range(count)))
-        _check_positions(self)
-        _check_pieces(self)
-        if self.stock is not None:
-            stock = np.asarray(self.stock, dtype=np.float64)
-            if stock.shape != self.pieces.shape:
-                raise ValueError(f"the stock must be one number for each of the {len(self.pieces)} pieces")
-            if not ((stock >= 0) & (stock == np.rint(stock)) & np.isfinite(stock)).all():
-                raise ValueError("the stock must be whole numbers ≥ 0, how many of each piece there are")
-            put("stock", stock.astype(np.int64))
-        _check_something_fits(self)
+    per_hole: int
+    step: float
+    taken: FloatArray
+    stock: IntArray | None
+    names: tuple[str, ...]
+    max_weight: float
 
     @property
     def free(self) -> BoolArray:
@@ -150,10 +123,10 @@ def equal_holes(n: int, first: float = 0.0) -> FloatArray:
     ValueError
         For fewer than one hole, an angle that is not finite.
     """
-    if isinstance(n, bool) or n != int(n) or n < 1:
-        raise ValueError(f"the number of holes must be a whole number of 1 or more; got {n}")
-    if not np.isfinite(first):
-        raise ValueError("the angle of the first hole must be a finite number")
+    if n != int(n) or n < 1 or not np.isfinite(first):
+        raise ValueError(
+            f"the number of holes must be whole, 1 or more, the first angle finite; got {n}, {first}"
+        )
     angles = np.mod(first + 2 * np.pi * np.arange(int(n)) / int(n), 2 * np.pi)
     return np.where(angles >= 2 * np.pi, 0.0, angles)
 
@@ -169,23 +142,65 @@ def from_list(
     names: Sequence[str] = (),
     max_weight: float = np.inf,
 ) -> Holes:
-    """Holes from plain lists.
+    """Holes from plain lists, checked.
 
     Parameters
     ----------
     angles, pieces, per_hole, step, taken, stock, names, max_weight
-        The attributes of `Holes`, which says what it raises.
+        The attributes of `Holes`; nothing is taken by default, and names are "1", "2", …
+
+    Raises
+    ------
+    ValueError
+        Where numbers are not finite, negative, repeated or do not fit, or nothing at all can be mounted.
     """
-    return Holes(
-        np.asarray(angles),
-        np.asarray(pieces),
-        per_hole,
-        float(step),
-        np.asarray(taken),
-        None if stock is None else np.asarray(stock),
-        tuple(names),
-        float(max_weight),
+    phi, sizes, there = (np.array(values, dtype=np.float64) for values in (angles, pieces, taken))
+    count, there = len(phi), there if there.size else np.zeros(len(phi))
+    named = tuple(names) or tuple(str(k + 1) for k in range(count))
+    number = np.ones(len(sizes)) if stock is None else np.asarray(stock, dtype=np.float64)
+    fits = 0 < count == len(named) == len(set(named)) and there.shape == phi.shape
+    same = [named[k] for k in _same_place(phi)] if fits else []
+    rules = (
+        (fits, f"{count} holes: there must be some, each with a name of its own and what is mounted there"),
+        (
+            np.isfinite((*phi, *sizes, *there, step)).all(),
+            "angles, pieces and weights must be finite numbers",
+        ),
+        (not (np.abs(phi - np.pi) > 3 * np.pi * KEPT).any(), "angles of holes must be from −360° to 720°"),
+        (not same, f"holes {' and '.join(same)} stand at the same angle: list each once"),
+        ((sizes > 0).all(), "pieces must weigh more than 0"),
+        (
+            (there >= 0).all() and step >= 0 and max_weight >= 0,
+            "what is mounted, the smallest step and the largest weight must not be negative",
+        ),
+        (
+            len(set(sizes)) == len(sizes),
+            "a piece is listed twice: list each size once and give how many there are as stock",
+        ),
+        (per_hole >= 1 and per_hole % 1 == 0, "the number of pieces in one hole must be a whole number ≥ 1"),
+        (not (len(sizes) and step), "give either pieces or a smallest step of free amounts, not both"),
+        (
+            number.shape == sizes.shape and (number >= 0).all() and not (number % 1).any(),
+            f"the stock must be whole numbers ≥ 0, one for each of the {len(sizes)} pieces",
+        ),
+        (not (there > 0).all(), "nothing can be mounted: something is mounted in every hole already"),
+        (
+            max_weight > 0 and (number.any() or not len(sizes)),
+            "nothing can be mounted: the stock is empty, or the largest weight of the plane is 0",
+        ),
     )
+    for right, words in rules:
+        if not right:
+            raise ValueError(words)
+    left = None if stock is None else number.astype(np.int64)
+    return Holes(phi, sizes, int(per_hole), float(step), there, left, named, float(max_weight))
+
+
+def _same_place(angles: FloatArray) -> list[int]:
+    """The first two holes that are one."""
+    apart = np.abs(np.mod(angles[:, None] - angles + np.pi, 2 * np.pi) - np.pi)
+    at, other = np.nonzero(np.triu(apart < SAME_ANGLE, 1))
+    return [int(at[0]), int(other[0])] if len(at) else []
 
 
 def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike | None = None) -> Mounting:
@@ -194,6 +209,13 @@ def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike |
     number = np.zeros(shape, dtype=np.int64) if counts is None else np.asarray(counts, dtype=np.int64)
     weight = number @ holes.pieces if amounts is None else np.asarray(amounts, dtype=np.float64)
     return Mounting(number, weight, complex(weight @ np.exp(1j * holes.angles)))
+
+
+def content(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
+    """What goes into a hole, in units of 1 / scale: "2 × 150 + 50", or a free amount."""
+    each = zip(mounting.counts[h], holes.pieces * scale, strict=False)
+    parts = [f"{n} × {size:.6g}" if n > 1 else f"{size:.6g}" for n, size in each if n]
+    return " + ".join(parts) or f"{mounting.amounts[h] * scale:.6g}"
 
 
 def lightest(holes: Holes, usable: BoolArray, z: complex, most: float) -> FloatArray:
@@ -217,75 +239,3 @@ def equal_together(contents: Iterable[tuple[str, str]]) -> list[str]:
     for content, hole in contents:
         same.setdefault(content, []).append(hole)
     return [f"{what} in {'holes' if at[1:] else 'hole'} {', '.join(at)}" for what, at in same.items()]
-
-
-def _numbers(values: ArrayLike, what: str) -> FloatArray:
-    array = np.array(values, dtype=np.float64)
-    if array.ndim != 1:
-        raise ValueError(f"the {what} must be a plain list of numbers")
-    if not np.isfinite(array).all():
-        raise ValueError(f"the {what} must be finite numbers; number {_first(~np.isfinite(array))} is not")
-    return array
-
-
-def _check_positions(holes: Holes) -> None:
-    angles, names, count = holes.angles, holes.names, len(holes.angles)
-    if not count:
-        raise ValueError("the plane has no holes: give at least one angle")
-    if len(names) != count or len(set(names)) != count:
-        raise ValueError(f"the names of the holes must be {count} different names, one for each hole")
-    outside = (angles < -2 * np.pi * KEPT) | (angles > 4 * np.pi * KEPT)
-    if outside.any():
-        name = names[int(np.argmax(outside))]
-        raise ValueError(
-            f"hole {name} stands outside −360° … 720°: give its angle in degrees within one turn"
-        )
-    order = np.argsort(np.mod(angles, 2 * np.pi), kind="stable")
-    after = np.mod(np.roll(angles[order], -1) - angles[order], 2 * np.pi)
-    near = np.minimum(after, 2 * np.pi - after)
-    if count > 1 and near.min() < SAME_ANGLE:
-        k = int(np.argmin(near))
-        one, other = sorted((order[k], order[(k + 1) % count]))
-        raise ValueError(f"holes {names[one]} and {names[other]} stand at the same angle: list each once")
-    if holes.taken.shape != (count,):
-        raise ValueError(
-            f"there must be one weight already mounted for each of the {count} holes (0 where it is free)"
-        )
-    if (holes.taken < 0).any():
-        name = names[int(np.argmax(holes.taken < 0))]
-        raise ValueError(f"the weight already mounted in hole {name} is negative: give 0 where it is free")
-
-
-def _check_pieces(holes: Holes) -> None:
-    pieces = holes.pieces
-    if (pieces <= 0).any():
-        raise ValueError(f"pieces must weigh more than 0; number {_first(pieces <= 0)} does not")
-    if len(np.unique(pieces)) != len(pieces):
-        raise ValueError("a piece is listed twice: list each size once and give how many there are as stock")
-    if isinstance(holes.per_hole, bool) or holes.per_hole != int(holes.per_hole) or holes.per_hole < 1:
-        raise ValueError(f"the number of pieces in one hole must be a whole number ≥ 1; got {holes.per_hole}")
-    if not (np.isfinite(holes.step) and holes.step >= 0):
-        raise ValueError("the smallest step of a weight must be a finite number ≥ 0 (0 for any amount)")
-    if len(pieces) and holes.step > 0:
-        raise ValueError("give either pieces or a smallest step of free amounts, not both")
-    if not holes.max_weight >= 0:  # NaN is not ≥ 0
-        raise ValueError("the largest weight of the plane must be a number ≥ 0")
-    if not len(pieces) and holes.stock is not None:
-        raise ValueError("a stock needs pieces: list the pieces, or leave the stock out")
-
-
-def _check_something_fits(holes: Holes) -> None:
-    usable = holes.pieces if holes.stock is None else holes.pieces[holes.stock > 0]
-    why = ""
-    if not holes.free.any():
-        why = "something is mounted in every hole already"
-    elif holes.max_weight <= 0:
-        why = "the largest weight of the plane is 0"
-    elif not holes.free_amounts and not len(usable):
-        why = "the stock is empty"
-    if why:
-        raise ValueError(f"nothing can be mounted: {why}")
-
-
-def _first(where: BoolArray) -> int:
-    return int(np.argmax(where)) + 1

@@ -37,7 +37,7 @@ they are together at the bearings (`Tolerance.transfer`).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -76,13 +76,13 @@ class Tolerance(Answered):
     planes
         Names of the correction planes, length P (0, 1 or 2).
     positions
-        Along the shaft, m, shape (P,); None where no distances are known.
+        Along the shaft, m, shape (P,); NaN where no distances are known.
     bearings
-        Positions of the tolerance planes, m; None where nothing is allocated to them.
+        Positions of the tolerance planes, m, shape (2,); empty where nothing is allocated to them.
     centre
         Position of the centre of mass, m; None as before.
     bearing_limits
-        U_A and U_B, kg·m, shape (2,); None as before.
+        U_A and U_B, kg·m, shape (2,); empty as before.
     limits
         Of each correction plane, kg·m, shape (P,).
     rule
@@ -95,10 +95,10 @@ class Tolerance(Answered):
     mass: float
     speed: float
     planes: tuple[str, ...]
-    positions: FloatArray | None
-    bearings: tuple[float, float] | None
+    positions: FloatArray
+    bearings: FloatArray
     centre: float | None
-    bearing_limits: FloatArray | None
+    bearing_limits: FloatArray
     limits: FloatArray
     rule: str
     warnings: tuple[str, ...] = ()
@@ -116,16 +116,13 @@ class Tolerance(Answered):
     @property
     def transfer(self) -> FloatArray | None:
         """T (2, P): unbalance at the bearings per unbalance in the planes; None without distances."""
-        if self.bearings is None or self.positions is None:
-            return None
-        return transfer(self.positions, self.bearings)
+        known = len(self.bearings) > 0 and np.isfinite(self.positions).all()
+        return transfer(self.positions, self.bearings) if known else None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: kg·m, m, rad/s, and g·mm, µm where people read these."""
-        bearings = None
-        if self.bearings is not None and self.bearing_limits is not None:
-            bearings = rows(_limit_columns(self.bearings, self.bearing_limits))
-        planes = _limit_columns(self._places, self.limits)
+        ends = rows(_limit_columns(self.bearings, self.bearing_limits))
+        planes = _limit_columns(self.positions, self.limits)
         return {
             "grade": f"G{self.grade:g}",
             "mass_kg": self.mass,
@@ -135,7 +132,7 @@ class Tolerance(Answered):
             "permissible_g_mm": self.total * _GRAM_MM,
             "specific_um": self.eccentricity * 1e6,
             "centre_of_mass_m": self.centre,
-            "bearings": bearings,
+            "bearings": ends or None,
             "planes": rows((Column("plane", self.planes), *planes)),
             "rule": self.rule,
             "warnings": list(self.warnings),
@@ -146,21 +143,15 @@ class Tolerance(Answered):
         return frame(self._columns())
 
     def _columns(self) -> tuple[Column, ...]:
-        ends: FloatArray = np.zeros(0) if self.bearing_limits is None else self.bearing_limits
-        names = ("bearing A", "bearing B")[: len(ends)]
-        at = np.concatenate(([np.nan], self.bearings or (), self._places))
-        limits = np.concatenate(([self.total], ends, self.limits)) * _GRAM_MM
+        names = ("bearing A", "bearing B")[: len(self.bearings)]
+        at = np.concatenate(([np.nan], self.bearings, self.positions))
+        limits = np.concatenate(([self.total], self.bearing_limits, self.limits)) * _GRAM_MM
         places = ("whole rotor", *names, *(f"plane {name}" for name in self.planes))
         return (
             Column("place", places, str, ""),
             Column("position_mm", at * 1e3, "at {:.6g} mm".format, ""),
             Column("limit_g_mm", limits, figures, "g·mm"),
         )
-
-    @property
-    def _places(self) -> FloatArray:
-        """Of the planes, m, NaN where unknown."""
-        return np.full(len(self.planes), np.nan) if self.positions is None else self.positions
 
     @property
     def answer(self) -> Answer:
@@ -173,7 +164,7 @@ class Tolerance(Answered):
         )
 
 
-def _limit_columns(positions: Sequence[float] | FloatArray, limits: FloatArray) -> tuple[Column, ...]:
+def _limit_columns(positions: FloatArray, limits: FloatArray) -> tuple[Column, ...]:
     return (
         Column("position_m", positions),
         Column("limit_kg_m", limits),
@@ -189,16 +180,13 @@ def parse_grade(text: str | float) -> float:
     ValueError
         For a grade that the standard does not have, with its neighbours.
     """
-    body = str(text).strip().removeprefix("G").removeprefix("g").strip().replace(",", ".")
-    try:
-        value = float(body)
-    except ValueError:
-        value = math.nan
+    body = str(text).strip().lstrip("Gg").strip().replace(",", ".")
+    value = float(body) if body.replace(".", "", 1).isdecimal() else math.nan
     if value in GRADES:
         return value
-    known = ", ".join(f"G{g:g}" for g in GRADES)
     near = [g for g in GRADES if g < value][-1:] + [g for g in GRADES if g > value][:1]
     hint = f"the nearest are {' and '.join(f'G{g:g}' for g in near)}; " if near else ""
+    known = ", ".join(f"G{g:g}" for g in GRADES)
     raise ValueError(f"there is no balance quality grade {str(text)!r}: {hint}the grades are {known}")
 
 
@@ -247,30 +235,57 @@ def tolerance(
     >>> f"{found.total * 1e6:.0f} g·mm, {found.eccentricity * 1e6:.2f} µm"
     '3979 g·mm, 7.96 µm'
     """
-    for what, value in (("mass of the rotor", mass), ("service speed", speed)):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"the {what} must be a finite number above 0, not {value:g}")
+    named = dict(planes or {})
+    given = np.array([np.nan if z is None else z for z in named.values()], dtype=np.float64)
+    positions = given[np.isfinite(given)]
+    placed, two = len(positions) == len(named) > 0, len(positions) == 2
+    ends = np.array(positions if bearings is None and two else bearings or (), dtype=np.float64)
+    stated = [z for z in (*named.values(), *(bearings or ()), centre) if z is not None]
+    for right, words in (
+        (0 < mass < math.inf, f"the mass of the rotor must be a finite number above 0, not {mass:g}"),
+        (0 < speed < math.inf, f"the service speed must be a finite number above 0, not {speed:g}"),
+        (
+            len(named) < 3,
+            f"the tolerance of a rigid rotor is shared by one or two planes, not {len(named)}: choose two",
+        ),
+        (
+            np.isfinite(stated).all(),
+            "positions of planes, bearings and centre of mass must be finite numbers",
+        ),
+        (placed or not len(positions), "give the position of both planes, or of none"),
+        (len(set(bearings or "ab")) == 2, "both bearings are at the same place: give two positions"),
+        (
+            not two or positions[0] != positions[1],
+            "both planes are at the same place: give two different positions, or one plane",
+        ),
+        (
+            placed or bearings is None or len(named) < 2,
+            "with the positions of the bearings, give those of the planes, too",
+        ),
+        (
+            centre is not None or not len(ends),
+            "the share of each plane needs the position of the centre of mass: give that, too",
+        ),
+        (
+            centre is None or len(ends),
+            "the position of the centre of mass says nothing without those of bearings or two planes",
+        ),
+    ):
+        if not right:
+            raise ValueError(words)
     G = parse_grade(grade)
     total = mass * G * 1e-3 / speed
-    named = dict(planes or {})
-    positions = _positions(named, bearings, centre)
-    ends = bearings
-    if ends is None and positions is not None and len(positions) == 2:
-        ends = (float(positions[0]), float(positions[1]))
-    at: FloatArray | None = None
-    rule = ""
+    at, rule = np.zeros(0), ""
     warnings: tuple[str, ...] = ()
-    if ends is not None and centre is not None:
+    if centre is not None:
         at, rule, warnings = _bearing_limits(total, ends, centre)
     if len(named) < 2:
         limits = np.full(len(named), total)
         rule += "One plane (a disc) has the whole of it." if named else ""
-    elif at is None or ends is None or positions is None:
-        limits = np.full(2, total / 2)
-        rule = "Half in each plane, as for a symmetric rotor."
+    elif not two:
+        limits, rule = np.full(2, total / 2), "Half in each plane, as for a symmetric rotor."
     elif bearings is None:
-        limits = at.copy()
-        rule += "The correction planes are the tolerance planes."
+        limits, rule = at, rule + "The correction planes are the tolerance planes."
     else:
         limits = _safe_pair(np.abs(transfer(positions, ends)), at)
         rule += "In the planes: safe at the bearings whatever the angles of the residuals are."
@@ -279,9 +294,9 @@ def tolerance(
         mass=float(mass),
         speed=float(speed),
         planes=tuple(named),
-        positions=positions,
-        bearings=None if at is None else ends,
-        centre=None if at is None else centre,
+        positions=given,
+        bearings=ends,
+        centre=centre,
         bearing_limits=at,
         limits=limits,
         rule=rule.strip() or "Nothing is allocated to planes.",
@@ -289,61 +304,27 @@ def tolerance(
     )
 
 
-def _positions(
-    planes: Mapping[str, float | None], bearings: tuple[float, float] | None, centre: float | None
-) -> FloatArray | None:
-    """Positions (P,) of the planes, checked against everything else; None where there are none."""
-    if len(planes) > 2:
-        raise ValueError(
-            f"the tolerance of a rigid rotor is shared by one or two planes, not {len(planes)}: choose two"
-        )
-    given = [z for z in planes.values() if z is not None]
-    if any(not math.isfinite(z) for z in (*given, *(bearings or ()), *(() if centre is None else (centre,)))):
-        raise ValueError("positions of planes, bearings and the centre of mass must be finite numbers")
-    if 0 < len(given) < len(planes):
-        raise ValueError("give the position of both planes, or of none")
-    if bearings is not None and bearings[0] == bearings[1]:
-        raise ValueError("both bearings are at the same place: give two different positions")
-    if len(given) == 2 and given[0] == given[1]:
-        raise ValueError("both planes are at the same place: give two different positions, or one plane")
-    if bearings is not None and len(planes) == 2 and not given:
-        raise ValueError("with the positions of the bearings, give those of the planes, too")
-    if centre is None and (bearings is not None or len(given) == 2):
-        raise ValueError("the share of each plane needs the position of the centre of mass: give that, too")
-    if centre is not None and bearings is None and len(given) < 2:
-        raise ValueError(
-            "the position of the centre of mass says nothing without those of bearings or two planes"
-        )
-    return np.array(given, dtype=np.float64) if given else None
-
-
-def _bearing_limits(
-    total: float, ends: tuple[float, float], centre: float
-) -> tuple[FloatArray, str, tuple[str, ...]]:
+def _bearing_limits(total: float, ends: FloatArray, centre: float) -> tuple[FloatArray, str, tuple[str, ...]]:
     """U_A and U_B (2,), kg·m, by the levers of the centre of mass; the rule in words; warnings."""
-    a, b = ends
-    share = np.abs(np.array([b - centre, centre - a]) / (b - a))
-    inboard = min(a, b) <= centre <= max(a, b)
+    share = np.abs((ends[::-1] - centre) / (ends[1] - ends[0]))
+    inboard = ends.min() <= centre <= ends.max()
     low, high = INBOARD if inboard else OUTBOARD
     kept = np.clip(share, low, high)
     rule = (
         f"Tolerance planes by the levers of the centre of mass ({'between' if inboard else 'outside'} them): "
         f"shares {kept[0]:.3g} and {kept[1]:.3g}. "
     )
-    changed = np.abs(kept - share) > 1e-12
-    warnings: tuple[str, ...] = ()
-    if changed.any():
-        warnings = (
-            f"by the levers the tolerance planes had {share[0]:.3g} and {share[1]:.3g} of the permissible "
-            f"unbalance; the limits {low:g} … {high:g} make it {kept[0]:.3g} and {kept[1]:.3g}",
-        )
-    return kept * total, rule, warnings
+    words = (
+        f"by the levers the tolerance planes had {share[0]:.3g} and {share[1]:.3g} of the permissible "
+        f"unbalance; the limits {low:g} … {high:g} make it {kept[0]:.3g} and {kept[1]:.3g}"
+    )
+    return kept * total, rule, (words,) if (np.abs(kept - share) > 1e-12).any() else ()
 
 
-def transfer(positions: FloatArray, ends: tuple[float, float]) -> FloatArray:
+def transfer(positions: FloatArray, ends: FloatArray) -> FloatArray:
     """T (2, P): unbalance at the tolerance planes per unbalance at these positions (P,), m."""
     a, b = ends
-    return np.array([b - positions, positions - a]) / (b - a)
+    return np.asarray(np.array([b - positions, positions - a]) / (b - a))
 
 
 def _safe_pair(T: FloatArray, limits: FloatArray) -> FloatArray:
@@ -352,9 +333,8 @@ def _safe_pair(T: FloatArray, limits: FloatArray) -> FloatArray:
     log u₁ + log u₂ is concave: at the optimum either one constraint holds alone, where each plane uses half
     of it, u_k = limit / (2 T_k), or both hold, at their intersection.
     """
-    for row, limit, other, most in ((T[0], limits[0], T[1], limits[1]), (T[1], limits[1], T[0], limits[0])):
-        if (row > 0).all():
-            u = limit / (2 * row)
-            if other @ u <= most * (1 + 1e-12):
-                return np.asarray(u)
+    for k in (0, 1):
+        u = limits[k] / (2 * np.maximum(T[k], 1e-300))
+        if T[1 - k] @ u <= limits[1 - k] * (1 + 1e-12):
+            return np.asarray(u)
     return np.asarray(np.linalg.solve(T, limits))

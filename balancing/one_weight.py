@@ -3,89 +3,49 @@
 Every weight is complex, kg or kg·m, its angle counted with the rotation. Taking the unbalance u away at the
 angle φ changes the rotor by −u e^{iφ}; so an added unbalance D is done by u = |D| at φ = arg D + 180°.
 
-**Radial hole** (from the surface at radius R inward). With z the depth and A(z) the area of the hole,
+**Radial hole** from the surface at radius R inward, by a drill of diameter d and tip angle 118°: a cylinder
+of depth h and below it a cone of height t = (d/2)/tan 59°, of volume A t/3 (A = π d²/4), its centre of mass
+t/4 below its base:
 
-    m = ρ ∫ A(z) dz,        u = ρ ∫ A(z) (R − z) dz.
+    u/ρ = A h (R − h/2) + (A t/3)(R − h − t/4),
 
-A drill of diameter d and tip angle τ leaves a cone of height t = (d/2)/tan(τ/2) below the cylinder of depth
-h. With A = π d²/4, the cone's volume A t/3 and its centre of mass t/4 below its base,
-
-    u/ρ = A h (R − h/2) + (A t/3)(R − h − t/4);
-
-a tip that has gone in by s < t only leaves u/ρ = (A t/3)(s/t)³(R − s/4). The surface is taken as flat across
-the hole (the part missing is d²/(32 R) of depth). **Axial hole** (at the radius r): u = ρ V r, the same V(h).
-**Several holes**, n of one depth in a row, σ apart and symmetric to φ, sum to u₁ sin(nσ/2)/sin(σ/2), exactly.
+so that h² / 2 − h (R − t/3) + u/(ρ A) − (t/3)(R − t/4) = 0. The surface is taken as flat across the hole (the
+part missing is d²/(32 R) of depth).
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from balancing.conventions import Labels
-from balancing.holes import Holes, Mounting, equal_together, lightest
+from balancing.holes import Holes, Mounting, content, equal_together
 from balancing.pieces import FEW, HEAVIER, NOTHING, SPARE, PlaneVectors
-from rotorid.base.answer import Answer
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, percent
 
 __all__ = [
-    "Drill",
     "Removal",
     "Rounded",
     "Split",
     "TwoPositions",
     "combine",
-    "drill_holes",
+    "drill",
     "grind",
     "rounded",
     "split",
-    "trim",
     "two_positions",
 ]
-TIP_ANGLE = float(np.radians(118.0))
-"""Of a usual twist drill."""
-PITCH = 1.5
-"""Distance of neighbouring holes of a row by their diameter, where no spacing is given."""
-_EDGE = 1e-12
-
-
-class OneWeight(ABC):
-    """How one weight is mounted, in the units and angles of `labels`."""
-
-    @abstractmethod
-    def sentence(self, labels: Labels) -> str:
-        """What to do."""
-
-    @abstractmethod
-    def to_dict(self, labels: Labels) -> dict[str, Any]:
-        """As JSON types."""
-
-    def tables(self, labels: Labels) -> tuple[Table, ...]:
-        """A row for each hole or solution: the single values of it, and of all of them."""
-        every = self.to_dict(labels)
-        places = every.get("holes") or every.get("solutions") or [{}]
-        each = [every | place for place in places]
-        rows = [{key: one[key] for key in one if not isinstance(one[key], dict | list)} for one in each]
-        return (Table("weight", tuple(Column(key, [row[key] for row in rows]) for key in rows[0])),)
-
-    def answer(self, labels: Labels) -> Answer:
-        """For a terminal."""
-        return Answer(self.sentence(labels))
-
-
-def _document(method: str, target: complex, labels: Labels, **more: Any) -> dict[str, Any]:  # noqa: ANN401
-    head = {"method": method, "unit": labels.weight_unit, "angles": labels.angles}
-    return {**head, "target": labels.weight_entry(target), **more}
+STEEL = 7850.0
+"""kg/m³."""
+_TIP = float(np.tan(np.radians(59.0)))
 
 
 @dataclass(frozen=True, eq=False)
-class Split(OneWeight):
+class Split:
     """A weight split on the holes of one plane.
 
     Attributes
@@ -114,7 +74,7 @@ class Split(OneWeight):
     @property
     def relative_error(self) -> float:
         """|error| by the size of the target (a target of 0: by what is mounted, or 0)."""
-        return abs(self.error) / (abs(self.target) or abs(self.mounting.vector) or 1.0)
+        return _relative(self.mounting.vector, self.target)
 
     @property
     def pieces(self) -> int:
@@ -125,13 +85,10 @@ class Split(OneWeight):
     def in_holes(self, labels: Labels) -> list[str]:
         """Equal contents together, such as "10 g in holes 7 (120°), 9 (150°)"."""
         contents = []
-        for row in self._entries(labels)["holes"]:
-            each = (
-                (f"{one['count']} × " if one["count"] > 1 else "") + f"{one['mass']:.6g}"
-                for one in row["pieces"]
-            )
-            what = f"{' + '.join(each) or format(row['mass'], '.6g')} {labels.weight_in}"
-            contents.append((what, f"{row['hole']} ({round(row['angle_deg'], 2) % 360:g}°)"))
+        for h in np.flatnonzero(self.mounting.amounts).tolist():
+            what = content(self.holes, self.mounting, h, labels.weight_scale)
+            (angle,) = labels.directions(self.holes.angles[[h]])
+            contents.append((f"{what} {labels.weight_in}", f"{self.holes.names[h]} ({angle:.6g}°)"))
         return equal_together(contents)
 
     def _entries(self, labels: Labels) -> dict[str, Any]:
@@ -141,16 +98,11 @@ class Split(OneWeight):
             pieces = zip(self.mounting.counts[h], self.holes.pieces, strict=False)
             each = [{"count": int(n), "mass": labels.weight_entry(size)["mass"]} for n, size in pieces if n]
             rows.append({"hole": self.holes.names[h], **weight, "pieces": each})
-        return _document(
-            "holes",
-            self.target,
-            labels,
-            holes=rows,
-            mounted=labels.weight_entry(self.mounting.vector),
-            error=labels.weight_entry(self.error),
-            relative_error=self.relative_error,
-            number_of_pieces=self.pieces,
-        )
+        return _document("holes", self.target, labels, self.mounting.vector) | {
+            "holes": rows,
+            "mounted": labels.weight_entry(self.mounting.vector),
+            "number_of_pieces": self.pieces,
+        }
 
     def to_dict(self, labels: Labels) -> dict[str, Any]:
         """As JSON types."""
@@ -167,14 +119,14 @@ class Split(OneWeight):
             f"Mount {many}: {labels.weight_at(self.mounting.vector)} together, for {wanted}; error {share} %."
         )
 
-    def answer(self, labels: Labels) -> Answer:
+    def lines(self, labels: Labels) -> list[str]:
         """What goes where, and what fewer pieces can do."""
-        out = [f"  {line}" for line in self.in_holes(labels)]
-        out += ["", "With fewer pieces:"] if self.fewer else []
-        for one in self.fewer:
-            where = "; ".join(one.in_holes(labels))
-            out.append(f"  {one.pieces}: error {percent(one.relative_error)} %: {where}")
-        return Answer(self.sentence(labels), "\n".join(out))
+        fewer = [
+            f"  {one.pieces}: error {percent(one.relative_error)} %: {'; '.join(one.in_holes(labels))}"
+            for one in self.fewer
+        ]
+        more = ["", "With fewer pieces:", *fewer] if fewer else []
+        return [*(f"  {line}" for line in self.in_holes(labels)), *more]
 
 
 def split(
@@ -208,24 +160,20 @@ def split(
     >>> found.in_holes(Labels(weight_unit="g", weight_scale=1e3))
     ['20 g in holes 3 (60°), 5 (120°)']
     """
-    if not np.isfinite(target):
-        raise ValueError(f"the weight to be split must be finite, not {target!r}")
-    if most_pieces is not None and most_pieces < 1:
-        raise ValueError(f"the number of pieces must be 1 or more, not {most_pieces!r}")
-    if not good_enough >= 0:
-        raise ValueError(f"the relative error that is good enough must not be negative, not {good_enough!r}")
-    target, heaviest = complex(target), np.inf
-    if good_enough and not holes.free_amounts:
-        most = holes.per_hole * float(holes.pieces.max())
-        heaviest = HEAVIER * float(lightest(holes, holes.free, target, most).sum())
-    plane = PlaneVectors(holes, holes.free, holes.max_weight, target, most_pieces, heaviest)
+    if not (np.isfinite(target) and good_enough >= 0 and (most_pieces is None or most_pieces >= 1)):
+        raise ValueError(
+            "the weight to be split must be finite, the number of pieces 1 or more, the error not negative"
+        )
+    target, few = complex(target), good_enough > 0 and not holes.free_amounts
+    heavier, most = HEAVIER if few else np.inf, np.inf if most_pieces is None else most_pieces
+    plane = PlaneVectors(holes, target, heavier=heavier, most=most)
     if plane.any_weight:
         return Split(target, holes, plane.place(target))
     nearest = plane.near(target, 1)
     if not len(nearest.d):
         raise ValueError(NOTHING)
     best = Split(target, holes, plane.mount(nearest.put[0]))
-    enough = max(FEW * abs(best.error), good_enough * abs(target)) if good_enough else 0.0
+    enough = max(FEW * abs(best.error), good_enough * abs(target)) if few else 0.0
     fewer: list[Split] = []
     for n in range(0 if holes.free_amounts else best.pieces):
         for put in plane.near(target, 1, n).put:
@@ -238,24 +186,24 @@ def split(
 
 
 @dataclass(frozen=True, eq=False)
-class TwoPositions(OneWeight):
-    """Where two fixed masses stand so that together they are a wanted weight.
+class TwoPositions:
+    """Where two fixed masses stand so that together they are the target.
 
     Attributes
     ----------
+    target
+        Wanted, kg or kg·m.
     masses
         Of the two weights, kg or kg·m, shape (2,).
     angles
-        Of each solution (row) and mass, rad with the rotation, 0 ≤ angle < 2π, shape (2, 2). The second
-        solution is the first one mirrored at the direction of the target; both rows are equal where the
-        masses stand in one line.
-    target
-        The wanted weight.
+        Of each solution (row) and mass, rad with the rotation, −π … π, shape (2, 2). The second solution is
+        the first one mirrored at the direction of the target; both rows are equal where the masses stand in
+        one line.
     """
 
+    target: complex
     masses: FloatArray
     angles: FloatArray
-    target: complex
 
     def weights(self) -> ComplexArray:
         """Both weights of each solution (row), shape (2, 2)."""
@@ -268,58 +216,12 @@ class TwoPositions(OneWeight):
             {"angles_deg": row, "first_angle_deg": row[0], "second_angle_deg": row[1]} for row in rows
         ]
         masses = (self.masses * labels.weight_scale).tolist()
-        return _document("two positions", self.target, labels, masses=masses, solutions=solutions)
+        return {**_document("two positions", self.target, labels), "masses": masses, "solutions": solutions}
 
     def sentence(self, labels: Labels) -> str:
         """Both solutions."""
         each = (" and ".join(map(labels.weight_at, pair)) for pair in self.weights())
         return f"{labels.weight_at(self.target)} from two weights: either {' or '.join(each)}."
-
-
-@dataclass(frozen=True)
-class Rounded(OneWeight):
-    """A weight rounded to what scale and angle marks can show.
-
-    Attributes
-    ----------
-    wanted
-        Before rounding.
-    weight
-        After it.
-    worst
-        The largest error that rounding with these steps can make of a weight of this size.
-    """
-
-    wanted: complex
-    weight: complex
-    worst: float
-
-    @property
-    def error(self) -> complex:
-        """`weight` minus the wanted one."""
-        return self.weight - self.wanted
-
-    @property
-    def relative_error(self) -> float:
-        """|error| by the size of the wanted one; 0 for a wanted weight of 0 that stays 0."""
-        return abs(self.error) / (abs(self.wanted) or 1.0)
-
-    def to_dict(self, labels: Labels) -> dict[str, Any]:
-        """As JSON types."""
-        return _document(
-            "one weight",
-            self.wanted,
-            labels,
-            weight=labels.weight_entry(self.weight),
-            error=labels.weight_entry(self.error),
-            relative_error=self.relative_error,
-            largest_possible_error=self.worst * labels.weight_scale,
-        )
-
-    def sentence(self, labels: Labels) -> str:
-        """The weight, and what rounding did to it."""
-        lost = f" (error {percent(self.relative_error)} %)" if self.worst else ""
-        return f"Mount {labels.weight_at(self.weight)}{lost}."
 
 
 def two_positions(target: complex, mass_a: float, mass_b: float) -> TwoPositions:
@@ -347,17 +249,19 @@ def two_positions(target: complex, mass_a: float, mass_b: float) -> TwoPositions
     array([[148.81,  55.23],
            [ 31.19, 124.77]])
     """
-    a, b, size = _positive(mass_a, "mass"), _positive(mass_b, "mass"), abs(_finite(target))
-    if not abs(a - b) - _EDGE * (a + b) <= size <= (a + b) * (1 + _EDGE):
+    _positive(mass_a, mass_b)
+    a, b, size = mass_a, mass_b, abs(target)
+    little = 1e-12 * (a + b)
+    if not abs(a - b) - little <= size <= a + b + little:
         raise ValueError(
             f"weights of {a:g} and {b:g} cannot make {size:g} at any angles: together they reach from "
             f"{abs(a - b):g} to {a + b:g}; use other masses"
         )
     # equal masses that cancel each other may stand anywhere
-    cosine = (a * a + size * size - b * b) / (2 * a * size) if size > _EDGE * a else 1.0
+    cosine = (a * a + size * size - b * b) / (2 * a * size) if size > little else 1.0
     opening = np.arccos(np.clip(cosine, -1.0, 1.0))
     first = a * np.exp(1j * (np.angle(target) + np.array([opening, -opening])))
-    return TwoPositions(np.array([a, b]), _turn(np.angle(np.column_stack((first, target - first)))), target)
+    return TwoPositions(target, np.array([a, b]), np.angle(np.column_stack((first, target - first))))
 
 
 def combine(weights: Iterable[complex]) -> complex:
@@ -368,57 +272,49 @@ def combine(weights: Iterable[complex]) -> complex:
     Raises
     ------
     ValueError
-        For no weights, or one that is not finite.
+        For no weights.
 
     Examples
     --------
     >>> combine([3.0, 4.0j])
     (3+4j)
     """
-    each = np.array([_finite(weight) for weight in weights], dtype=complex)
+    each = np.array([*weights], dtype=complex)
     if not each.size:
         raise ValueError("there is no weight to combine")
     total = complex(each.sum())
     return total if abs(total) > 4 * np.finfo(float).eps * np.abs(each).sum() else 0j
 
 
-def trim(target: complex, mounted: Iterable[complex] | complex) -> complex:
-    """What has to be added so that it and what is mounted already make the target.
+@dataclass(frozen=True, eq=False)
+class Rounded:
+    """A weight rounded to what scale and angle marks can show.
 
-    Parameters
+    Attributes
     ----------
     target
-        Wanted in this plane altogether, kg or kg·m.
-    mounted
-        What stays in: one weight or several, possibly none.
-
-    Raises
-    ------
-    ValueError
-        For weights that are not finite.
+        Wanted, kg or kg·m.
+    weight
+        After rounding.
+    worst
+        The largest error that rounding with these steps can make of a weight of this size.
     """
-    several = mounted if isinstance(mounted, Iterable) else [mounted]
-    return combine([target, *(-weight for weight in several)])
 
+    target: complex
+    weight: complex
+    worst: float
 
-def round_to(value: float, step: float) -> float:
-    """The multiple of a scale's step nearest to a value; 0 as the step leaves the value as it is.
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types."""
+        return _document("one weight", self.target, labels, self.weight) | {
+            "weight": labels.weight_entry(self.weight),
+            "largest_possible_error": self.worst * labels.weight_scale,
+        }
 
-    Raises
-    ------
-    ValueError
-        For a step that is negative or not finite, or a value that is not finite.
-
-    Examples
-    --------
-    >>> round_to(34.7, 0.5)
-    34.5
-    """
-    if not (np.isfinite(step) and step >= 0):
-        raise ValueError(f"the step of a scale must be positive (0: no rounding), not {step!r}")
-    if not np.isfinite(value):
-        raise ValueError(f"only a finite number can be rounded, not {value!r}")
-    return float(f"{round(value / step) * step:.12g}") if step else float(value)  # 347 · 0.1 is 34.7
+    def sentence(self, labels: Labels) -> str:
+        """The weight, and what rounding did to it."""
+        lost = f" (error {percent(_relative(self.weight, self.target))} %)" if self.worst else ""
+        return f"Mount {labels.weight_at(self.weight)}{lost}."
 
 
 def rounded(weight: complex, mass_step: float = 0.0, angle_step: float = 0.0) -> Rounded:
@@ -442,181 +338,125 @@ def rounded(weight: complex, mass_step: float = 0.0, angle_step: float = 0.0) ->
     ValueError
         For steps that are negative, not finite, or beyond a full turn.
     """
-    weight, size = _finite(weight), abs(weight)
-    if not 0 <= angle_step <= 2 * np.pi:
-        raise ValueError(f"the step of an angle must be from 0 to 360°, not {np.degrees(angle_step):g}°")
-    angle = round_to(float(np.angle(weight)), angle_step)
-    new = complex(round_to(size, mass_step) * np.exp(1j * angle)) if mass_step or angle_step else weight
+    if not (0 <= mass_step < np.inf and 0 <= angle_step <= 2 * np.pi):
+        raise ValueError("the step of a scale must not be negative, that of an angle from 0 to 360°")
+    size, angle = abs(weight), float(np.angle(weight))
+    new = complex(weight)
+    if mass_step or angle_step:
+        new = _nearest(size, mass_step) * complex(np.exp(1j * _nearest(angle, angle_step)))
     sizes = np.array([max(size - mass_step / 2, 0.0), size + mass_step / 2])
     return Rounded(weight, new, float(np.abs(sizes * np.exp(0.5j * angle_step) - size).max()))
 
 
-@dataclass(frozen=True)
-class Drill:
-    """A drill and what it goes into.
-
-    Attributes
-    ----------
-    diameter
-        m.
-    radius
-        Radial: of the surface, from which the hole goes inward; axial: of the hole's axis; m.
-    density
-        Of the material, kg/m³.
-    way
-        "radial" or "axial".
-    tip_angle
-        Full angle of the tip, rad; π: flat.
-
-    Raises
-    ------
-    ValueError
-        For sizes that are not positive, a tip angle outside 0 … 180°, or a drill wider than the rotor.
-    """
-
-    diameter: float
-    radius: float
-    density: float
-    way: Literal["radial", "axial"] = "radial"
-    tip_angle: float = TIP_ANGLE
-
-    def __post_init__(self) -> None:
-        for name in ("diameter", "radius", "density"):
-            _positive(getattr(self, name), name)
-        if not 0 < self.tip_angle <= np.pi * (1 + _EDGE):
-            raise ValueError("the tip angle must be above 0 and up to 180° (flat)")
-        if self.diameter / 2 >= self.radius:
-            raise ValueError("the hole does not fit at this radius; use a smaller drill")
-
-    @property
-    def tip_height(self) -> float:
-        """Height t of the tip's cone, m."""
-        return max(float(self.diameter / 2 / np.tan(self.tip_angle / 2)), 0.0)
-
-    def removed(self, depth: float) -> tuple[float, float]:
-        """Mass (kg) and unbalance (kg·m) of a hole whose tip is `depth` (m) below the surface."""
-        t, area = self.tip_height, self.density * np.pi * self.diameter**2 / 4
-        h, s = max(depth - t, 0.0), min(depth, t)
-        cone = area * s / 3 * (s / t) ** 2 if t else 0.0
-        if self.way == "axial":
-            return area * h + cone, (area * h + cone) * self.radius
-        return area * h + cone, area * h * (self.radius - h / 2) + cone * (self.radius - h - s / 4)
+def _nearest(value: float, step: float) -> float:
+    """The nearest multiple of a step (347 · 0.1 is 34.7); a step of 0 leaves the value."""
+    return float(f"{round(value / step) * step:.12g}") if step else value
 
 
 @dataclass(frozen=True, eq=False)
-class Removal(OneWeight):
-    """Material taken away, opposite to an unbalance that was to be added.
+class Removal:
+    """Material taken away at one place, opposite to an unbalance that was to be added.
 
     Attributes
     ----------
-    method
-        "drilling" or "grinding".
-    wanted
-        The unbalance that was to be added, kg·m.
+    target
+        What was to be added, kg·m.
     radius
-        Where weights would have been added, m.
-    angles
-        Where material is taken away, rad with the rotation, 0 ≤ angle < 2π, shape (n,).
-    values
-        Sizes in SI units, of one place, by their key in JSON.
+        Of the surface that is drilled, or of the centre of mass of what is ground off, m.
+    mass
+        To be taken away, kg.
+    diameter, depth, tip_depth
+        Of a hole, of its full diameter and of its tip, m; 0 for grinding.
     """
 
-    method: Literal["drilling", "grinding"]
-    wanted: complex
+    target: complex
     radius: float
-    angles: FloatArray
-    values: Mapping[str, Any]
+    mass: float
+    diameter: float = 0.0
+    depth: float = 0.0
+    tip_depth: float = 0.0
 
     def to_dict(self, labels: Labels) -> dict[str, Any]:
         """As JSON types."""
-        target = self.wanted / (1.0 if labels.unbalances else self.radius)
-        each = [{"angle_deg": angle} for angle in labels.directions(self.angles)]
-        where = {"holes": each} if self.method == "drilling" else each[0]
-        return _document(self.method, target, labels, radius_m=self.radius, **self.values, **where)
+        target = self.target / (1.0 if labels.unbalances else self.radius)
+        document = _document("drilling" if self.diameter else "grinding", target, labels)
+        document |= {"angle_deg": self._angle(labels), "radius_m": self.radius, "mass_kg": self.mass}
+        document["unbalance_kg_m"] = abs(self.target)
+        hole = {"diameter_m": self.diameter, "depth_m": self.depth, "tip_depth_m": self.tip_depth}
+        return document | (hole if self.diameter else {})
+
+    def _angle(self, labels: Labels) -> float:
+        return labels.weight_entry(-self.target)["angle_deg"]
 
     def sentence(self, labels: Labels) -> str:
         """Where, and how much or how deep."""
-        at = ", ".join(f"{angle:.1f}°" for angle in labels.directions(self.angles))
-        if self.method == "grinding":
-            return f"Grind off {1e3 * self.values['mass_kg']:.5g} g at {at}, radius {1e3 * self.radius:g} mm."
-        size, tip = (f"{1e3 * self.values[key]:.4g} mm" for key in ("diameter_m", "tip_depth_m"))
-        return (
-            f"Drill {counted(len(self.angles), 'hole')} of diameter {size} at {at}, down to {tip} (the tip)."
-        )
+        grams, at, radius = 1e3 * self.mass, f"at {self._angle(labels):.1f}°", 1e3 * self.radius
+        if not self.diameter:
+            return f"Grind off {grams:.5g} g {at}, radius {radius:g} mm."
+        size, tip = 1e3 * self.diameter, 1e3 * self.tip_depth
+        return f"Drill a hole of diameter {size:.4g} mm {at}, down to {tip:.4g} mm (the tip): {grams:.4g} g."
 
 
-def grind(weight: complex, radius: float) -> Removal:
+def grind(target: complex, radius: float) -> Removal:
     """Material to be ground off at a radius (of its centre of mass, m) instead of adding an unbalance, kg·m.
 
     Raises
     ------
     ValueError
-        For a radius that is not positive, or a weight that is not finite.
+        For a radius that is not positive.
     """
-    size = abs(_finite(weight))
-    values = {"mass_kg": size / _positive(radius, "radius"), "unbalance_kg_m": size}
-    return Removal("grinding", weight, radius, _turn(np.angle([-weight])), values)
+    _positive(radius)
+    return Removal(target, radius, abs(target) / radius)
 
 
-def drill_holes(weight: complex, drill: Drill, *, max_depth: float = np.inf) -> Removal:
-    """Holes instead of an added weight: one, or a row of as few as keep each within the largest depth.
+def drill(target: complex, radius: float, diameter: float, density: float = STEEL) -> Removal:
+    """One radial hole instead of an added unbalance.
 
     Parameters
     ----------
-    weight
-        Equivalent added unbalance, kg·m.
-    drill
-        Diameter, place and material.
-    max_depth
-        Of the full diameter, m. Radial holes of a row end where they would meet.
+    target
+        What was to be added, kg·m.
+    radius, diameter
+        Of the surface and of the drill, m.
+    density
+        Of the material, kg/m³.
 
     Raises
     ------
     ValueError
-        Where no number of holes, `PITCH` diameters apart, is enough.
+        For sizes that are not positive, and where one hole cannot be so small or so large.
     """
-    from scipy.optimize import brentq
-
-    size, apart, most = abs(_finite(weight)), PITCH * drill.diameter / drill.radius, max_depth
-    for n in range(1, max(1, int(np.pi / apart)) + 1):  # beyond half a turn more holes do not help
-        each = size * np.sin(apart / 2) / np.sin(n * apart / 2)
-        if drill.way == "radial":
-            meet = drill.diameter / 2 / np.tan(apart / 2) if n > 1 else 0.0
-            most = min(max_depth, drill.radius - drill.tip_height - meet)
-        deepest = min(most, 1e3 * drill.radius) + drill.tip_height
-        if drill.removed(deepest)[1] >= each:
-            tip = brentq(
-                lambda z, each=each: drill.removed(z)[1] - each, 0.0, deepest, xtol=1e-15, rtol=1e-14
-            )
-            mass, unbalance = drill.removed(tip)
-            values = {
-                "way": drill.way,
-                "diameter_m": drill.diameter,
-                "depth_m": max(tip - drill.tip_height, 0.0),
-                "tip_depth_m": tip,
-                "mass_of_one_kg": mass,
-                "unbalance_of_one_kg_m": unbalance,
-            }
-            angles = np.angle(-weight) + apart * (np.arange(n) - (n - 1) / 2)
-            return Removal("drilling", weight, drill.radius, _turn(angles), values)
-    raise ValueError(
-        f"{1e6 * size:.4g} g·mm cannot be taken away by holes of diameter {1e3 * drill.diameter:g} mm: "
-        "use a larger drill or depth"
-    )
+    _positive(radius, diameter, density)
+    tip, area = diameter / 2 / _TIP, density * np.pi * diameter**2 / 4
+    left = abs(target) - area * tip / 3 * (radius - tip / 4)  # what the tip alone does not take away
+    middle = radius - tip / 3
+    fits = 0 <= 2 * left <= area * middle**2
+    depth = middle - float(np.sqrt(middle**2 - 2 * left / area)) if fits else np.inf
+    if depth + tip > radius:
+        raise ValueError(
+            f"a hole of diameter {1e3 * diameter:g} mm cannot take away {1e6 * abs(target):.4g} g·mm: use a "
+            f"{'smaller' if left < 0 else 'larger'} drill, or share the weight (--holes) and drill each part"
+        )
+    return Removal(target, radius, area * (depth + tip / 3), diameter, depth, depth + tip)
 
 
-def _finite(value: complex) -> complex:
-    if not np.isfinite(value):
-        raise ValueError(f"a weight must be finite, not {value!r}")
-    return complex(value)
+OneWeight = Split | TwoPositions | Rounded | Removal
 
 
-def _positive(value: float, what: str) -> float:
-    if not 0 < value < np.inf:
-        raise ValueError(f"the {what} must be positive and finite, not {value:g}")
-    return float(value)
+def _document(method: str, target: complex, labels: Labels, made: complex | None = None) -> dict[str, Any]:
+    """What every document has; with the error of what is made."""
+    head = {"method": method, "unit": labels.weight_unit, "angles": labels.angles}
+    document: dict[str, Any] = {**head, "target": labels.weight_entry(target)}
+    if made is not None:
+        document["error"] = labels.weight_entry(made - target)
+        document["relative_error"] = _relative(made, target)
+    return document
 
 
-def _turn(angles: FloatArray) -> FloatArray:
-    turned = np.mod(angles, 2 * np.pi)
-    return np.where(turned >= 2 * np.pi, 0.0, turned)
+def _relative(made: complex, target: complex) -> float:
+    return abs(made - target) / (abs(target) or abs(made) or 1.0)
+
+
+def _positive(*sizes: float) -> None:
+    if not all(0 < size < np.inf for size in sizes):
+        raise ValueError("masses, sizes and densities must be positive and finite")

@@ -58,7 +58,7 @@ class Vectors(NamedTuple):
     """Vectors that can be mounted (n,), the pieces of each (n,), and what stands in every hole (n, H, K)."""
 
     d: ComplexArray
-    number: IntArray
+    number: FloatArray
     put: IntArray
 
 
@@ -66,7 +66,7 @@ class _Half(NamedTuple):
     """Sums of some holes (n,), their pieces of each size (n, K), and the content of each hole (n, holes)."""
 
     sums: ComplexArray
-    used: IntArray
+    used: FloatArray
     picks: IntArray
 
 
@@ -77,35 +77,38 @@ class PlaneVectors:
     ----------
     holes
         Positions and pieces.
-    usable
-        Which holes can be used, shape (H,).
-    max_weight
-        Largest |mounted + d|.
     wanted
         The weight that is wanted: where not all sums can be listed, those stay that do most for it; free
         amounts without a step are thousandths of it.
+    arcs
+        First angle and width of arcs in which no hole is used.
+    max_weight
+        Largest |mounted + d|, beside that of the holes.
+    heavier
+        More than two pieces weigh at most so many times the least sum that makes what is wanted.
     most
-        Pieces altogether, at most; None: as many as fit.
-    heaviest
-        Weight of more than two pieces together, at most.
+        Pieces altogether, at most; None: four more than that sum needs.
 
     Raises
     ------
     ValueError
-        For more ways to fill one hole than can be listed.
+        Where no hole can be used, and for more ways to fill one than can be listed.
     """
 
     def __init__(
         self,
         holes: Holes,
-        usable: BoolArray,
-        max_weight: float,
         wanted: complex,
-        most: int | None = None,
-        heaviest: float = np.inf,
+        arcs: Sequence[tuple[float, float]] = (),
+        max_weight: float = np.inf,
+        heavier: float = np.inf,
+        most: float | None = None,
     ) -> None:
-        self.holes, self.max_weight, self.heaviest, self.wanted = holes, max_weight, heaviest, wanted
-        self.usable, where = usable, np.flatnonzero(usable)
+        self.holes, self.wanted, self.max_weight = holes, wanted, min(holes.max_weight, max_weight)
+        self.usable, self.heaviest = holes.outside(arcs), np.inf
+        where = np.flatnonzero(self.usable)
+        if not len(where):
+            raise ValueError("every hole is taken or at a forbidden angle, nothing can be mounted")
         self.toward = np.conj(wanted) / (abs(wanted) or 1.0)
         if holes.free_amounts:
             size = abs(wanted) + 2 * abs(holes.mounted) or 1.0
@@ -113,8 +116,17 @@ class PlaneVectors:
             steps = int(1.2 * size / self.sizes[0]) + 4
             self.most, self.parts = 2 * steps, _neighbours(holes.angles, where)
         else:
-            self.sizes, capacity = holes.pieces, holes.per_hole * len(where)
-            self.most = capacity if most is None else min(most, capacity)
+            self.sizes, largest = holes.pieces, holes.pieces.max()
+            least = float(lightest(holes, self.usable, wanted, holes.per_hole * largest).sum())
+            self.heaviest = heavier * (least or 1e-300)
+            self.most = int(
+                min(
+                    holes.per_hole * len(where),
+                    np.ceil(least / largest - SAME) + SPARE if most is None else most,
+                    np.inf if np.isinf(heavier) else max(2.0, self.heaviest // self.sizes.min()),
+                    np.inf if holes.stock is None else float(holes.stock.sum()),
+                )
+            )
             steps = min(holes.per_hole, self.most)
             # holes 60°, 120° and 180° apart add up or cancel: the list of a half with both is shorter
             turned = np.round(np.mod(holes.angles[where] + 1e-7, np.pi / 3), 5)
@@ -142,26 +154,27 @@ class PlaneVectors:
                 kept = kept[(used[kept] <= share).all(axis=1)]
                 aim = abs(self.wanted) * n / len(where) / 2
                 lost = used @ self.sizes - along + np.abs(along - aim)
-                lost[used.sum(axis=1) <= 2] = -1.0
+                lost[_number(used) <= 2] = -1.0
                 kept = kept[np.argsort(lost[kept])[:_LONGEST]]
             picks = np.column_stack((half.picks[row[kept]], pick[kept]))
             half = _Half(sums[kept], used[kept], picks)
         return half
 
-    def _fits(self, used: IntArray) -> BoolArray:
+    def _fits(self, used: FloatArray) -> BoolArray:
         """Whether so many pieces are there, and are not too heavy."""
-        number = used.sum(axis=1)
+        number = _number(used)
         light = (number <= 2) | (used @ self.sizes <= self.heaviest * KEPT)
         return np.asarray(light & (number <= self.most) & (used <= self.stock).all(axis=1))
 
-    def _distinct(self, sums: ComplexArray, used: IntArray) -> IndexArray:
+    def _distinct(self, sums: ComplexArray, used: FloatArray) -> IndexArray:
         """Of equal sums (that use the same of a stock) those of the fewest pieces, then the lightest."""
-        place = [np.rint(part / (SAME * self.reach)).astype(np.int64) for part in (sums.real, sums.imag)]
-        scarce = used[:, self.stock < self.most]
+        scarce = used[:, self.stock < self.most].T
         # a hash of whole numbers: different ones are the same with a chance of 1e-7 in a list
-        mixed = np.column_stack((*place, scarce)) @ _MIX[: 2 + scarce.shape[1]]
-        order = np.lexsort((used @ self.sizes, used.sum(axis=1)))
-        return np.asarray(order[np.unique(mixed[order], return_index=True)[1]])
+        parts = (*(np.rint(part / (SAME * self.reach)) for part in (sums.real, sums.imag)), *scarce)
+        mixed = np.add.reduce([part.astype(np.int64) * mix for part, mix in zip(parts, _MIX, strict=False)])
+        cost = used @ (1 + 0.5 * self.sizes / self.reach)
+        order = np.lexsort((cost, mixed))
+        return np.asarray(order[np.diff(mixed[order], prepend=np.iinfo(np.int64).min) != 0])
 
     def near(self, z: complex, count: int, number: int | None = None) -> Vectors:
         """About `count` vectors near z, the nearest first, of so many pieces or (None) of any number."""
@@ -171,11 +184,9 @@ class PlaneVectors:
         most, everything = self.most if number is None else number, 2 * (abs(z) + self.reach)
         apart = 0.0 if number is None else 2 * everything  # another number is far away
         for where, halves in zip(self.parts, self.halves, strict=True):
-            first, second = (
-                _Half(*(part[half.used.sum(axis=1) <= most] for part in half)) for half in halves
-            )
-            tree = cKDTree(_points(z - first.sums, (most - first.used.sum(axis=1)) * apart))
-            other = cKDTree(_points(second.sums, second.used.sum(axis=1) * apart))
+            first, second = (_few(half, most) for half in halves)
+            tree = cKDTree(_points(z - first.sums, (most - _number(first.used)) * apart))
+            other = cKDTree(_points(second.sums, _number(second.used) * apart))
             # along the wanted weight both halves make so much at most
             short = (self.toward * z).real - sum(
                 (half.sums * self.toward).real.max() for half in (first, second)
@@ -183,8 +194,9 @@ class PlaneVectors:
             asked, beyond = count, self.reach * np.sqrt(count / (tree.n * other.n)) / 8
             while True:
                 radius = min(max(short, 0.0) + beyond, everything)
-                if radius < everything and tree.count_neighbors(other, radius) < asked:
-                    beyond *= 1.4
+                near = int(tree.count_neighbors(other, radius))
+                if radius < everything and near < asked:
+                    beyond *= min(max(np.sqrt(asked / (near + 1)), 1.1), 4.0)
                     continue
                 met = tree.sparse_distance_matrix(other, radius, output_type="ndarray")
                 i, j = met["i"], met["j"]
@@ -199,10 +211,10 @@ class PlaneVectors:
             put[:, where] = self.contents[np.column_stack((first.picks[i[kept]], second.picks[j[kept]]))]
             found.append((d[kept], used[kept], put))
         d, used, put = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        order = np.lexsort(
-            (used @ self.sizes, used.sum(axis=1), np.rint(np.abs(d - z) / (SAME * self.reach)))
-        )[:count]
-        return Vectors(d[order], used[order].sum(axis=1) * (not self.holes.free_amounts), put[order])
+        order = np.lexsort((used @ self.sizes, _number(used), np.rint(np.abs(d - z) / (SAME * self.reach))))[
+            :count
+        ]
+        return Vectors(d[order], _number(used[order]) * (not self.holes.free_amounts), put[order])
 
     def mount(self, put: IntArray) -> Mounting:
         """What goes where, (H, K) as `Vectors` have it."""
@@ -246,7 +258,17 @@ class PlaneVectors:
         return mounting(self.holes, amounts=lightest(self.holes, self.usable, z, np.inf))
 
 
-def _points(d: ComplexArray, height: FloatArray | IntArray) -> FloatArray:
+def _few(half: _Half, most: int) -> _Half:
+    """Of so many pieces at most."""
+    kept = _number(half.used) <= most
+    return _Half(half.sums[kept], half.used[kept], half.picks[kept])
+
+
+def _number(used: FloatArray) -> FloatArray:
+    return np.asarray(used @ np.ones(used.shape[1]))
+
+
+def _points(d: ComplexArray, height: FloatArray) -> FloatArray:
     return np.column_stack((d.real, d.imag, height))
 
 
@@ -258,12 +280,12 @@ def _neighbours(angles: FloatArray, where: IndexArray) -> list[IndexArray]:
     return [pair if 0 < angle <= WIDEST else pair[:1] for pair, angle in zip(pairs, wide, strict=True)]
 
 
-def _contents(K: int, most: int) -> IntArray:
+def _contents(K: int, most: int) -> FloatArray:
     """Pieces of each of K sizes that one hole can hold, (m, K), nothing first."""
     if (most + 1) ** K > _CONTENTS:
         raise ValueError("too many combinations in one hole: allow fewer pieces, or take a larger step")
     grid = np.indices((most + 1,) * K).reshape(K, -1).T
-    return np.asarray(grid[grid.sum(axis=1) <= most])
+    return np.asarray(grid[grid.sum(axis=1) <= most], dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,8 +374,7 @@ def solve_discrete(
     guides = _guides(W, Y, w, limits.residual.ravel(), minmax=method == "minmax")
     z = _optimum(guides[-1], W, Y)
     exact = np.asarray(z if wanted is None else wanted, dtype=complex)
-    of = zip(named.items(), limits.forbidden, limits.max_weight, exact, strict=True)
-    sets = [_plane(*item, arcs, largest, complex(d), heavier) for item, arcs, largest, d in of]
+    sets = _planes(named, limits, exact, heavier)
     fixed = [p for p in np.argsort(np.linalg.norm(W, axis=0)) if not sets[p].any_weight]
     free = [p for p in range(P) if p not in fixed]
     # planes of any weight cancel what they can of what the others leave
@@ -392,18 +413,15 @@ def solve_discrete(
     return replace(each[chosen], enough=first is not None, fewer=tuple(each[:chosen]))
 
 
-fewest = solve_discrete
-
-
 def _leaves(
     known: ComplexArray, lists: Sequence[tuple[PlaneVectors, Vectors]]
-) -> tuple[IntArray, ComplexArray, IntArray]:
+) -> tuple[IntArray, ComplexArray, FloatArray]:
     """Choices with the least |A D + b|² for every number, [A b] known: rows of the lists, D, number."""
     P = len(lists)
     little = 1e-12 * (np.abs(known).max() or 1.0) * np.eye(P, P + 1)  # for full rank
     R = np.asarray(np.linalg.qr(np.vstack((known, little)), mode="r"))
     rows, D = np.zeros((1, P), dtype=int), np.zeros((1, P), dtype=complex)
-    number, cost = np.zeros(1, dtype=int), np.zeros(1)
+    number, cost = np.zeros(1), np.zeros(1)
     for k in range(P - 1, -1, -1):
         one, vectors = lists[k]
         centre = -(R[k, P] + D[:, k + 1 :] @ R[k, k + 1 : P]) / R[k, k]
@@ -433,26 +451,21 @@ def _guides(
     return guides
 
 
-def _plane(
-    name: str,
-    holes: Holes | None,
-    arcs: Sequence[tuple[float, float]],
-    max_weight: float,
-    wanted: complex,
-    heavier: float,
-) -> PlaneVectors:
-    """What a plane can take."""
-    if holes is None and arcs:
-        raise ValueError(f"plane {name} has forbidden angles but no holes: list its holes")
-    holes = holes or from_list(equal_holes(4))
-    usable, number, heaviest = holes.outside(arcs), 0, np.inf
-    if not usable.any():
-        raise ValueError(f"plane {name}: every hole is taken or at a forbidden angle, nothing can be mounted")
-    if not holes.free_amounts:
-        largest = holes.pieces.max()
-        least = float(lightest(holes, usable, wanted, holes.per_hole * largest).sum())
-        number, heaviest = int(np.ceil(least / largest - SAME)) + SPARE, heavier * (least or 1e-300)
-    return PlaneVectors(holes, usable, min(holes.max_weight, max_weight), wanted, number, heaviest)
+def _planes(
+    named: Mapping[Any, Holes | None], limits: Limits, exact: ComplexArray, heavier: float
+) -> list[PlaneVectors]:
+    """What each plane can take."""
+    sets = []
+    for (name, holes), arcs, largest, d in zip(
+        named.items(), limits.forbidden, limits.max_weight, exact, strict=True
+    ):
+        if holes is None and arcs:
+            raise ValueError(f"plane {name} has forbidden angles but no holes: list its holes")
+        try:
+            sets.append(PlaneVectors(holes or from_list(equal_holes(4)), complex(d), arcs, largest, heavier))
+        except ValueError as error:
+            raise ValueError(f"plane {name}: {error}") from None
+    return sets
 
 
 def _optimum(guide: FloatArray, A: ComplexArray, y: ComplexArray) -> ComplexArray:

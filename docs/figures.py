@@ -122,13 +122,13 @@ GALLERY = (
     Picture(
         "drill",
         "balancing",
-        "split 35g@120 --drill 8mm --depth 20mm --radius 100mm",
-        "Drill five holes of 8 mm, 19.2 mm deep, opposite the 35 g that are missing at 120°.",
+        "split 3g@120 --drill 8mm --radius 100mm",
+        "Drill a hole of 8 mm, 9.5 mm deep, opposite the 3 g that are missing at 120°.",
     ),
     Picture(
         "unbalance",
         "balancing",
-        f"unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2",
+        f"unbalance {MODEL_JOB} --stations 6,12,19",
         "Where the unbalance sits, how large and in which direction; the closed line at the tip of "
         "each is the region where it lies with 95 %.",
     ),

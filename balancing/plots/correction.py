@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.plots.polar import complete, draw_line, of_plane, polar_axes, turning, unit
+from balancing.plots.polar import draw_line, from_zero, of_plane, polar_axes, turning, unit
 from balancing.regions import reach
 from balancing.tables import INVISIBLE
 from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_above, legend_below, new_figure, plain
@@ -78,8 +78,8 @@ def residual_figure(result: Correction, mounted: Mounted | None = None) -> Figur
 def weights(c: Correction, ax: Axes | None = None) -> Axes:
     """Polar picture of the correction weights with 95 % regions, largest weights and forbidden arcs."""
     labels, shown, limits = c.labels, c.labels.weight, c.limits
-    polar = polar_axes(ax, labels.angles_on_paper)
-    largest, turn = np.abs(c.weights).max(), np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+    polar = polar_axes(ax, labels.angles_on_paper, f"Weights on the bare rotor, {labels.weight_in}")
+    largest = np.abs(c.weights).max()
     styles: dict[str, tuple[str, float]] = {}
     for p, (plane, place) in enumerate(zip(c.planes, c.places(c.planes, c.weights), strict=True)):
         name = f"{cut(plane, 24)}: {labels.weight_at(c.weights[p])}"
@@ -88,19 +88,23 @@ def weights(c: Correction, ax: Axes | None = None) -> Axes:
         lines = []
         if c.region_known:
             lines.append((c.region([p]).edge(181), STYLES[p % 4], 1.2, "closed lines: 95 % regions"))
-        if limits is not None and np.isfinite(limits.max_weight[p]):
-            lines.append((limits.max_weight[p] * turn, "--", 0.9, "dashed circles: largest weights"))
-        for start, width in () if limits is None else limits.forbidden[p]:
-            arc = largest * np.exp(1j * np.linspace(start, start + width, 91))
-            lines.append((arc, "-", 5, "thick arcs: nothing can be mounted"))
+        if limits is not None:
+            arcs = [(limits.max_weight[p], 0.0, 2 * np.pi, "--", 0.9, "dashed circles: largest weights")]
+            arcs += [
+                (largest, *arc, "-", 5, "thick arcs: nothing can be mounted") for arc in limits.forbidden[p]
+            ]
+            lines += [
+                (size * np.exp(1j * np.linspace(start, start + width, 181)), *look)
+                for size, start, width, *look in arcs
+                if np.isfinite(size)
+            ]
         for line, style, thick, words in lines:
             draw_line(polar, shown, line, style, lw=thick, color=of_plane(p)["color"], alpha=0.6)
             styles[words] = style, thick
     for words, (style, thick) in styles.items():
         polar.plot([], [], style, lw=thick, color=QUIET, label=words)
     # a region far larger than the weights would hide them: it may leave the picture
-    most = 4 * largest * labels.weight_scale or 1.0
-    complete(polar, shown, c.weights, f"Weights on the bare rotor, {labels.weight_in}", most)
+    from_zero(polar, shown, c.weights, 4 * largest * labels.weight_scale or 1.0)
     return polar
 
 
@@ -115,36 +119,37 @@ def amplitudes(
     With a check run (of several: the last) those before, predicted with what was mounted, and achieved. On a
     second one of the axes again, in the scale of what is left.
     """
-    labels, result, read = c.labels, mounted or c, c if check is None else check
-    values, covariance = [c.before, result.after], result.after_covariance
+    labels, result = c.labels, mounted or c
+    vectors = [c.before, result.after, np.full_like(c.before, np.nan)]
+    covariance, sensors, speeds = result.after_covariance, c.sensors, c.speeds
     if check is not None:
-        values = [check.before, check.predicted[-1], check.achieved[-1]]
-        covariance = check.covariance[-1]
-    before, after, *achieved = (np.abs(z).ravel() * labels.vibration_scale for z in values)
+        vectors = [check.before, check.predicted[-1], check.achieved[-1]]
+        covariance, sensors, speeds = check.covariance[-1], check.sensors, check.speeds
+    before, after, achieved = (np.abs(z).ravel() * labels.vibration_scale for z in vectors)
     within = reach(np.nan_to_num(covariance)).ravel() * labels.vibration_scale
-    label = f"predicted{', with 95 % of a check run' if within.any() else ''}"
-    S, C = values[0].shape
+    S, C = len(speeds), len(sensors)
     places = np.arange(S * C) + np.repeat(np.arange(S), C) * 0.8
-    beside = places - 0.17 * len(achieved)  # dots and stars hide each other otherwise
+    beside = places - 0.17 * (check is not None)  # dots and stars hide each other otherwise
     for ax in axes:
         ax.bar(places, before, color="0.86", edgecolor="0.5", label="before")
         ax.vlines(beside, (after - within).clip(min=0.0), after + within, color="black")
+        label = f"predicted{', with 95 % of a check run' if within.any() else ''}"
         ax.plot(beside, after, "o", color="black", ms=4.5, label=label)
-        for sizes in achieved:
-            ax.plot(places + 0.2, sizes, "*", color="black", ms=8, mec="white", label="achieved")
-        if check is None and c.limits is not None and np.isfinite(c.limits.residual).any():
+        if check is not None:
+            ax.plot(places + 0.2, achieved, "*", color="black", ms=8, mec="white", label="achieved")
+        elif c.limits is not None and np.isfinite(c.limits.residual).any():
             limit = c.limits.residual.ravel() * labels.vibration_scale
             ax.hlines(limit, places - 0.45, places + 0.45, color="black", lw=2.2, label="limit")
         plain(ax)
         ax.grid(visible=False, axis="x")
         ax.set(ylim=(0, None), ylabel=f"vibration{unit(labels)}")
     if len(axes) > 1:
-        left = max(np.max([after + within, *achieved]), INVISIBLE * before.max()) or 1.0
+        left = max(np.nanmax([*after + within, *achieved]), INVISIBLE * before.max()) or 1.0
         axes[1].set(ylim=(0, 1.08 * left), ylabel=f"what is left{unit(labels)}")
-    names = [cut(name, 24) for name in read.sensors] * S if S * C <= _NAMED else []
+    names = [cut(name, 24) for name in sensors] * S if S * C <= _NAMED else []
     axes[-1].set_xticks(places[: len(names)], names, rotation=90, fontsize=TEXT, parse_math=False)
-    every = -(-S // _SPEEDS)
-    numbers = [labels.speed_number(speed) for speed in read.speeds[::every]]
+    every = slice(None, None, -(-S // _SPEEDS))
     upper = axes[0].secondary_xaxis("top")
-    upper.set_xticks(places.reshape(S, C).mean(axis=1)[::every], numbers, fontsize=TEXT)
+    numbers = list(map(labels.speed_number, speeds[every]))
+    upper.set_xticks(places.reshape(S, C).mean(axis=1)[every], numbers, fontsize=TEXT)
     upper.set_xlabel(f"speed, {labels.speed_in}", fontsize=TEXT)

@@ -31,7 +31,7 @@ Shown = Callable[[ArrayLike], tuple[FloatArray, FloatArray]]
 """`Labels.weight` or `Labels.vibration`: size and angle in degrees as the job writes them."""
 
 
-def polar_axes(ax: Axes | None, sign: int) -> PolarAxes:
+def polar_axes(ax: Axes | None, sign: int, title: str) -> PolarAxes:
     """The axes, or those of a new figure: angles grow counter-clockwise where `sign` is +1.
 
     Raises
@@ -39,12 +39,16 @@ def polar_axes(ax: Axes | None, sign: int) -> PolarAxes:
     ValueError
         For axes that are not polar.
     """
+    from matplotlib.ticker import MaxNLocator
+
     ax = ax or new_figure(5, 5).add_subplot(projection="polar")
     if ax.name != "polar":
         raise ValueError("vectors are drawn in polar axes: make them with projection='polar'")
     polar = cast("PolarAxes", ax)
     polar.set_theta_direction(1 if sign > 0 else -1)
     polar.tick_params(labelsize=TEXT, pad=0)
+    polar.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
+    polar.set_title(title, fontsize="medium", pad=10)
     return polar
 
 
@@ -59,14 +63,17 @@ def of_plane(p: int) -> dict[str, Any]:
     return {"color": COLORS[p % len(COLORS)], "marker": MARKERS[p % len(MARKERS)]}
 
 
-def complete(polar: PolarAxes, shown: Shown, vectors: ArrayLike, title: str, most: float = np.inf) -> None:
-    """Radii from 0 (to `most` at most), their numbers away from the vectors, and a title."""
-    from matplotlib.ticker import MaxNLocator
-
+def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = np.inf) -> None:
+    """Radii from 0 (to `most` at most), their numbers away from the vectors."""
     polar.set_rlabel_position(float(shown(-np.sum(vectors))[1]))
-    polar.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
     polar.set_rlim(0, min(polar.get_rmax(), most), auto=True)
-    polar.set_title(title, fontsize="medium", pad=10)
+
+
+def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: Sequence[str]) -> None:
+    """Arrows with black edges from places of the horizontal axis, in the scale of the vertical one."""
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.009}
+    x = np.broadcast_to(at, tips.shape)
+    ax.quiver(x, 0 * x, tips.real, tips.imag, color=colors, edgecolor="black", linewidth=0.8, **look)
 
 
 def turning(labels: Labels) -> str:
@@ -112,7 +119,8 @@ def draw_readings(
         For axes that are not polar.
     """
     labels, shown, values = trials.labels, trials.labels.vibration, trials.mean[:, 0, 0]
-    polar = polar_axes(ax, labels.phase_sign)
+    where = f"{trials.sensors[0]} at {labels.speed_words(float(trials.speeds[0]))}{unit(labels)}"
+    polar = polar_axes(ax, labels.phase_sign, f"{where}\nphase as {labels.phase}")
     edges = region_edge(values, covariance[:, 0, 0], 121)
     for r, (run, size, phase) in enumerate(zip(trials.runs, *shown(values), strict=True)):
         name, look = f"{cut(run, 24)}: {figures(size)} at {phase:.0f}°", of_plane(r)
@@ -121,8 +129,7 @@ def draw_readings(
         if first is not None:
             change = [values[trials.runs.index(first)], values[r]]
             draw_line(polar, shown, change, ":", color=look["color"])
-    where = f"{trials.sensors[0]} at {labels.speed_words(float(trials.speeds[0]))}{unit(labels)}"
-    complete(polar, shown, values, f"{where}\nphase as {labels.phase}")
+    from_zero(polar, shown, values)
     polar.plot([], [], color=QUIET, label="closed lines: 95 % of one reading")
     legend_above(polar, 2, height=-0.08)
     return polar
@@ -151,11 +158,11 @@ def draw_trial_weight(t: TrialWeight, ax: Axes | None = None, k: int = 0) -> Axe
             "this trial weight has no angle to draw: give the phase of the initial reading and the lag"
         )
     labels, weight, look = t.labels, t.amount * np.exp(1j * t.angle), of_plane(k)
-    polar = polar_axes(ax, labels.angles_on_paper)
+    polar = polar_axes(ax, labels.angles_on_paper, f"Trial weight, {labels.weight_in}")
     draw_line(polar, labels.weight, [0, weight], lw=2, label=f"{t.plane}: {labels.weight_at(weight)}", **look)
     if t.angle_reach:
         arc = weight * np.exp(1j * np.linspace(-t.angle_reach, t.angle_reach, 91))
         name = f"the best angle is within ± {np.degrees(t.angle_reach):.0f}°"
         draw_line(polar, labels.weight, arc, color=look["color"], lw=4, alpha=0.4, label=name)
-    complete(polar, labels.weight, weight, f"Trial weight, {labels.weight_in}")
+    from_zero(polar, labels.weight, weight)
     return polar

@@ -33,7 +33,7 @@ _HOLES = (
 )
 _BELONGS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(_HOLES, ("holes",)),
-    **dict.fromkeys(("axial", "depth", "density", "tip_angle"), ("drill",)),
+    "density": ("drill",),
     "step": ("holes", ""),
     "angle_step": ("",),
 }
@@ -41,8 +41,6 @@ _BELONGS: dict[str, tuple[str, ...]] = {
 _APART = 1e-3
 """Degrees between holes that count as one."""
 _GOOD_ENOUGH = 20.0
-STEEL = 7850.0
-"""kg/m³."""
 
 
 @dataclass(frozen=True)
@@ -79,19 +77,13 @@ class SplitOptions:
     two : 20g,30g
         Angles of two fixed weights instead of holes.
     drill : DIAMETER
-        Drill material away opposite to VECTOR instead, such as 8mm.
+        Drill one radial hole opposite to VECTOR instead, such as 8mm.
     grind
         Grind it off opposite to VECTOR instead.
     radius : LENGTH
-        Where the masses stand; from where radial holes are drilled, or where axial ones are.
-    axial : --axial/--radial
-        Drill along the rotor's axis or towards it.
-    depth : LENGTH
-        Largest depth of the full diameter, such as 20mm.
+        Where the masses stand; the surface that is drilled.
     density : KG/M3
         Of the material drilled; default: 7850.
-    tip_angle : DEG
-        Of the drill; 180 for a flat one; default: 118.
     angles : WAY
         "with rotation" or "against rotation", of all angles.
     """
@@ -112,16 +104,13 @@ class SplitOptions:
     drill: Amount | None = None
     grind: bool = False
     radius: Amount | None = None
-    axial: bool = False
-    depth: Amount | None = None
     density: float | None = None
-    tip_angle: float | None = None
     angles: str = "with rotation"
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "mounted radius angles",
         "Holes": "holes pieces stock per_hole first_hole taken most_pieces good_enough",
         "Limits and steps": "max_mass step angle_step",
-        "Instead of holes": "two drill depth axial tip_angle density grind",
+        "Instead of holes": "two drill density grind",
     }
     to: ClassVar[Sequence[str]] = USUAL
 
@@ -134,7 +123,7 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
 
     Example: rotorid split 35g@120 --two 20g,30g
 
-    Example: rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
+    Example: rotorid split 3g@120 --drill 8mm --radius 100mm
 
     Parameters
     ----------
@@ -149,17 +138,17 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     ValueError
         For a weight or an option that cannot be, or that means nothing with the way that was chosen.
     """
-    from balancing.one_weight import combine, trim
+    from balancing.one_weight import Split, combine
 
     options = options or SplitOptions()
     labels, each = vectors(vector, options.angles)
     way = _way(options, single=len(each) == 1)
-    target = combine(each)
     if options.mounted is not None:
         other, there = vectors(options.mounted, options.angles, "--mounted")
         if labels.unbalances != other.unbalances:
             raise ValueError("--mounted: write it as VECTOR is written, both masses or both unbalances")
-        target = trim(target, there)
+        each = [*each, *(-weight for weight in there)]
+    target = combine(each)
     if target == 0 and way:
         raise ValueError("there is nothing to mount: the weight is 0")
     radius = None if options.radius is None else size(options.radius, "--radius")
@@ -171,11 +160,11 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
         "": _rounded,
     }[way]
     placed = how(_Wanted(target, labels, radius, options))
-    keys, answer = placed.to_dict(labels), placed.answer(labels)
-    rows = _rows(keys)
+    keys = placed.to_dict(labels)
+    rows, below = _rows(keys), placed.lines(labels) if isinstance(placed, Split) else []
     return Outcome(
         result=placed,
-        sentences=(answer.judgement, *answer.found.splitlines()),
+        sentences=(placed.sentence(labels), *below),
         tables=(),
         file=Table("weight", tuple(Column(name, [row[name] for row in rows]) for name in rows[0])),
         keys=keys,
@@ -245,9 +234,7 @@ def _at_two_angles(wanted: _Wanted) -> OneWeight:
 
 
 def _removed(wanted: _Wanted) -> OneWeight:
-    import numpy as np
-
-    from balancing.one_weight import TIP_ANGLE, Drill, drill_holes, grind
+    from balancing.one_weight import STEEL, drill, grind
 
     options, radius = wanted.options, wanted.radius
     if radius is None:
@@ -256,15 +243,8 @@ def _removed(wanted: _Wanted) -> OneWeight:
     unbalance = wanted.target * (1.0 if wanted.labels.unbalances else radius)
     if options.drill is None:
         return grind(unbalance, radius)
-    tool = Drill(
-        size(options.drill, "--drill", "8mm"),
-        radius,
-        STEEL if options.density is None else options.density,
-        "axial" if options.axial else "radial",
-        TIP_ANGLE if options.tip_angle is None else float(np.radians(options.tip_angle)),
-    )
-    depth = np.inf if options.depth is None else size(options.depth, "--depth", "20mm")
-    return drill_holes(unbalance, tool, max_depth=depth)
+    diameter = size(options.drill, "--drill", "8mm")
+    return drill(unbalance, radius, diameter, STEEL if options.density is None else options.density)
 
 
 def _rounded(wanted: _Wanted) -> OneWeight:
@@ -364,15 +344,10 @@ def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
             for k, solution in enumerate(found["solutions"], start=1)
             for angle, size in zip(solution["angles_deg"], found["masses"], strict=True)
         ]
-    if method == "drilling":
-        grams, depth = 1e3 * found["mass_of_one_kg"], 1e3 * found["depth_m"]
-        return [
-            {"hole": k, **hole, "mass_g": grams, "depth_mm": depth}
-            for k, hole in enumerate(found["holes"], start=1)
-        ]
-    if method == "grinding":
-        size, radius = 1e3 * found["mass_kg"], 1e3 * found["radius_m"]
-        return [{"angle_deg": found["angle_deg"], "mass_g": size, "radius_mm": radius}]
+    if method in ("drilling", "grinding"):
+        grams, radius = 1e3 * found["mass_kg"], 1e3 * found["radius_m"]
+        depth = {"depth_mm": 1e3 * found["depth_m"]} if method == "drilling" else {}
+        return [{"angle_deg": found["angle_deg"], "mass_g": grams, "radius_mm": radius, **depth}]
     return [{"angle_deg": found["weight"]["angle_deg"], mass: found["weight"]["mass"]}]
 
 
@@ -382,8 +357,6 @@ def _pieces(row: Mapping[str, Any]) -> str:
 
 def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:
     """A disc for each solution."""
-    import numpy as np
-
     from balancing.one_weight import Removal, Rounded, Split, TwoPositions
     from balancing.plots import weight_figure
 
@@ -394,10 +367,4 @@ def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:
     if isinstance(placed, Rounded):
         return weight_figure(labels, target, (placed.weight,) if placed.weight else ())
     assert isinstance(placed, Removal)
-    if placed.method == "grinding":
-        return weight_figure(labels, target, (target,), remove=True)
-    mass, depth = (1e3 * placed.values[key] for key in ("mass_of_one_kg", "depth_m"))
-    scale = placed.values["unbalance_of_one_kg_m"] / (1.0 if labels.unbalances else placed.radius)
-    holes = tuple(-scale * np.exp(1j * placed.angles))
-    words = [f"{mass:.4g} g\n{depth:.2f} mm deep"] * len(holes)
-    return weight_figure(labels, target, holes, remove=True, words=words)
+    return weight_figure(labels, target, (target,), remove=True)

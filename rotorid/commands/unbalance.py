@@ -26,7 +26,7 @@ def choices() -> dict[str, Sequence[Method[Any]]]:
 
 @dataclass(frozen=True)
 class UnbalanceOptions:
-    """Options of `unbalance`; `model_error` in percent.
+    """Options of `unbalance`.
 
     Attributes
     ----------
@@ -36,14 +36,11 @@ class UnbalanceOptions:
         How the unbalance follows from the readings.
     ridge : STRENGTH from 0
         For ridge; default: from the errors.
-    model_error : PERCENT from 0
-        Standard deviation of the coefficients.
     """
 
     stations: Nodes
     method: str = "minimum-norm"
     ridge: float | None = None
-    model_error: float | None = None
     panels: ClassVar[Mapping[str, str]] = {"Method": "method ridge"}
     to: ClassVar[Sequence[str]] = USUAL
 
@@ -51,6 +48,8 @@ class UnbalanceOptions:
 @command
 def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
     """Unbalance along a rotor model, from the readings of one run, without trial weights.
+
+    The model counts as exact: ± are those of the readings.
 
     Example: rotorid unbalance sample_data/model_job/job.toml --stations 6,12,19
 
@@ -78,6 +77,6 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
     places = {str(node): read.rotor.node(node) for node in asked}
     if len(set(places.values())) < len(asked):
         raise ValueError(f"--stations {options.stations!r}: every station may stand only once")
-    influence = computed(read, options.model_error or 0.0, places)
+    influence = computed(read, 0.0, places)
     result = unbalance_of_run(influence, read.trials, method=options.method, ridge=options.ridge)
     return Found(found=result, provenance=provenance(read.files, options))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from balancing.holes import SAME_ANGLE, Holes, equal_holes, from_list, mounting
+from balancing.holes import SAME_ANGLE, equal_holes, from_list, mounting
 
 
 def test_equal_holes_stand_within_one_turn():
@@ -31,7 +31,7 @@ def test_defaults_and_order():
     assert holes.mounted == pytest.approx(0.03)
     assert not holes.free_amounts
     assert from_list([0.0]).free_amounts
-    assert Holes(np.array([0.0, 1.0]), np.zeros(0)).taken.tolist() == [0, 0]
+    assert from_list([0.0, 1.0]).taken.tolist() == [0, 0]
 
 
 def test_largest_weight_counts_what_is_mounted():
@@ -53,34 +53,33 @@ def test_vector_of_a_mounting():
 @each_of(
     ("angles", "options", "message"),
     [
-        ([], {}, "no holes"),
+        ([], {}, "0 holes: there must be some"),
         ([0.0, 1.0, 0.0], {}, "holes 1 and 3 stand at the same angle"),
         ([0.0, 2 * np.pi], {"names": ["A", "B"]}, "holes A and B stand at the same angle"),
-        ([0.0, 13.0], {}, "hole 2 stands outside"),
-        ([-7.0], {}, "hole 1 stands outside"),
-        ([0.0, np.nan], {}, "angles of the holes must be finite numbers; number 2"),
-        ([[0.0]], {}, "plain list"),
-        ([0.0], {"pieces": [1.0, 0.0]}, "number 2 does not"),
+        ([0.0, 13.0], {}, "from −360° to 720°"),
+        ([-7.0], {}, "from −360° to 720°"),
+        ([0.0, np.nan], {}, "angles, pieces and weights must be finite"),
+        ([0.0], {"pieces": [1.0, 0.0]}, "more than 0"),
         ([0.0], {"pieces": [-1.0]}, "more than 0"),
-        ([0.0], {"pieces": [np.nan]}, "pieces must be finite"),
+        ([0.0], {"pieces": [np.nan]}, "must be finite"),
         ([0.0], {"pieces": [1.0, 1.0]}, "listed twice"),
         ([0.0], {"pieces": [1.0], "per_hole": 0}, "whole number ≥ 1"),
         ([0.0], {"pieces": [1.0], "per_hole": 1.5}, "whole number ≥ 1"),
         ([0.0], {"step": -0.1}, "smallest step"),
-        ([0.0], {"step": np.nan}, "smallest step"),
+        ([0.0], {"step": np.nan}, "finite"),
         ([0.0], {"pieces": [1.0], "step": 0.1}, "either pieces or a smallest step"),
-        ([0.0, 1.0], {"taken": [0.0]}, "for each of the 2 holes"),
-        ([0.0, 1.0], {"taken": [0.0, -1.0]}, "hole 2 is negative"),
+        ([0.0, 1.0], {"taken": [0.0]}, "2 holes: there must be"),
+        ([0.0, 1.0], {"taken": [0.0, -1.0]}, "must not be negative"),
         ([0.0], {"taken": [1.0]}, "mounted in every hole"),
-        ([0.0], {"stock": [1]}, "a stock needs pieces"),
+        ([0.0], {"stock": [1]}, "each of the 0 pieces"),
         ([0.0], {"pieces": [1.0, 2.0], "stock": [1]}, "for each of the 2 pieces"),
         ([0.0], {"pieces": [1.0], "stock": [-1]}, "whole numbers ≥ 0"),
         ([0.0], {"pieces": [1.0], "stock": [0.5]}, "whole numbers ≥ 0"),
         ([0.0], {"pieces": [1.0], "stock": [0]}, "the stock is empty"),
         ([0.0], {"max_weight": np.nan}, "largest weight"),
         ([0.0], {"max_weight": 0.0}, "largest weight of the plane is 0"),
-        ([0.0, 1.0], {"names": ["A"]}, "2 different names"),
-        ([0.0, 1.0], {"names": ["A", "A"]}, "2 different names"),
+        ([0.0, 1.0], {"names": ["A"]}, "with a name of its own"),
+        ([0.0, 1.0], {"names": ["A", "A"]}, "with a name of its own"),
     ],
 )
 def test_messages(angles, options, message):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balancing.holes import equal_holes, from_list, lightest
-from balancing.pieces import HEAVIER, PlaneVectors, fewest, solve_discrete
+from balancing.pieces import HEAVIER, PlaneVectors, solve_discrete
 from balancing.trials import Limits
 
 METHODS = ("least-squares", "minmax")
@@ -108,7 +108,7 @@ def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
     def enough(weights):
         return objectives(method, W, Y, w, weights[None])[0] <= level
 
-    found = fewest(W, Y, planes, enough, wanted=wanted, method=method, row_weights=w)
+    found = solve_discrete(W, Y, planes, enough, wanted=wanted, method=method, row_weights=w)
     pieces = number[size <= level].min()
     assert found.enough
     assert (found.pieces, found.objective) == (pieces, pytest.approx(size[number <= pieces].min(), rel=1e-8))
@@ -118,7 +118,7 @@ def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
     for one in found.fewer:  # the best of so many, each better than the one before
         assert one.objective == pytest.approx(size[number <= one.pieces].min(), rel=1e-8)
         assert not enough(one.weights)
-    never = fewest(W, Y, planes, lambda _: False, wanted=wanted, method=method, row_weights=w)
+    never = solve_discrete(W, Y, planes, lambda _: False, wanted=wanted, method=method, row_weights=w)
     assert not never.enough
     assert never.objective <= 1.2 * size.min() * (1 + 1e-9)
 
@@ -198,7 +198,7 @@ def three_planes():
 @pytest.mark.parametrize("method", METHODS)
 def test_three_planes_of_24_holes(method):
     W, Y, planes = three_planes()
-    found = fewest(W, Y, planes, lambda _: False, method=method)
+    found = solve_discrete(W, Y, planes, lambda _: False, method=method)
     seven = [one for one in (*found.fewer, found) if one.pieces <= 7][-1]
     assert seven.objective == pytest.approx(BEST[method], rel=0.02)
     for one in (*found.fewer, found):
@@ -226,9 +226,9 @@ def test_two_pieces_may_always_weigh_more():
     """A weight below the lightest piece: two that act against each other, but not three."""
     W, Y = np.eye(1), np.array([-0.3 + 0j])
     holes = from_list(equal_holes(24), [1.0])
-    found = fewest(W, Y, [holes], lambda d: abs(d[0] - 0.3) < 0.06)
+    found = solve_discrete(W, Y, [holes], lambda d: abs(d[0] - 0.3) < 0.06)
     assert (found.pieces, found.enough) == (2, True)
-    finer = fewest(W, Y, [holes], lambda d: abs(d[0] - 0.3) < 1e-3)
+    finer = solve_discrete(W, Y, [holes], lambda d: abs(d[0] - 0.3) < 1e-3)
     assert finer.pieces <= 2
     assert not finer.enough
 
@@ -251,12 +251,12 @@ def test_forbidden_arcs_and_largest_weights():
 def test_many_holes_at_odd_angles_are_answered_within_seconds():
     angles = np.sort(np.random.default_rng(5).uniform(0, 2 * np.pi, 40))
     holes = from_list(angles[:28], [0.01, 0.02, 0.03], stock=[9, 9, 9])
-    plane = PlaneVectors(holes, holes.free, np.inf, 0.05j)
+    plane = PlaneVectors(holes, 0.05j, most=np.inf)
     near = plane.near(0.05j, 1)
     assert abs(near.d[0] - 0.05j) < 2e-3 * 0.05
     scarce = from_list(equal_holes(36), [1.5, 7.5], stock=[8, 2])
     z = complex([42.63, -9.0, -6.0] @ np.exp(1j * np.radians([20.0, 292.0, 200.0])))
-    far = PlaneVectors(scarce, scarce.free, np.inf, z).near(z, 1)
+    far = PlaneVectors(scarce, z, most=np.inf).near(z, 1)
     assert abs(far.d[0] - z) < 24.3  # all ten pieces, side by side
 
 
@@ -270,7 +270,7 @@ def test_no_pieces_where_nothing_vibrates(method):
 
 def test_planes_that_act_alike_are_answered():
     W, Y = np.array([[1.0, 1.0], [2.0, 2.0]]), np.array([-1.0, -2.0])
-    found = fewest(W, Y, [from_list(equal_holes(6), [0.5, 1.0])] * 2, lambda _: False)
+    found = solve_discrete(W, Y, [from_list(equal_holes(6), [0.5, 1.0])] * 2, lambda _: False)
     assert found.objective == pytest.approx(0, abs=1e-9)
 
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from balancing_data import complex_normal, stored
+from balancing_data import complex_normal
 from cases import each_of
 from exact_solutions import exactly
 from fem_rotors import rotor23
@@ -39,6 +39,13 @@ def readings(rotor, U, speeds):
     return np.array([response.at(node) for node in SENSORS.values()]).T.ravel()
 
 
+def drawn(covariance, n=400):
+    """Errors of readings (n, N) with covariances (N, 2, 2)."""
+    z = np.random.default_rng(0).standard_normal((n, len(covariance), 2))
+    e = np.einsum("nij,dnj->dni", np.linalg.cholesky(covariance), z)
+    return e[..., 0] + 1j * e[..., 1]
+
+
 def coefficients(rotor, planes, speeds):
     return model_influence(rotor, planes, SENSORS, speeds).W.reshape(-1, len(planes))
 
@@ -49,7 +56,6 @@ def test_three_stations_are_recovered_exactly(rotor):
     Y = readings(rotor, dict(zip(THREE.values(), U, strict=True)), speeds)
     found = estimate_unbalance(coefficients(rotor, THREE, speeds), Y, names=list(THREE))
     np.testing.assert_allclose(found.unbalance, U, rtol=1e-5)
-    np.testing.assert_array_equal(found.corrections, -found.unbalance)
     assert (found.method, found.rank, found.warnings) == ("least-squares", 3, ())
     assert found.determined.all()
     assert found.words() == "the readings determine all 3 stations"
@@ -84,13 +90,13 @@ def test_words_say_which_station_is_determined():
     np.testing.assert_allclose(found.own_share, [1, 0.5, 0.5], rtol=1e-14)
     assert found.words() == (
         "the readings determine 2 of 3 independent combinations of the stations; determined: A; "
-        "not determined: B (50 % its own, mixed with C), C (50 % its own, mixed with B)"
+        "not determined: B (mixed most with C) and C (mixed most with B)"
     )
 
 
 def test_std_only_where_the_station_is_determined():
     covariance = np.tile(np.diag([0.04, 0.04]), (2, 1, 1))
-    found = estimate_unbalance([[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6.0], covariance=covariance)
+    found = estimate_unbalance([[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6.0], errors=drawn(covariance))
     np.testing.assert_allclose(found.std, [0.1, np.nan, np.nan], rtol=0.1)
 
 
@@ -99,17 +105,17 @@ def test_covariance_is_that_of_drawn_readings():
     rng = np.random.default_rng(4)
     W, U = complex_normal(rng, (8, 3)), np.array([1.0, 2j, -1.5])
     Y = W @ U
-    errors = ReadingErrors(0.01, 0.04)
-    covariance = reading_covariance(Y, errors)
-    found = estimate_unbalance(W, Y, covariance=covariance)
+    covariance = reading_covariance(Y, ReadingErrors(0.01, 0.04))
+    errors = drawn(covariance, 4000)
+    found = estimate_unbalance(W, Y, errors=errors)
     root = np.linalg.cholesky(covariance)
-    drawn = []
+    again = []
     for _ in range(4000):
         noise = np.einsum("nij,nj->ni", root, rng.standard_normal((8, 2)))
-        each = estimate_unbalance(W, Y + noise[:, 0] + 1j * noise[:, 1], covariance=covariance)
-        drawn.append(each.unbalance.view(float))
+        each = estimate_unbalance(W, Y + noise[:, 0] + 1j * noise[:, 1], errors=errors)
+        again.append(each.unbalance.view(float))
     scale = np.sqrt(np.diag(found.covariance))
-    spread = np.cov(np.array(drawn).T)
+    spread = np.cov(np.array(again).T)
     np.testing.assert_allclose(
         spread / np.outer(scale, scale), found.covariance / np.outer(scale, scale), atol=0.15
     )
@@ -128,7 +134,7 @@ def test_ridge_is_nearer_to_a_smooth_unbalance_than_the_smallest_one(rotor):
     sigma = 0.02 * np.median(np.abs(W @ U))
     Y = W @ U + sigma * complex_normal(rng, len(W))
     covariance = np.tile(sigma**2 * np.eye(2), (len(W), 1, 1))
-    found = estimate_unbalance(W, Y, method="ridge", covariance=covariance)
+    found = estimate_unbalance(W, Y, method="ridge", errors=drawn(covariance))
     plain = estimate_unbalance(W, Y)
     assert np.linalg.norm(found.unbalance - U) < 0.01 * np.linalg.norm(plain.unbalance - U)
     assert any("use the method" in words for words in plain.warnings)
@@ -150,7 +156,7 @@ def test_ridge_that_is_given():
 def test_readings_within_their_errors_show_no_unbalance():
     covariance = np.tile(np.eye(2), (4, 1, 1))
     found = estimate_unbalance(
-        np.diag([1.0, 2, 3, 4]), [0.1, 0.1j, 0.1, 0], method="ridge", covariance=covariance
+        np.diag([1.0, 2, 3, 4]), [0.1, 0.1j, 0.1, 0], method="ridge", errors=drawn(covariance)
     )
     assert np.abs(found.unbalance).max() < 1e-9
     assert found.warnings == ("the readings lie within their errors: they show no unbalance at all",)
@@ -160,16 +166,16 @@ def test_readings_within_their_errors_show_no_unbalance():
 def test_readings_that_no_unbalance_here_explains(method):
     W, Y = np.array([[1.0], [1.0], [1.0]]), np.array([1.0, 2.0, 3.0])
     covariance = np.tile(0.01 * np.eye(2), (3, 1, 1))
-    found = estimate_unbalance(W, Y, method=method, covariance=covariance)
+    found = estimate_unbalance(W, Y, method=method, errors=drawn(covariance))
     [words] = found.warnings
     assert words.endswith("unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons")
-    assert estimate_unbalance(W, 2 * W[:, 0], covariance=covariance).warnings == ()
+    assert estimate_unbalance(W, 2 * W[:, 0], errors=drawn(covariance)).warnings == ()
 
 
 def test_rows_count_by_their_errors():
     covariance = np.array([np.eye(2), 4 * np.eye(2)])
-    found = estimate_unbalance([[1.0], [1.0]], [1.0, 2.0], covariance=covariance)
-    assert found.unbalance[0] == pytest.approx((1.0 + 2.0 / 4) / (1 + 1 / 4), rel=1e-12)
+    found = estimate_unbalance([[1.0], [1.0]], [1.0, 2.0], errors=drawn(covariance))
+    assert found.unbalance[0] == pytest.approx((1.0 + 2.0 / 4) / (1 + 1 / 4), rel=0.05)
     assert found.std[0] == pytest.approx(1 / np.sqrt(1 + 1 / 4), rel=0.1)
 
 
@@ -177,7 +183,7 @@ def test_result_in_the_labels_units():
     labels = Labels(weight_unit="g_mm", weight_scale=1e6, angles="against rotation")
     covariance = np.tile(1e-12 * np.eye(2), (2, 1, 1))
     found = estimate_unbalance(
-        np.eye(2), [1e-3, 2e-3j], names=["DE", "NDE"], covariance=covariance, labels=labels
+        np.eye(2), [1e-3, 2e-3j], names=["DE", "NDE"], errors=drawn(covariance), labels=labels
     )
     data = found.to_dict()
     assert [row["unbalance"] for row in data["stations"]] == pytest.approx([1000.0, 2000.0])
@@ -196,7 +202,11 @@ def test_picture():
     covariance = np.tile(np.diag([0.04, 0.04]), (2, 1, 1))
     labels = Labels(weight_unit="g_mm", weight_scale=1e6)
     found = estimate_unbalance(
-        [[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6j], names=["A", "B", "C"], covariance=covariance, labels=labels
+        [[2.0, 0, 0], [0, 3.0, 3.0]],
+        [2.0, 6j],
+        names=["A", "B", "C"],
+        errors=drawn(covariance),
+        labels=labels,
     )
     ax = plot(found)
     arrows = ax.collections[0]
@@ -222,7 +232,7 @@ def test_from_a_run_with_a_weight_mounted(rotor):
     run = Trials(("now",), speeds, tuple(SENSORS), ("a",), Y, [[mounted]], errors, Labels("um", 1e6))
     found, weights = unbalance_of_run(model, run), correct(model, run)
     np.testing.assert_allclose(found.unbalance, list(U.values()), rtol=1e-4)
-    np.testing.assert_allclose(found.corrections, weights.weights, rtol=1e-4)
+    np.testing.assert_allclose(found.unbalance, -weights.weights, rtol=1e-4)
     assert found.stations == ("a", "b", "c")
     assert (found.labels.vibration_unit, found.labels.weight_unit) == ("um", "kg_m")
     assert (found.std > 0).all()
@@ -232,33 +242,16 @@ def test_from_a_run_with_a_weight_mounted(rotor):
     assert bare.unbalance[0] == pytest.approx(2e-3 + mounted, rel=0.01)
 
 
-def test_errors_of_coefficients_count_by_the_unbalance():
-    rng = np.random.default_rng(4)
-    W, U, n = complex_normal(rng, (1, 12, 3)), np.array([1.0, 2j, -1.5]), 60
-    sizes, warned = [], 0
-    for _ in range(n):
-        model = stored(W + 0.1 * np.abs(W) * complex_normal(rng, W.shape), relative=0.1)
-        read = W @ U * (1 + 0.01 * complex_normal(rng, (1, 12)))
-        run = Trials(
-            ("now",), model.speeds, model.sensors, (), read[None], np.zeros((1, 0)), ReadingErrors(0.01, 0.01)
-        )
-        found = unbalance_of_run(model, run)
-        sizes.append(found.chi_square)
-        warned += bool(found.warnings)
-    assert np.mean(sizes) == pytest.approx(2 * (12 - 3), rel=0.25)
-    assert warned < 5
-
-
 BAD = [
-    ({"W": [[1.0, np.nan]]}, ValueError, "must be finite; found NaN"),
+    ({"W": [[1.0, np.nan]]}, ValueError, "must be finite"),
     ({"Y": [np.inf]}, ValueError, "must be finite"),
     ({"Y": [1.0, 2.0]}, ValueError, r"coefficients \(N, Q\) and readings \(N,\)"),
     ({"W": [[0.0, 0.0]]}, UndeterminedError, "no station has an effect on any reading"),
     ({"method": "best"}, ValueError, "minimum-norm"),
-    ({"ridge": 0.1}, ValueError, "an option of the method"),
-    ({"method": "ridge", "ridge": 0.0}, ValueError, "ridge must be a finite number > 0"),
-    ({"covariance": np.eye(2)}, ValueError, "covariance of the readings must be finite"),
-    ({"covariance": np.zeros((1, 2, 2))}, ValueError, "not all zero"),
+    ({"ridge": 0.1}, ValueError, "no other method has one"),
+    ({"method": "ridge", "ridge": 0.0}, ValueError, "ridge > 0"),
+    ({"errors": np.eye(2)}, ValueError, "1 errors of each draw"),
+    ({"method": "ridge", "errors": np.zeros((9, 1))}, ValueError, "or errors of the readings"),
     ({"names": ["A"]}, ValueError, "2 names of stations"),
 ]
 

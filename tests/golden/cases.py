@@ -195,7 +195,7 @@ balance-no-plane            balance {TURBO}/job.toml --planes left,midle
 balance-ending              balance {TURBO}/job.toml --output corrections.txt
 balance-undetermined        balance {TURBO}/runs.csv alike.csv --amplitude-error 2 --phase-error 2
 unbalance-model-job         unbalance {MODEL_JOB} --stations 6,9,12,15,18
-unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2 --output u.csv --plot u.png --verbose
+unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --output u.csv --plot u.png --verbose
 unbalance-ridge             unbalance {MODEL_JOB} --stations 6,9,12,15,18 --method ridge
 unbalance-ridge-stated      unbalance {MODEL_JOB} --stations 6,12,18 --method ridge --ridge 0.1
 unbalance-no-rotor          unbalance {TURBO}/job.toml --stations 6,12
@@ -206,8 +206,7 @@ split-free                  split 35g@120 --holes 12 --first-hole 10 --step 0.5g
 split-two                   split 35g@120 --two 20g,30g
 split-sum                   split 35g@120+5g@200 --mounted 10g@30+20g@200 --holes 24
 split-scale                 split 35g@121.3 --step 0.5g --angle-step 15
-split-drill                 split 35g@120 --drill 8mm --depth 20mm --radius 100mm
-split-drill-axial           split 35g@120 --drill 8mm --depth 10mm --radius 100mm --axial --density 7800 --tip-angle 180
+split-drill                 split 3g@120 --drill 8mm --radius 100mm
 split-grind                 split 3500g_mm@120 --grind --radius 100mm
 split-wrong                 split 35g120 --holes 24
 tolerance                   tolerance --mass 500kg --speed 3000rpm --grade G2.5

@@ -166,10 +166,7 @@ OPTIONS = {
         "--speeds": SPEEDS,
     },
     ("tolerance", "--mass", "500kg", "--grade", "G2.5"): {"--speed": (*SPEEDS, "1e-300rpm", "1e-9")},
-    ("split", "35g@120", "--drill", "8mm", "--radius", "100mm"): {
-        "--spacing": (*EXTREME, "1e-308", "1e-30"),
-        "--tip-angle": (*EXTREME, "1e-30"),
-    },
+    ("split", "3g@120", "--drill", "8mm", "--radius", "100mm"): {"--density": (*EXTREME, "1e-308", "1e-30")},
     ("trial-weight", "--rotor-mass", "500kg", "--radius", "200mm", "--speed", "3000rpm"): {
         "--fraction": EXTREME,
         "--damping": EXTREME,

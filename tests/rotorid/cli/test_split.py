@@ -78,26 +78,23 @@ def test_two_weights_at_free_angles(run, tmp_path):
     )
 
 
-@pytest.mark.parametrize("way", ["--radial", "--axial"])
-def test_drilling_takes_away_opposite(run, way, tmp_path):
-    args = ("35g@120", "--drill", "8mm", "--depth", "12mm", "--radius", "100mm", "--density", "7800", way)
+def test_drilling_takes_away_opposite(run, tmp_path):
+    args = ("3g@120", "--drill", "8mm", "--radius", "100mm", "--density", "7800")
     document = run(*args, "--json").json
-    assert document["way"] == way[2:]
-    assert document["depth_m"] <= 0.012
-    taken = [{"mass": 1e6 * document["unbalance_of_one_kg_m"], **hole} for hole in document["holes"]]
-    assert vector(taken) == pytest.approx(3500 * np.exp(1j * np.radians(300)), rel=1e-9)
+    assert document["target"] == {"mass": pytest.approx(3), "angle_deg": pytest.approx(120)}
+    assert document["angle_deg"] == pytest.approx(300)
     outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.xlsx")
     assert outcome.code == 0, outcome.err
     # what the drill takes, a cylinder and the cone of its tip, 118° wide
-    cone = 0.004 / np.tan(np.radians(59))
-    assert document["tip_depth_m"] - document["depth_m"] == pytest.approx(cone, rel=1e-9)
-    mass = 7800 * np.pi * 0.004**2 * (document["depth_m"] + cone / 3)
-    assert document["mass_of_one_kg"] == pytest.approx(mass, rel=1e-9)
-    table = pd.read_excel(tmp_path / "t.xlsx")
-    assert table["hole"].tolist() == [k + 1 for k in range(len(document["holes"]))]
-    assert table["angle_deg"].tolist() == pytest.approx([hole["angle_deg"] for hole in document["holes"]])
-    assert table["mass_g"].to_numpy() == pytest.approx(1e3 * mass, rel=1e-9)
-    assert table["depth_mm"].to_numpy() == pytest.approx(1e3 * document["depth_m"])
+    cone, depth = 0.004 / np.tan(np.radians(59)), document["depth_m"]
+    assert document["tip_depth_m"] - depth == pytest.approx(cone, rel=1e-9)
+    area = 7800 * np.pi * 0.004**2
+    assert document["mass_kg"] == pytest.approx(area * (depth + cone / 3), rel=1e-9)
+    moment = area * (depth * (0.1 - depth / 2) + cone / 3 * (0.1 - depth - cone / 4))
+    assert moment == pytest.approx(0.003 * 0.1, rel=1e-9)
+    (row,) = pd.read_excel(tmp_path / "t.xlsx").to_dict("records")
+    grams, depth_mm = 1e3 * document["mass_kg"], 1e3 * depth
+    assert row == pytest.approx({"angle_deg": 300, "mass_g": grams, "radius_mm": 100, "depth_mm": depth_mm})
 
 
 def test_combining_trimming_and_rounding(run):
@@ -151,7 +148,7 @@ def test_combining_trimming_and_rounding(run):
         ("35g@120 --drill 8mm --radius 0mm", "expected a value above 0"),
         ("35g@120 --drill 8mm", "--drill needs --radius"),
         ("35g@120 --drill 8 --radius 100mm", "--drill '8': a number with its unit (m, mm, um, mil, in)"),
-        ("35g@120 --drill 8mm --radius 100mm --depth 1mm", "use a larger drill or depth"),
+        ("35g@120 --drill 8mm --radius 100mm", "use a larger drill, or share the weight (--holes)"),
         ("35g@120 --two 2g", "give two weights"),
         ("35g@120 --mounted 3g_mm@0", "both masses or both unbalances"),
         ("35g@120 --step 1g --angle-step 400", "no step of an angle"),

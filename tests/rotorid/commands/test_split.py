@@ -38,8 +38,8 @@ def test_arrays_are_lists():
         ("--holes 0,40,75,200 --step 0.5g", SplitOptions(holes=[0, 40, 75, 200], step=5e-4)),
         ("--two 20g,30g --angles againstrotation", SplitOptions(two=[0.02, 0.03], angles="against rotation")),
         (
-            "--drill 8mm --depth 12mm --radius 100mm --density 7800 --axial --tip-angle 90",
-            SplitOptions(drill=0.008, depth=0.012, radius=0.1, density=7800, axial=True, tip_angle=90),
+            "--drill 16mm --radius 100mm --density 7800",
+            SplitOptions(drill=0.016, radius=0.1, density=7800),
         ),
         ("--grind --radius 100mm", SplitOptions(grind=True, radius=0.1)),
         ("--mounted 10g@0 --angle-step 5", SplitOptions(mounted=0.01, angle_step=5)),

@@ -14,8 +14,8 @@ JOB = sample_data() / "model_job" / "job.toml"
     [
         ((), {}),
         (
-            ("--method", "ridge", "--ridge", "0.1", "--model-error", "5"),
-            {"method": "ridge", "ridge": 0.1, "model_error": 5},
+            ("--method", "ridge", "--ridge", "0.1"),
+            {"method": "ridge", "ridge": 0.1},
         ),
     ],
 )
