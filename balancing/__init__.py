@@ -8,22 +8,36 @@ and counts for the coefficients (`refine`).
 from __future__ import annotations
 
 from balancing.check_run import CheckComparison, compare_check, mounted_in, refine, with_check_runs
-from balancing.computed import combine, model_influence, update, with_parameters
-from balancing.conditioning import Conditioning, UndeterminedError, check_runs, clear_change, conditioning
+from balancing.computed import combine, model_influence, with_parameters
+from balancing.conditioning import (
+    Conditioning,
+    UndeterminedError,
+    chance,
+    check_runs,
+    clear_change,
+    conditioning,
+)
 from balancing.convention_test import ConventionTest, convention_test
 from balancing.conventions import Labels
 from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.holes import Holes, equal_holes, from_list
-from balancing.influence import Influence, change_of_run, estimate_influence, match_speeds
+from balancing.influence import (
+    Influence,
+    Remarks,
+    change_of_run,
+    estimate_influence,
+    local_runs,
+    match_speeds,
+)
 from balancing.iso21940 import Tolerance, tolerance
 from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian, white_rows
 from balancing.pieces import Discrete, solve_discrete
 from balancing.planes import Subsets, best_subsets, compare_planes
-from balancing.regions import Region, region_edge
+from balancing.regions import Region, real_parts, region_edge
 from balancing.trial_weight import (
     Lag,
     TrialWeight,
@@ -58,6 +72,7 @@ __all__ = [
     "Reading",
     "ReadingErrors",
     "Region",
+    "Remarks",
     "RunErrors",
     "RunScatter",
     "Solution",
@@ -70,6 +85,7 @@ __all__ = [
     "Verdict",
     "after_check_run",
     "best_subsets",
+    "chance",
     "change_of_run",
     "check_runs",
     "clear_change",
@@ -84,12 +100,14 @@ __all__ = [
     "estimate_unbalance",
     "expected_lag",
     "from_list",
+    "local_runs",
     "match_speeds",
     "model_influence",
     "mount",
     "mounted_in",
     "plane_load",
     "reading_of",
+    "real_parts",
     "refine",
     "region_edge",
     "solve",
@@ -98,7 +116,6 @@ __all__ = [
     "trial_from_coefficients",
     "trial_from_force",
     "unbalance_of_run",
-    "update",
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",

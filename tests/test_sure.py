@@ -19,11 +19,10 @@ from balancing import (
     UndeterminedError,
     correct,
     estimate_influence,
-    update,
 )
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
-from rotorid.fleet import fit_type
+from rotorid.fleet import fit_type, update
 from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import experiments
 from rotorid.regression import stretch

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Influence, Trials, update, with_check_runs
+from balancing import Influence, Trials, with_check_runs
 from rotorid.base.text import counted
 from rotorid.commands.outcome import hash_of
 from rotorid.commands.type_records import Grid, KnownType, known_type
-from rotorid.fleet import MachineRecord
+from rotorid.fleet import MachineRecord, update
 
 if TYPE_CHECKING:
     from balancing import Correction

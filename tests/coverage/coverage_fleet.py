@@ -23,11 +23,10 @@ from balancing import (
     Trials,
     UndeterminedError,
     correct,
-    update,
 )
 from balancing.regions import NORMAL_RADIUS
 from rotorid.commands.type_coefficients import LEVEL
-from rotorid.fleet import MachineRecord, MachineType, fit_type
+from rotorid.fleet import MachineRecord, MachineType, fit_type, update
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]
