@@ -7,7 +7,7 @@ and counts for the coefficients (`refine`).
 
 from __future__ import annotations
 
-from balancing.check_run import CheckComparison, compare_check, mounted_in, refine, with_check_runs
+from balancing.check_run import CheckComparison, compare_check, refine, with_check_runs
 from balancing.computed import combine, model_influence, update, with_parameters
 from balancing.conditioning import Conditioning, UndeterminedError, check_runs, clear_change, conditioning
 from balancing.convention_test import ConventionTest, convention_test
@@ -89,7 +89,6 @@ __all__ = [
     "from_list",
     "model_influence",
     "mount",
-    "mounted_in",
     "plane_load",
     "reading_of",
     "refine",

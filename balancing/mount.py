@@ -1,9 +1,9 @@
 """Pieces in holes that make a correction: chosen for all planes together, the fewest that are enough.
 
-A set of pieces is enough where every reading's 95 % bound in a check run is within its limit; without
-limits, where the bound of the root mean square is at most 1.2 times that of the exact weights, or the root
-mean square a fifth of the present vibration. Errors of a check run with pieces are those with the exact
-weights.
+A set of pieces is enough where every reading passes its limit in a check run (`balancing.verdict`: all of its
+95 % region is within); without limits, where the bound of the root mean square of a check run is at most the
+larger of 1.2 times that of the exact weights and a fifth of the present vibration. Errors of a check run with
+pieces are those with the exact weights.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from balancing.tables import (
     weight_columns,
 )
 from balancing.trials import Trials
+from balancing.verdict import largest
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -41,8 +42,6 @@ if TYPE_CHECKING:
 
 _ANY = "any"
 """Hole of a plane that takes any weight at any angle."""
-AGAINST = 3.0
-"""Pieces that weigh more than this times what they make are said to act against each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +72,9 @@ class Mounted(Answered):
     on_top_of: str | None = None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Planes in which pieces act mostly against each other, for a gain that may be nothing."""
-        labels, words = self.correction.labels, []
-        for plane, chosen in zip(self.correction.planes, self.discrete.mountings, strict=True):
-            if chosen is None:
-                continue
-            total, made = float(chosen.amounts.sum()), abs(chosen.vector)
-            if total > AGAINST * made:
-                words.append(
-                    f"plane {plane}: pieces of {labels.weight_words(total)} together make "
-                    f"{labels.weight_words(made)}, they act against each other: state a "
-                    "stock, or fewer pieces per hole, if fewer would do"
-                )
-        return tuple(words)
+    def check_rms(self) -> float:
+        """Root mean square below which 95 of 100 check runs stay; NaN where errors are unknown."""
+        return _check_rms(self.correction, self.after)
 
     @property
     def weights(self) -> ComplexArray:
@@ -109,7 +97,7 @@ class Mounted(Answered):
             {
                 "planes": rows((*weight_columns(labels, c.planes, self.weights), actions)),
                 "on_top_of": self.on_top_of,
-                "warnings": self.warnings,
+                "warnings": [],
                 "holes": rows(_columns(self)),
                 "residuals": rows(residuals),
                 "rms_after": rms(after),
@@ -154,7 +142,6 @@ class Mounted(Answered):
         return Answer(
             f"{first} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),
-            self.warnings,
             tables=(f"Hole by hole:\n{text(columns, left=2)}",) if used else (),
             more="hole by hole",
         )
@@ -254,19 +241,24 @@ def mount(
     return Mounted(c, tuple(each.values()), discrete, after, c.after_covariance, run)
 
 
+def _check_rms(c: Correction, left: ComplexArray) -> float:
+    """Root mean square that 95 of 100 check runs stay below around a prediction (S, C); NaN: not known."""
+    return float(np.sqrt(max(rms(left) ** 2 + c.check_rms**2 - rms(c.after) ** 2, 0.0)))
+
+
 def _enough(c: Correction, Y: ComplexArray) -> Callable[[ComplexArray], bool]:
     """Whether weights D (P,), added to what reads Y, leave little enough."""
-    W = c.influence.W
-    more = c.check_rms**2 - rms(c.after) ** 2 if c.errors_known else 0.0
-    bound, little = FEW * np.hypot(rms(c.after), np.sqrt(max(more, 0.0))), LITTLE * rms(Y)
-    limits = None if c.limits is None else c.limits.residual
-    within = np.nan_to_num(c.within) / c.labels.vibration_scale
+    limits = np.full(Y.shape, np.inf) if c.limits is None else c.limits.residual
+    limited = np.isfinite(limits)
+    covariance = np.nan_to_num(c.after_covariance)[limited]
+    best = c.check_rms if c.errors_known else rms(c.after)
 
     def enough(D: ComplexArray) -> bool:
-        left = np.abs(Y + W @ D)
-        if limits is not None and np.isfinite(limits).any():
-            return bool((left + within <= limits).all())
-        return bool(rms(left) <= little or np.sqrt(max(rms(left) ** 2 + more, 0.0)) <= bound)
+        left = Y + c.influence.W @ D
+        if limited.any():
+            return bool((largest(left[limited], covariance) <= limits[limited]).all())
+        bound = _check_rms(c, left) if c.errors_known else rms(left)
+        return bool(bound <= max(FEW * best, LITTLE * rms(Y)))
 
     return enough
 

@@ -26,6 +26,8 @@ from rotorid.base.text import capital, figures, listing
 WORTH = 0.9
 """Of the vibration in the check run: what a trim has to stay below."""
 
+Word = Literal["done", "trim", "take off what is mounted", "add nothing yet"]
+
 
 @dataclass(frozen=True, eq=False)
 class LeftToDo(Answered):
@@ -45,7 +47,7 @@ class LeftToDo(Answered):
         The trim as pieces in holes; None: at any angle.
     """
 
-    word: Literal["done", "trim", "take off what is mounted", "add nothing yet"]
+    word: Word
     why: str
     correction: Correction
     run: str
@@ -122,35 +124,34 @@ def after_check_run(
     run, planes, there = c.mounted
     pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
     now, before = rms(check.mean[-1]), rms(c.before[pick])
-    after = c.after[pick] if pieces is None else pieces.after[pick]
-    bound = c.check_rms if pieces is None and c.errors_known else None
-    left = rms(after) if bound is None or judged == "fail" else bound
-    change = f"rms {three_figures(now * scale)} → {small(rms(after) * scale, now * scale)} {unit}".rstrip()
+    trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
+    after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
+    change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
     change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
-
-    def end(
-        word: Literal["done", "trim", "take off what is mounted", "add nothing yet"], why: str
-    ) -> LeftToDo:
-        trim = c.to_add if pieces is None else _in_planes(pieces, planes)
-        return LeftToDo(word, why, c, run, planes, there, trim if word == "trim" else 0 * trim, pieces)
-
+    left = after if bound is None or judged == "fail" else bound
+    worth = trim.any() and left < WORTH * now
+    again = c.decision.cause if c.decision.word == "measure again" else ""
+    blocked = stop or "; ".join(c.contradictions) or again
+    settled = not blocked and judged != "fail" and explained is not False
+    word: Word = "add nothing yet"
+    why = (
+        f"{'a trim' if pieces is None else 'pieces beside these'} would not make it clearly better ({change})"
+    )
     if judged == "pass":
-        return end("done", "every limit is kept")
-    if now >= before and explained is not True and there.any():
+        word, why = "done", "every limit is kept"
+    elif now >= before and explained is not True and there.any():
+        word = "take off what is mounted"
         why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
-        return end("take off what is mounted", f"{why}; {stop or 'check what was mounted, and where'}")
-    open_ = stop or c.contradictions or c.decision.word == "measure again"
-    if not open_ and judged != "fail" and explained is not False and _within_its_error(c):
-        return end("done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})")
-    if stop or not (c.sound or pieces is not None):
-        return end("add nothing yet", stop or c.decision.cause)
-    trim = c.to_add if pieces is None else _in_planes(pieces, planes)
-    if not trim.any() or left >= WORTH * now:
-        added = "a trim" if pieces is None else "pieces beside these"
-        still_open = judged == "fail" or explained is False
-        why = f"{added} would not make it clearly better ({change})"
-        return end("add nothing yet" if still_open else "done", why)
-    return end("trim", change)
+        why += f"; {stop or 'check what was mounted, and where'}"
+    elif settled and _within_its_error(c):
+        word, why = "done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})"
+    elif settled and not worth:
+        word = "done"
+    elif blocked or (worth and not c.sound and pieces is None):
+        why = blocked or c.decision.cause
+    elif worth:
+        word, why = "trim", change
+    return LeftToDo(word, why, c, run, planes, there, trim if word == "trim" else 0 * trim, pieces)
 
 
 def _within_its_error(c: Correction) -> bool:

@@ -26,7 +26,7 @@ from balancing.influence import Influence, match_speeds
 from balancing.iso21940 import Tolerance
 from balancing.methods import solve
 from balancing.planes import plane_indices
-from balancing.regions import NORMAL_RADIUS, Region
+from balancing.regions import NORMAL_RADIUS, Region, region_edge
 from balancing.tables import INVISIBLE
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import Answer, Answered
@@ -197,6 +197,11 @@ class Verdict(Answered):
         )
 
 
+def largest(values: ComplexArray, covariance: FloatArray, radius: float = NORMAL_RADIUS) -> FloatArray:
+    """Largest size (…) in the 95 % regions of values (…) with covariances (…, 2, 2)."""
+    return np.asarray(np.abs(region_edge(values, covariance, _POINTS, radius)).max(axis=-1))
+
+
 def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | None = None) -> Judgement:
     """Judge one complex value.
 
@@ -222,7 +227,8 @@ def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | No
     edge = region.edge(_POINTS)
     size = np.abs(edge)
     low = 0.0 if region.holds(np.zeros(1, dtype=complex)) else float(size.min())
-    return Judgement(kind, name, speed, value, float(limit), low, float(size.max()), edge)
+    high = float(largest(region.centre[0], region.covariance, region.radius))
+    return Judgement(kind, name, speed, value, float(limit), low, high, edge)
 
 
 def judge_unbalance(
