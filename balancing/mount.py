@@ -19,6 +19,7 @@ from balancing.correction import Correction
 from balancing.holes import Holes, Mounting, equal_together
 from balancing.influence import Influence, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
+from balancing.regions import LEVEL
 from balancing.tables import (
     covariance_column,
     largest_readings,
@@ -60,6 +61,8 @@ class Mounted(Answered):
         Predicted vibration with them, (S, C).
     after_covariance
         Of a reading in a check run around it, (S, C, 2, 2); NaN where errors are unknown.
+    check_rms
+        Root mean square below which 95 of 100 check runs stay; NaN where errors are unknown.
     on_top_of
         Run whose weights stay mounted; None: everything is removed before.
     """
@@ -69,12 +72,8 @@ class Mounted(Answered):
     discrete: Discrete
     after: ComplexArray
     after_covariance: FloatArray
+    check_rms: float
     on_top_of: str | None = None
-
-    @property
-    def check_rms(self) -> float:
-        """Root mean square below which 95 of 100 check runs stay; NaN where errors are unknown."""
-        return _check_rms(self.correction, self.after)
 
     @property
     def weights(self) -> ComplexArray:
@@ -171,7 +170,7 @@ class Mounted(Answered):
         ]
         lines = [f"With fewer pieces: {', '.join(each)}."] if each else []
         if not self.discrete.enough:
-            lines.append("No set of pieces is enough: this one leaves least.")
+            lines.append("No set of pieces is enough: this one leaves hardly more than the best.")
         return lines
 
 
@@ -230,7 +229,7 @@ def mount(
         W,
         Y.ravel(),
         each,
-        _enough(c, Y),
+        _enough(c, Y, bound := _bound(c)),
         wanted=c.weights - stays,
         method="minmax" if c.method == "minmax" else "least-squares",
         row_weights=rows_,
@@ -238,27 +237,33 @@ def mount(
     )
     after = Y + (W @ discrete.weights).reshape(Y.shape)
     run = c.mounted.run if on_top and any(there.values()) else None
-    return Mounted(c, tuple(each.values()), discrete, after, c.after_covariance, run)
+    check_rms = bound(after) if c.errors_known else np.nan
+    return Mounted(c, tuple(each.values()), discrete, after, c.after_covariance, check_rms, run)
 
 
-def _check_rms(c: Correction, left: ComplexArray) -> float:
-    """Root mean square that 95 of 100 check runs stay below around a prediction (S, C); NaN: not known."""
-    return float(np.sqrt(max(rms(left) ** 2 + c.check_rms**2 - rms(c.after) ** 2, 0.0)))
+def _bound(c: Correction) -> Callable[[ComplexArray], float]:
+    """Root mean square that 95 of 100 check runs stay below around a prediction (S, C)."""
+    influence, after = c.influence, c.after
+    each = zip(influence.draws(), influence.further(after, c.weights), strict=False)
+    drawn = [Y + W @ c.weights + more - after for (Y, W), more in each]
+    errors = np.concatenate(drawn) if drawn else np.zeros((1, *after.shape))
+    return lambda left: float(np.quantile(np.sqrt(np.mean(np.abs(left + errors) ** 2, axis=(1, 2))), LEVEL))
 
 
-def _enough(c: Correction, Y: ComplexArray) -> Callable[[ComplexArray], bool]:
+def _enough(
+    c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float]
+) -> Callable[[ComplexArray], bool]:
     """Whether weights D (P,), added to what reads Y, leave little enough."""
     limits = np.full(Y.shape, np.inf) if c.limits is None else c.limits.residual
     limited = np.isfinite(limits)
     covariance = np.nan_to_num(c.after_covariance)[limited]
-    best = c.check_rms if c.errors_known else rms(c.after)
+    most = max(FEW * bound(c.after), LITTLE * rms(Y))
 
     def enough(D: ComplexArray) -> bool:
         left = Y + c.influence.W @ D
         if limited.any():
             return bool((largest(left[limited], covariance) <= limits[limited]).all())
-        bound = _check_rms(c, left) if c.errors_known else rms(left)
-        return bool(bound <= max(FEW * best, LITTLE * rms(Y)))
+        return bound(left) <= most
 
     return enough
 

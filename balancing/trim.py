@@ -102,6 +102,7 @@ def after_check_run(
     judged: str = "",
     stop: str = "",
     pieces: Mounted | None = None,
+    bare: ComplexArray | None = None,
 ) -> LeftToDo:
     """Decide what is left to do after the last check run.
 
@@ -119,11 +120,13 @@ def after_check_run(
         Why nothing may be added before something else is done; empty: nothing speaks against it.
     pieces
         The trim as pieces beside what is mounted, where it is to be one of pieces.
+    bare
+        Vibration of the bare rotor at the speeds and sensors of the check, (S, C); None: the correction's.
     """
     c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
     run, planes, there = c.mounted
     pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
-    now, before = rms(check.mean[-1]), rms(c.before[pick])
+    now, before = rms(check.mean[-1]), rms(c.before[pick] if bare is None else bare)
     trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
     change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()

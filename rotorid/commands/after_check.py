@@ -104,9 +104,15 @@ def left_to_do(
     if pieces is None and not stop:
         with suppress(ValueError):  # no holes, or none that can be used: a trim at any angle
             pieces = mount(result, *known, job.holes, on_top=True)
-    explained = None if check is None else check.explained
-    judged = "" if verdict is None else verdict.overall
-    return after_check_run(result, runs, explained=explained, judged=judged, stop=stop, pieces=pieces)
+    return after_check_run(
+        result,
+        runs,
+        explained=None if check is None else check.explained,
+        judged="" if verdict is None else verdict.overall,
+        stop=stop,
+        pieces=pieces,
+        bare=None if check is None else check.before,
+    )
 
 
 def _last(runs: Trials) -> Trials:
