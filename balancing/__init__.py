@@ -7,7 +7,7 @@ and counts for the coefficients (`refine`).
 
 from __future__ import annotations
 
-from balancing.check_run import CheckComparison, compare_check, refine, with_check_runs
+from balancing.check_run import CheckComparison, compare_check, last_run, refine, with_check_runs
 from balancing.computed import combine, model_influence, update, with_parameters
 from balancing.conditioning import Conditioning, UndeterminedError, check_runs, clear_change, conditioning
 from balancing.convention_test import ConventionTest, convention_test
@@ -87,6 +87,7 @@ __all__ = [
     "expected_lag",
     "fit_type",
     "from_list",
+    "last_run",
     "model_influence",
     "mount",
     "plane_load",

@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +32,7 @@ from balancing.influence import Influence, Noise, Whitening, estimate_influence,
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import (
     ROUNDING,
+    covariance_column,
     largest_readings,
     reading_columns,
     rms,
@@ -116,34 +119,18 @@ class CheckComparison(Answered):
         return np.asarray(self.achieved - self.predicted)
 
     @property
-    def improvement_predicted(self) -> float | None:
-        """Rms before by rms predicted; None where nothing should be left."""
-        return _factor(self.before, self.predicted)
-
-    @property
-    def improvement_achieved(self) -> float | None:
-        """Rms before by rms achieved; None where nothing was left."""
-        return _factor(self.before, self.achieved)
-
-    @property
-    def worst(self) -> tuple[int, int, int]:
-        """Run, speed and sensor of the reading that differs most: in its errors, or in size without them."""
-        size = np.abs(self.difference) if self.explained is None else self.distance
-        r, s, c = np.unravel_index(int(np.argmax(size)), size.shape)
-        return int(r), int(s), int(c)
-
-    @property
     def verdict(self) -> str:
         """One or two sentences: whether the errors explain the differences, and what else may."""
-        r, s, k = self.worst
+        size = np.abs(self.difference) if self.explained is None else self.distance
+        r, s, k = np.unravel_index(int(np.argmax(size)), size.shape)
         where = f"sensor {self.sensors[k]!r} at {self.labels.speed_words(self.speeds[s])}"
         if len(self.runs) > 1:
             where += f" in run {self.runs[r]!r}"
-        if self.explained is None or self.probability is None:
-            size = self.labels.vibration(self.difference)[0][r, s, k]
+        if self.probability is None:
+            most = figures(size[r, s, k] * self.labels.vibration_scale, 3)
             return (
                 "no verdict: the errors of the readings are not known (state them, or repeat readings); "
-                f"{where} differs most, by {figures(size, 3)} {self.labels.vibration_in}".rstrip()
+                f"{where} differs most, by {most} {self.labels.vibration_in}".rstrip()
             )
         share = 100 * self.probability
         chance = f"probability {f'{share:.0f}' if share > 1 else 'below 1'} %"
@@ -155,7 +142,7 @@ class CheckComparison(Answered):
         )
         return (
             f"the differences are not explained by the errors ({chance}): {likely}; {where} differs most, by "
-            f"{figures(self.distance[r, s, k], 2)} standard deviations"
+            f"{figures(size[r, s, k], 2)} standard deviations"
         )
 
     def _as_if(self) -> str:
@@ -199,8 +186,8 @@ class CheckComparison(Answered):
                 "rms_before": rms(sizes["before"]),
                 "rms_predicted": rms(sizes["predicted"]),
                 "rms_achieved": rms(sizes["achieved"]),
-                "improvement_predicted": self.improvement_predicted,
-                "improvement_achieved": self.improvement_achieved,
+                "improvement_predicted": _factor(self.before, self.predicted),
+                "improvement_achieved": _factor(self.before, self.achieved),
                 "warnings": self.warnings,
             }
         )
@@ -234,46 +221,31 @@ class CheckComparison(Answered):
 
     def _columns(self) -> tuple[Column, ...]:
         """One row per run, speed and sensor."""
-        R, S, C = self.achieved.shape
-        labels = self.labels
-        before = np.broadcast_to(self.before, (R, S, C))
+        R, labels = len(self.runs), self.labels
         rounding = ROUNDING * float(np.abs(self.before).max()) * labels.vibration_scale
-        blocks: Sequence[Any] | FloatArray = [None] * (R * S * C)
-        if self.explained is not None:
-            blocks = labels.vibration_covariance(self.covariance).reshape(-1, 2, 2)
+        before = np.broadcast_to(self.before, self.achieved.shape)
+        each = (("predicted", self.predicted), ("achieved", self.achieved), ("difference", self.difference))
+        vectors = (
+            vector_columns(labels, name, values, rounding) for name, values in (("before", before), *each)
+        )
+        places = reading_columns(labels, self.speeds, self.sensors)
+        known = None if self.explained is None else self.covariance
         return (
-            Column("run", np.repeat(self.runs, S * C)),
-            *(
-                replace(column, values=list(column.values) * R)
-                for column in reading_columns(labels, self.speeds, self.sensors)
-            ),
-            *vector_columns(labels, "before", before, rounding),
-            *vector_columns(labels, "predicted", self.predicted, rounding),
-            *vector_columns(labels, "achieved", self.achieved, rounding),
-            *vector_columns(labels, "difference", self.difference, rounding),
-            Column("covariance", blocks),
-            Column(
-                "distance",
-                self.distance.ravel(),
-                lambda distance: figures(distance, 2),
-                "std",
-            ),
+            Column("run", np.repeat(self.runs, before[0].size), str if R > 1 else None),
+            *(replace(column, values=list(column.values) * R) for column in places),
+            *chain.from_iterable(vectors),
+            covariance_column(labels, "covariance", known, before.size),
+            Column("distance", self.distance.ravel(), partial(figures, digits=2), "std"),
         )
 
     def _readings_text(self) -> str:
-        shown = {column.name: column for column in self._columns()}
-        if len(self.runs) > 1:
-            named = zip(shown["sensor"].values, shown["run"].values, strict=True)
-            shown["sensor"] = Column("sensor", [f"{sensor} ({run})" for sensor, run in named], str)
-        for name in ("before", "before_phase_deg", "difference_phase_deg"):
-            del shown[name]
-        foot = ""
-        if self.explained is None:
-            del shown["distance"]
-        else:
-            foot = "\nstd: the difference in its standard deviations"
+        hidden = {"before", "before_phase_deg", "difference_phase_deg"}
+        hidden |= {"distance"} if self.explained is None else set()
+        shown = [column for column in self._columns() if column.name not in hidden]
+        foot = "" if self.explained is None else "\nstd: the difference in its standard deviations"
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        return f"Vibration{unit}, predicted and achieved\n{text(list(shown.values()), left=2)}{foot}"
+        table = text(shown, left=2 + (len(self.runs) > 1))
+        return f"Vibration{unit}, predicted and achieved\n{table}{foot}"
 
 
 def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
@@ -312,11 +284,11 @@ def compare_check(
     """
     today = influence if baseline is None else influence.rebased(baseline)
     at = match_speeds(check.speeds, today.speeds)
-    part = today.part(at, [_index(name, today.sensors, "sensor") for name in check.sensors])
+    part = today.part(at, [index_of(name, today.sensors, "sensor") for name in check.sensors])
     T = np.zeros((len(check.runs), len(part.planes)), dtype=complex)
     for plane, weights in _mounted(check, correction).items():
         if plane in part.planes or weights.any():
-            T[:, _index(plane, part.planes, "plane")] = weights
+            T[:, index_of(plane, part.planes, "plane")] = weights
     predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, T)
     difference = check.mean - predicted
     reading = reading_of(check)
@@ -392,7 +364,15 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
     return min(fits, key=lambda fit: fit[0])[1] if fits else None
 
 
-def _index(name: str, names: tuple[str, ...], what: str) -> int:
+def last_run(runs: Trials) -> Trials:
+    """The last of several runs."""
+    parts = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
+    last = {name: part[..., -1:, :, :] for name, part in parts.items() if part is not None}
+    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
+
+
+def index_of(name: str, names: tuple[str, ...], what: str) -> int:
+    """Where a name of a check run stands among those of the coefficients."""
     if name not in names:
         raise ValueError(
             f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "
@@ -466,8 +446,7 @@ def with_check_runs(trials: Trials, *checks: Trials, corrections: Correction | N
     planes = tuple(dict.fromkeys((*trials.planes, *later)))
     names: list[str] = []
     for name in (name for table in tables for name in table.runs):
-        marks = ("", " (check)", *(f" (check {k})" for k in range(2, len(names) + 2)))
-        names.append(next(name + mark for mark in marks if name + mark not in names))
+        names.append(f"{name} (check {len(names) + 1})" if name in names else name)
     weights = np.zeros((len(names), len(planes)), dtype=complex)
     for p, plane in enumerate(planes):
         each = zip(mounted, tables, strict=True)

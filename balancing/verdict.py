@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.check_run import index_of, last_run
 from balancing.conditioning import chance, check_planes
 from balancing.conventions import Labels
 from balancing.correct import fit_part
@@ -31,7 +32,6 @@ from balancing.tables import INVISIBLE
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.result import Column, frame, rows
 from rotorid.base.rpm import RPM, rpm
 from rotorid.base.text import capital, counted
 from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
@@ -126,18 +126,20 @@ class Verdict(Answered):
         return {
             "source": self.source,
             "verdict": self.overall,
-            "rows": rows(self._columns()),
+            "rows": [self._row(row) for row in self.rows],
             "warnings": list(self.warnings),
         }
 
     def to_frame(self) -> pd.DataFrame:
         """One row per judgement: the keys of `to_dict`."""
-        return frame(self._columns())
+        import pandas as pd
+
+        return pd.DataFrame([self._row(row) for row in self.rows])
 
     @property
     def answer(self) -> Answer:
         """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
-        lines = [self._row_words(row) for row in rows(self._columns())]
+        lines = [self._row_words(self._row(row)) for row in self.rows]
         same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
         near = sorted(same, key=lambda k: round(self.rows[k].limit / (self.rows[k].size or 1e-30), 6))
         shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
@@ -168,33 +170,27 @@ class Verdict(Answered):
         name = f"{row['kind']} {row['name']}{at}"
         return f"  {name}: {value} ({within}), limit {row['limit']:.4g}: {row['verdict']}"
 
-    def _columns(self) -> tuple[Column, ...]:
-        labels = self.labels
-        scales = {
+    def _row(self, row: Judgement) -> dict[str, Any]:
+        labels, seen = self.labels, row.kind == "sensor"
+        scale, unit = {
             "plane": (labels.weight_scale, labels.weight_unit),
             "bearing": (_GRAM_MM, "g_mm"),
             "sensor": (labels.vibration_scale, labels.vibration_unit),
+        }[row.kind]
+        amount, angle = (labels.vibration if seen else labels.weight)(row.value)
+        low, high = (None if size is None else size * scale for size in (row.low, row.high))
+        return {
+            "kind": row.kind,
+            "name": row.name,
+            "speed_rpm": None if row.speed is None else float(rpm(row.speed)),
+            "size": row.size * scale,
+            "angle_deg": float(angle) if amount else None,
+            "low": low,
+            "high": high,
+            "limit": row.limit * scale,
+            "unit": unit,
+            "verdict": row.verdict,
         }
-        scale = np.array([scales[row.kind][0] for row in self.rows])
-        values = [
-            (labels.vibration if row.kind == "sensor" else labels.weight)(row.value) for row in self.rows
-        ]
-        size, low, high, limit, speeds = (
-            np.array([getattr(row, name) for row in self.rows], dtype=float)
-            for name in ("size", "low", "high", "limit", "speed")
-        )
-        return (
-            Column("kind", [row.kind for row in self.rows]),
-            Column("name", [row.name for row in self.rows]),
-            Column("speed_rpm", [rpm(speed) for speed in speeds]),
-            Column("size", size * scale),
-            Column("angle_deg", [float(angle) if amount else np.nan for amount, angle in values]),
-            Column("low", low * scale),
-            Column("high", high * scale),
-            Column("limit", limit * scale),
-            Column("unit", [scales[row.kind][1] for row in self.rows]),
-            Column("verdict", [row.verdict for row in self.rows]),
-        )
 
 
 def largest(values: ComplexArray, covariance: FloatArray, radius: float = NORMAL_RADIUS) -> FloatArray:
@@ -322,13 +318,12 @@ def verdict_of_check(
     influence: Influence,
     check: Trials,
     *,
-    run: int = -1,
     tolerance: Tolerance | None = None,
     radii: Mapping[str, float] | None = None,
     limits: Limits | None = None,
     planes: Sequence[str] | None = None,
 ) -> Verdict:
-    """Judge one check run, everything mounted that shall stay.
+    """Judge the last check run, everything mounted that shall stay.
 
     Parameters
     ----------
@@ -336,8 +331,6 @@ def verdict_of_check(
         Coefficients, at the speeds and for the sensors of the check run (there may be more).
     check
         Check runs; what was mounted in them does not matter here.
-    run
-        Which of them, by index; default the last.
     tolerance, radii
         As of `judge_unbalance`.
     limits
@@ -353,20 +346,8 @@ def verdict_of_check(
         Where nothing is given to judge by, for unknown planes, sensors or speeds, and as `judge_unbalance`.
     """
     at = match_speeds(check.speeds, influence.speeds)
-    unknown = [name for name in check.sensors if name not in influence.sensors]
-    if unknown:
-        raise ValueError(f"there are no coefficients of sensor {unknown[0]!r}, which the check run has")
-    sensors = [influence.sensors.index(name) for name in check.sensors]
-    name, only = check.runs[run], [range(len(check.runs))[run]]
-    bare = replace(
-        check,
-        runs=(name,),
-        readings=check.readings[:, only],
-        steps=None if check.steps is None else check.steps[:, :, only],
-        covariance=None if check.covariance is None else check.covariance[:, :, :, only],
-        planes=(),
-        weights=np.zeros((1, 0), dtype=complex),
-    )
+    sensors = [index_of(name, influence.sensors, "sensor") for name in check.sensors]
+    bare = replace(last_run(check), planes=(), weights=np.zeros((1, 0), dtype=complex))
     left = influence.part(at, sensors).rebased(bare)
     judged: list[Judgement] = []
     warnings = left.remarks.warnings
@@ -385,29 +366,19 @@ def verdict_of_check(
                 "elsewhere, or the coefficients are wrong",
             )
     if limits is not None:
-        covariance = (
-            left.channels()[..., :2, :2]
-            if left.known_errors
-            else np.full((*left.baseline.shape, 2, 2), np.nan)
-        )
-        pick = np.ix_(at, sensors)
-        judged += _readings(left, left.baseline, covariance, limits.residual[pick])
-    return _verdict(judged, f"check run {name}", left.labels, warnings)
+        covariance = left.channels()[..., :2, :2] if left.known_errors else np.full((2, 2), np.nan)
+        judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(at, sensors)])
+    return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
 
 
 def _readings(
     of: Influence, readings: ComplexArray, covariance: FloatArray, limit: FloatArray
 ) -> list[Judgement]:
-    return [
-        judge(
-            "sensor",
-            of.sensors[c],
-            limit[s, c],
-            Region(readings[[s], c], covariance[s, c], NORMAL_RADIUS),
-            float(of.speeds[s]),
-        )
-        for s, c in np.argwhere(np.isfinite(limit))
-    ]
+    V = np.broadcast_to(covariance, (*limit.shape, 2, 2))
+    each = (
+        (s, c, Region(readings[[s], c], V[s, c], NORMAL_RADIUS)) for s, c in np.argwhere(np.isfinite(limit))
+    )
+    return [judge("sensor", of.sensors[c], limit[s, c], region, float(of.speeds[s])) for s, c, region in each]
 
 
 def _verdict(

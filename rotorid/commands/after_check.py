@@ -80,7 +80,7 @@ def left_to_do(
     pieces
         Those of a trim.
     """
-    from balancing import after_check_run, mount
+    from balancing import after_check_run, last_run, mount
 
     runs, (result, known, *_) = job.check, solved
     assert runs is not None
@@ -91,7 +91,7 @@ def left_to_do(
         measured = baseline is None and influence.trials is not None and options.machine_type is None
         try:
             if misplaced:  # what is really there is not known, what it leaves is
-                known = influence, _last(runs)
+                known = influence, last_run(runs)
             elif measured:
                 known = choose(job, options.coefficients, options.model_error, refined=True)
             else:
@@ -113,10 +113,3 @@ def left_to_do(
         pieces=pieces,
         bare=None if check is None else check.before,
     )
-
-
-def _last(runs: Trials) -> Trials:
-    """The last of several runs."""
-    parts = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
-    last = {name: part[..., -1:, :, :] for name, part in parts.items() if part is not None}
-    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
