@@ -71,26 +71,22 @@ class LeftToDo(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What to do; what is mounted, and the trim."""
-        c, scale, unit = (
-            self.correction,
-            self.correction.labels.weight_scale,
-            self.correction.labels.weight_in,
-        )
+        """What to do; what is mounted."""
+        c = self.correction
         mounted = [c.labels.weight_at(w) if w else "nothing" for w in self.there]
-        trim = [
-            f"{'take away' if plane in c.remove else 'add'} {figures(abs(w) * scale)} {unit} at {at:.1f}°"
-            if w
-            else "nothing"
-            for plane, w, at in zip(self.planes, self.trim, c.places(self.planes, self.trim), strict=True)
-        ]
-        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
         what = capital(self.word)
-        if self.word == "trim":
-            columns.append(Column("trim, beside that", trim, str))
-            pairs = zip(self.planes, trim, self.trim, strict=True)
-            each = [f"{words} in plane {plane!r}" for plane, words, w in pairs if w]
-            what += f": {listing(each, 'and') if self.pieces is None else self.pieces.in_holes()}"
+        if self.word == "trim" and self.pieces is not None:
+            what += f": {self.pieces.in_holes()}"
+        elif self.word == "trim":
+            at = c.places(self.planes, self.trim)
+            each = [
+                f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(float(abs(w)))} at "
+                f"{at[p]:.1f}° in plane {plane!r}"
+                for p, (plane, w) in enumerate(zip(self.planes, self.trim, strict=True))
+                if w
+            ]
+            what += f": {listing(each, 'and')}"
+        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
         return Answer(f"{what}; {self.why}.", text(columns, width=COLUMNS))
 
 

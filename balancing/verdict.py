@@ -32,7 +32,7 @@ from balancing.tables import INVISIBLE
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import RPM, rpm
+from rotorid.base.rpm import rpm
 from rotorid.base.text import capital, counted
 from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
 
@@ -64,8 +64,6 @@ class Judgement:
         In the same unit.
     low, high
         Least and largest size in the 95 % region; None where errors are unknown.
-    region
-        Points on the edge of the region; None as before.
     """
 
     kind: Kind
@@ -75,7 +73,6 @@ class Judgement:
     limit: float
     low: float | None = None
     high: float | None = None
-    region: ComplexArray | None = None
 
     @property
     def size(self) -> float:
@@ -139,63 +136,61 @@ class Verdict(Answered):
     @property
     def answer(self) -> Answer:
         """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
-        lines = [self._row_words(self._row(row)) for row in self.rows]
-        same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
-        near = sorted(same, key=lambda k: round(self.rows[k].limit / (self.rows[k].size or 1e-30), 6))
-        shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
-        shown += [k for k in near if k not in shown][:_SHOWN]
-        others = [words for k, words in enumerate(lines) if k not in shown]
+        same = sum(row.verdict == self.overall for row in self.rows)
+        near = [row for row in self.rows if row.kind == "sensor"]
+        near.sort(key=lambda row: (row.verdict != self.overall, -round(row.size / max(row.limit, 1e-30), 6)))
+        shown = [*(row for row in self.rows if row.kind != "sensor"), *near[:_SHOWN]]
         why = {
             "pass": "kept",
             "fail": "not kept",
             "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; repeated "
             "readings or stated errors would tell",
         }[self.overall]
-        of = f"{len(same)} of {counted(len(lines), 'limit')}"
+        others = near[_SHOWN:]
         return Answer(
-            f"{capital(self.overall)} ({self.source}): {of} {why}.",
-            "\n".join(lines[k] for k in shown),
+            f"{capital(self.overall)} ({self.source}): {same} of {counted(len(self.rows), 'limit')} {why}.",
+            "\n".join(map(self._words, shown)),
             self.warnings,
-            tables=("\n".join(["The other limits:", *others]),) if others else (),
+            tables=("\n".join(["The other limits:", *map(self._words, others)]),) if others else (),
             more="the other limits",
         )
 
-    def _row_words(self, row: dict[str, Any]) -> str:
-        sensor = row["kind"] == "sensor"
-        unit = vibration_unit_words(row["unit"]) if sensor else weight_unit_words(row["unit"])
-        at = "" if row["speed_rpm"] is None else f" at {self.labels.speed_words(row['speed_rpm'] / RPM)}"
-        within = "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
-        size = row["size"] if row["size"] > INVISIBLE * row["limit"] else 0.0
-        value = f"{size:.4g} {unit}".rstrip()
-        name = f"{row['kind']} {row['name']}{at}"
-        return f"  {name}: {value} ({within}), limit {row['limit']:.4g}: {row['verdict']}"
+    def _words(self, row: Judgement) -> str:
+        cells = self._row(row)
+        unit = (vibration_unit_words if row.kind == "sensor" else weight_unit_words)(cells["unit"])
+        at = "" if row.speed is None else f" at {self.labels.speed_words(row.speed)}"
+        within = "errors unknown"
+        if row.low is not None:
+            within = f"{cells['low']:.3g} … {cells['high']:.3g} with 95 %"
+        value = f"{cells['size'] if row.size > INVISIBLE * row.limit else 0.0:.4g} {unit}".rstrip()
+        name = f"{row.kind} {row.name}{at}"
+        return f"  {name}: {value} ({within}), limit {cells['limit']:.4g}: {row.verdict}"
 
     def _row(self, row: Judgement) -> dict[str, Any]:
-        labels, seen = self.labels, row.kind == "sensor"
-        scale, unit = {
-            "plane": (labels.weight_scale, labels.weight_unit),
-            "bearing": (_GRAM_MM, "g_mm"),
-            "sensor": (labels.vibration_scale, labels.vibration_unit),
+        labels = self.labels
+        scale, unit, shown = {
+            "plane": (labels.weight_scale, labels.weight_unit, labels.weight),
+            "bearing": (_GRAM_MM, "g_mm", labels.weight),
+            "sensor": (labels.vibration_scale, labels.vibration_unit, labels.vibration),
         }[row.kind]
-        amount, angle = (labels.vibration if seen else labels.weight)(row.value)
-        low, high = (None if size is None else size * scale for size in (row.low, row.high))
+        amount, angle = shown(row.value)
         return {
             "kind": row.kind,
             "name": row.name,
             "speed_rpm": None if row.speed is None else float(rpm(row.speed)),
             "size": row.size * scale,
             "angle_deg": float(angle) if amount else None,
-            "low": low,
-            "high": high,
+            "low": None if row.low is None else row.low * scale,
+            "high": None if row.high is None else row.high * scale,
             "limit": row.limit * scale,
             "unit": unit,
             "verdict": row.verdict,
         }
 
 
-def largest(values: ComplexArray, covariance: FloatArray, radius: float = NORMAL_RADIUS) -> FloatArray:
-    """Largest size (…) in the 95 % regions of values (…) with covariances (…, 2, 2)."""
-    return np.asarray(np.abs(region_edge(values, covariance, _POINTS, radius)).max(axis=-1))
+def largest(values: ComplexArray, covariance: FloatArray) -> FloatArray:
+    """Largest size (…) in the 95 % regions of normal values (…) with covariances (…, 2, 2)."""
+    return np.asarray(np.abs(region_edge(values, covariance, _POINTS)).max(axis=-1))
 
 
 def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | None = None) -> Judgement:
@@ -217,14 +212,12 @@ def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | No
     """
     if not (np.isfinite(limit) and limit >= 0):
         raise ValueError(f"the limit of {kind} {name!r} must be a finite number ≥ 0, not {limit}")
-    value = complex(region.centre[0])
+    judged = Judgement(kind, name, speed, complex(region.centre[0]), float(limit))
     if np.isnan(region.covariance).any():
-        return Judgement(kind, name, speed, value, float(limit))
-    edge = region.edge(_POINTS)
-    size = np.abs(edge)
-    low = 0.0 if region.holds(np.zeros(1, dtype=complex)) else float(size.min())
-    high = float(largest(region.centre[0], region.covariance, region.radius))
-    return Judgement(kind, name, speed, value, float(limit), low, high, edge)
+        return judged
+    size = np.abs(region.edge(_POINTS))
+    around = region.holds(np.zeros(1, dtype=complex))
+    return replace(judged, low=0.0 if around else float(size.min()), high=float(size.max()))
 
 
 def judge_unbalance(

@@ -116,7 +116,7 @@ def amplitudes(
     second one of the axes again, in the scale of what is left.
     """
     labels, result, read = c.labels, mounted or c, c if check is None else check
-    values, covariance = [c.before, result.after], result.after_covariance
+    values, covariance = [c.before, result.after], c.after_covariance
     if check is not None:
         values = [check.before, check.predicted[-1], check.achieved[-1]]
         covariance = check.covariance[-1]
