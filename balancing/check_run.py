@@ -17,7 +17,6 @@ mounted; the correction itself stays the total for the bare rotor, so that limit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -45,13 +44,11 @@ from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.result import Column, rows, text
 from rotorid.base.text import figures, listing, sentence
 from rotorid.regression import solution, unstretch
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from balancing.correction import Correction
 
 DRAWS = 400
@@ -192,10 +189,6 @@ class CheckComparison(Answered):
             }
         )
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
-        return frame([column for column in self._columns() if column.name != "covariance"])
-
     @property
     def headline(self) -> str:
         """Whether the rotor does what was predicted, and what is left, in a sentence."""
@@ -235,17 +228,16 @@ class CheckComparison(Answered):
             *(replace(column, values=list(column.values) * R) for column in places),
             *chain.from_iterable(vectors),
             covariance_column(labels, "covariance", known, before.size),
-            Column("distance", self.distance.ravel(), partial(figures, digits=2), "std"),
+            Column("distance", self.distance.ravel(), partial(figures, digits=2), "off by std"),
         )
 
     def _readings_text(self) -> str:
         hidden = {"before", "before_phase_deg", "difference_phase_deg"}
         hidden |= {"distance"} if self.explained is None else set()
         shown = [column for column in self._columns() if column.name not in hidden]
-        foot = "" if self.explained is None else "\nstd: the difference in its standard deviations"
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         table = text(shown, left=2 + (len(self.runs) > 1))
-        return f"Vibration{unit}, predicted and achieved\n{table}{foot}"
+        return f"Vibration{unit}, predicted and achieved\n{table}"
 
 
 def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
@@ -381,14 +373,14 @@ def index_of(name: str, names: tuple[str, ...], what: str) -> int:
     return names.index(name)
 
 
-def refine(trials: Trials, *checks: Trials, corrections: Correction | None = None) -> Influence:
+def refine(trials: Trials, check: Trials, corrections: Correction | None = None) -> Influence:
     """Influence coefficients from trial runs and check runs together.
 
     Parameters
     ----------
     trials
         Trial runs, as for `estimate_influence`.
-    checks
+    check
         Check runs in their order, of the same sensors and speeds (speeds within 0.5 % count as one). Weights
         of their planes are all that was mounted in them.
     corrections
@@ -404,11 +396,9 @@ def refine(trials: Trials, *checks: Trials, corrections: Correction | None = Non
     UndeterminedError
         Where all runs together do not determine the coefficients.
     ValueError
-        Without check runs; for other sensors and speeds, and where nobody says what was mounted.
+        For other sensors and speeds, and where nobody says what was mounted.
     """
-    if not checks:
-        raise ValueError("there is no check run: give one or more beside the trial runs")
-    return estimate_influence(with_check_runs(trials, *checks, corrections=corrections))
+    return estimate_influence(with_check_runs(trials, check, corrections))
 
 
 def _mounted(check: Trials, correction: Correction | None) -> dict[str, ComplexArray]:
@@ -424,12 +414,12 @@ def _mounted(check: Trials, correction: Correction | None) -> dict[str, ComplexA
     return dict(zip(correction.planes, every, strict=True))
 
 
-def with_check_runs(trials: Trials, *checks: Trials, corrections: Correction | None = None) -> Trials:
+def with_check_runs(trials: Trials, check: Trials, corrections: Correction | None = None) -> Trials:
     """Trial runs and check runs as one table.
 
     Parameters
     ----------
-    trials, checks, corrections
+    trials, check, corrections
         As of `refine`.
 
     Raises
@@ -437,60 +427,47 @@ def with_check_runs(trials: Trials, *checks: Trials, corrections: Correction | N
     ValueError
         For check runs of other sensors and speeds, and where nobody says what was mounted.
     """
-    tables = (trials, *(_aligned(check, trials) for check in checks))
-    mounted = [
-        dict(zip(trials.planes, trials.weights.T, strict=True)),
-        *(_mounted(check, corrections) for check in checks),
-    ]
-    later = (plane for each in mounted for plane, weights in each.items() if weights.any())
-    planes = tuple(dict.fromkeys((*trials.planes, *later)))
-    names: list[str] = []
-    for name in (name for table in tables for name in table.runs):
-        names.append(f"{name} (check {len(names) + 1})" if name in names else name)
-    weights = np.zeros((len(names), len(planes)), dtype=complex)
-    for p, plane in enumerate(planes):
-        each = zip(mounted, tables, strict=True)
-        weights[:, p] = np.concatenate([w.get(plane, np.zeros(len(table.runs))) for w, table in each])
-    errors, scatter = ([getattr(table, name) for table in tables] for name in ("errors", "run_errors"))
-    measured = [np.nanmean(t.covariance[[0, 1], [0, 1]]) for t in tables if t.covariance is not None]
-    # measured errors of typed readings: the mean of the others', or none beside stated ones
-    usual = 0.0 if any(errors) or not measured else float(np.mean(measured))
-    return replace(
-        trials,
-        runs=tuple(names),
-        planes=planes,
-        readings=_joined(tables, "readings", np.ones(())),
-        weights=weights,
-        errors=next(filter(None, errors), None),
-        run_errors=next(filter(None, scatter), None),
-        warnings=tuple(dict.fromkeys(word for table in tables for word in table.warnings)),
-        steps=_joined(tables, "steps", np.zeros(2)),
-        covariance=_joined(tables, "covariance", usual * np.eye(2)),
-    )
-
-
-def _aligned(check: Trials, trials: Trials) -> Trials:
-    """A check run in the order of the speeds and sensors of the trial runs."""
-    speeds = match_speeds(trials.speeds, check.speeds, "readings of the check run")
+    at = match_speeds(trials.speeds, check.speeds, "readings of the check run")
     if {*check.sensors} != {*trials.sensors}:
         raise ValueError(
             f"the check runs have readings of {listing(map(repr, check.sensors), 'and')}, the trial runs of "
             f"{listing(map(repr, trials.sensors), 'and')}: give those of the same sensors"
         )
-    at = np.ix_(speeds, [check.sensors.index(name) for name in trials.sensors])
-    parts = {name: getattr(check, name) for name in ("readings", "steps", "covariance")}
-    parts = {name: part[..., *at] for name, part in parts.items() if part is not None}
-    return replace(check, speeds=trials.speeds, sensors=trials.sensors, **parts)
+    pick = np.ix_(at, [check.sensors.index(name) for name in trials.sensors])
+    mounted, R = _mounted(check, corrections), len(trials.runs)
+    planes = tuple(dict.fromkeys((*trials.planes, *(p for p, weights in mounted.items() if weights.any()))))
+    T = np.zeros((R + len(check.runs), len(planes)), dtype=complex)
+    T[:R, : len(trials.planes)] = trials.weights
+    for p, plane in enumerate(planes):
+        T[R:, p] = mounted.get(plane, 0.0)
+    stated = trials.errors or check.errors
+    measured = [each.covariance for each in (trials, check) if each.covariance is not None]
+    # of typed readings beside measured ones: the mean of these, or none beside stated errors
+    usual = 0.0 if stated or not measured else float(np.nanmean(measured[0][[0, 1], [0, 1]]))
 
+    def joined(name: str, missing: FloatArray) -> Any:  # noqa: ANN401
+        """Arrays (…, K, R, S, C) of both as one, NaN where one has fewer repeats."""
+        both = [getattr(trials, name), getattr(check, name)]
+        if all(array is None for array in both):
+            return None
+        both[1] = None if both[1] is None else both[1][..., *pick]
+        most, padded = max(len(trials.readings), len(check.readings)), []
+        for runs, array in zip((trials, check), both, strict=True):
+            K, R = runs.readings.shape[:2]
+            full = np.multiply.outer(missing, np.ones((K, R, *trials.readings.shape[2:])))
+            gap = [*[(0, 0)] * missing.ndim, (0, most - K), *[(0, 0)] * 3]
+            padded.append(np.pad(full if array is None else array, gap, constant_values=np.nan))
+        return np.concatenate(padded, axis=-3)
 
-def _joined(tables: Sequence[Trials], name: str, usual: FloatArray) -> Any:  # noqa: ANN401
-    """Arrays (…, K, R, S, C) of several tables as those of one, NaN where one has fewer repeats."""
-    arrays = [getattr(table, name) for table in tables]
-    if all(array is None for array in arrays):
-        return None
-    most, padded = max(len(table.readings) for table in tables), []
-    for table, array in zip(tables, arrays, strict=True):
-        each = np.multiply.outer(usual, np.ones(table.readings.shape)) if array is None else array
-        gap = [(0, 0)] * (each.ndim - 4) + [(0, most - len(table.readings))] + [(0, 0)] * 3
-        padded.append(np.pad(each, gap, constant_values=np.nan))
-    return np.concatenate(padded, axis=-3)
+    return replace(
+        trials,
+        runs=(*trials.runs, *(f"{name} (check)" if name in trials.runs else name for name in check.runs)),
+        planes=planes,
+        readings=joined("readings", np.ones(())),
+        weights=T,
+        errors=stated,
+        run_errors=trials.run_errors or check.run_errors,
+        warnings=tuple(dict.fromkeys(trials.warnings + check.warnings)),
+        steps=joined("steps", np.zeros(2)),
+        covariance=joined("covariance", usual * np.eye(2)),
+    )

@@ -182,11 +182,9 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
         return replace(made, word="do not mount", cause=better[0], instead=better[1:])
     bound = result.check_rms / rms(result.before) if result.errors_known else 0.0
     if not D.any() or (sound and bound <= HARDLY_BELOW and not (unclear and bound**2 > 1 - EATEN)):
-        warnings = (
-            *_not_determined(result, case, unclear),
-            *made.warnings,
-            *_rising(result, case.today, limits),
-        )
+        together = "; each weight alone is uncertain, what they leave together is not"
+        open_ = (words.removesuffix(REMEDY) + together for words in unclear)
+        warnings = (*open_, *made.warnings, *_rising(result, case.today, limits))
         return replace(made, warnings=warnings, notes=coarse(case.today))
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
@@ -276,7 +274,7 @@ def _better_run(result: Correction, case: Case, predicted: float) -> tuple[str, 
     trials, limits = case.today.trials, result.limits
     if not result.errors_known or trials is None or trials.mean.shape[1:] != result.before.shape:
         return None
-    if trials.sensors != result.sensors or trials.runs[-1] != result.mounted.run:
+    if trials.runs[-1] != result.mounted.run:
         return None
     largest = dict(zip(case.names, case.max_weight * _MORE, strict=True))
     read, weights = np.abs(trials.mean), np.abs(trials.weights)
@@ -311,16 +309,6 @@ def coarse(influence: Influence) -> tuple[str, ...]:
         f"{figures(x * labels.vibration_scale, 2)} {labels.vibration_in}".rstrip() for x in (step, size)
     )
     return (f"the readings have one digit (steps of {steps}, readings of {readings})",)
-
-
-def _not_determined(result: Correction, case: Case, unclear: Sequence[str]) -> tuple[str, ...]:
-    if unclear:
-        together = "; each weight alone is uncertain, what they leave together is not"
-        return tuple(words.removesuffix(REMEDY) + together for words in unclear)
-    empty = [p for p, w in zip(case.names, result.weights, strict=True) if not w]
-    if empty and case.limits is not None:
-        return (f"the limits leave no weight in plane {listing(map(repr, empty), 'and')}",)
-    return ()
 
 
 def _contradicted(result: Correction) -> tuple[str, ...]:

@@ -121,11 +121,6 @@ class Mounted(Answered):
             first = "These pieces would leave"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
         lines = [f"Pieces in {labels.weight_in}{stays}:", *(f"  {words}" for words in self._in_planes())]
-        if labels.assumed:
-            taken = " and ".join(labels.assumed)
-            lines.append(
-                f"For {taken} as assumed: if that is otherwise, state it and choose the pieces anew."
-            )
         lines += ["", f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}"]
         fewer = (self._left(one, one.residual) for one in self.discrete.fewer)
         each = [f"{one['pieces']} → {three_figures(one['rms_after'])} {unit}".rstrip() for one in fewer]

@@ -157,7 +157,7 @@ def _within_its_error(c: Correction) -> bool:
     """Whether what is mounted may be the right weights."""
     if not c.region_known:
         return False
-    there = dict(zip(c.mounted.planes, c.mounted.weights, strict=True))
+    there = dict(zip(*c.mounted[1:], strict=True))
     return c.region().holds(np.array([there.get(plane, 0.0) for plane in c.planes], dtype=complex))
 
 

@@ -12,8 +12,8 @@ Predicted: what is mounted, M, less what the readings ask for, D; û = M − D. 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,9 +35,6 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.rpm import rpm
 from rotorid.base.text import capital, counted
 from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Kind = Literal["plane", "bearing", "sensor"]
 Word = Literal["pass", "fail", "not decidable"]
@@ -107,7 +104,7 @@ class Verdict(Answered):
 
     rows: tuple[Judgement, ...]
     source: str
-    labels: Labels = field(default_factory=Labels)
+    labels: Labels
     warnings: tuple[str, ...] = ()
 
     @property
@@ -126,12 +123,6 @@ class Verdict(Answered):
             "rows": [self._row(row) for row in self.rows],
             "warnings": list(self.warnings),
         }
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per judgement: the keys of `to_dict`."""
-        import pandas as pd
-
-        return pd.DataFrame([self._row(row) for row in self.rows])
 
     @property
     def answer(self) -> Answer:
@@ -204,14 +195,7 @@ def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | No
         In the unit of the value.
     region
         The value with its 95 % region; NaN covariance: errors unknown.
-
-    Raises
-    ------
-    ValueError
-        For a limit that is not a number ≥ 0.
     """
-    if not (np.isfinite(limit) and limit >= 0):
-        raise ValueError(f"the limit of {kind} {name!r} must be a finite number ≥ 0, not {limit}")
     judged = Judgement(kind, name, speed, complex(region.centre[0]), float(limit))
     if np.isnan(region.covariance).any():
         return judged
@@ -246,16 +230,14 @@ def judge_unbalance(
     Raises
     ------
     ValueError
-        For planes that the tolerance does not name, and radii that are lacking or not positive.
+        For planes that the tolerance does not name.
     """
     if sorted(planes) != sorted(tolerance.planes):
         raise ValueError(
             f"the tolerance is for the planes {', '.join(map(repr, tolerance.planes)) or '(none)'}, "
             f"the residual unbalance is in {', '.join(map(repr, planes))}: name the same planes in both"
         )
-    radius = np.array([1.0 if radii is None else radii.get(p, 0.0) for p in planes])
-    if not (np.isfinite(radius) & (radius > 0)).all():
-        raise ValueError(f"the radius of plane {planes[int(np.argmin(radius))]!r} must be a number above 0")
+    radius = np.array([1.0 if radii is None else radii[p] for p in planes])
     order = [tolerance.planes.index(p) for p in planes]
     u = np.asarray(residual, dtype=complex)
 
@@ -314,7 +296,6 @@ def verdict_of_check(
     tolerance: Tolerance | None = None,
     radii: Mapping[str, float] | None = None,
     limits: Limits | None = None,
-    planes: Sequence[str] | None = None,
 ) -> Verdict:
     """Judge the last check run, everything mounted that shall stay.
 
@@ -328,8 +309,6 @@ def verdict_of_check(
         As of `judge_unbalance`.
     limits
         Of readings, in the order of the coefficients' speeds and sensors.
-    planes
-        Use these planes only; None: those of the tolerance, or all.
 
     Raises
     ------
@@ -345,7 +324,7 @@ def verdict_of_check(
     judged: list[Judgement] = []
     warnings = left.remarks.warnings
     if tolerance is not None:
-        part = left.part(range(len(at)), None, plane_indices(left, planes or tolerance.planes))
+        part = left.part(range(len(at)), None, plane_indices(left, tolerance.planes))
         S, C, P = part.W.shape
         check_planes(part.W.reshape(-1, P), part.planes)
         fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
