@@ -357,7 +357,18 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
 
 
 def last_run(runs: Trials) -> Trials:
-    """The last of several runs."""
+    """The last of several runs.
+
+    Parameters
+    ----------
+    runs
+        One or more.
+
+    Returns
+    -------
+    Trials
+        With its readings and weights.
+    """
     parts = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
     last = {name: part[..., -1:, :, :] for name, part in parts.items() if part is not None}
     return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)

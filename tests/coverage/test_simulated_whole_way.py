@@ -32,7 +32,9 @@ def test_nothing_is_mounted_twice_and_a_trim_makes_it_better(ways):
 
 
 def test_refined_regions_hold_the_truth(ways):
-    assert np.mean([way.covered for way in ways]) >= lowest_share(len(ways), 0.93)
+    covered = [way.covered for way in ways if way.covered is not None]
+    assert len(covered) > 0.9 * len(ways)
+    assert np.mean(covered) >= lowest_share(len(covered), 0.93)
 
 
 def test_mistakes_that_matter_are_named_with_their_plane():
