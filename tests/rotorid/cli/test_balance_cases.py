@@ -52,17 +52,18 @@ def test_pieces_that_were_mounted_as_proposed_are_done(cli, options):
     said = first(ran)
     assert ("--refine" in options) or said.startswith("As predicted: ")
     assert "Done" in said
-    assert "Taken to be mounted, by --split: P1: 4.000 in hole 1; 8.000 in hole 6 · P2: 4.000 in hole 3" in said
+    assert "by --split: P1: 4.000 in hole 1; 8.000 in hole 6 · P2: 4.000 in hole 3" in said
     assert "Mount" not in ran.out
 
 
 def test_weighted_readings_and_a_largest_weight_have_the_best_place(cli):
-    """At the limit 32.6 is the least; a loop of fixed steps ended at 184° with several hundreds."""
+    """About 167°, where χ² is least; a loop of fixed steps ended at 184°."""
     folder = JOBS / "weighted_limit"
     errors = ("--amplitude-error", "10", "--phase-error", "0.3", "--max-mass", "2.1007779985187103g")
     job = (folder / "runs.csv", folder / "weights.csv", "--method", "weighted", *errors)
     found = cli("balance", *job, "--json").json
     assert found["chi_square"] < 33
+    assert found["corrections"][0]["angle_deg"] == pytest.approx(166.7, abs=1)
     assert found["corrections"][0]["mass"] == pytest.approx(2.1007779985, rel=1e-6)
     assert "certified" not in cli("balance", *job, "--table").out
 
