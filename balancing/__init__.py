@@ -7,12 +7,11 @@ and counts for the coefficients (`refine`).
 
 from __future__ import annotations
 
-from balancing.check_run import CheckComparison, compare_check, mounted_in, refine, with_check_runs
+from balancing.check_run import CheckComparison, compare_check, last_run, refine, with_check_runs
 from balancing.computed import combine, model_influence, with_parameters
 from balancing.conditioning import (
     Conditioning,
     UndeterminedError,
-    chance,
     check_runs,
     clear_change,
     conditioning,
@@ -31,7 +30,7 @@ from balancing.influence import (
     local_runs,
     match_speeds,
 )
-from balancing.iso21940 import Tolerance, tolerance
+from balancing.iso21940 import GRADES, Tolerance, tolerance
 from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian, white_rows
@@ -53,6 +52,7 @@ from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
 from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction
 
 __all__ = [
+    "GRADES",
     "METHODS",
     "UNBALANCE_METHODS",
     "CheckComparison",
@@ -85,7 +85,6 @@ __all__ = [
     "Verdict",
     "after_check_run",
     "best_subsets",
-    "chance",
     "change_of_run",
     "check_runs",
     "clear_change",
@@ -100,11 +99,11 @@ __all__ = [
     "estimate_unbalance",
     "expected_lag",
     "from_list",
+    "last_run",
     "local_runs",
     "match_speeds",
     "model_influence",
     "mount",
-    "mounted_in",
     "plane_load",
     "reading_of",
     "real_parts",

@@ -17,20 +17,22 @@ mounted; the correction itself stays the total for the bare rotor, so that limit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.conditioning import UndeterminedError
 from balancing.conventions import Labels
 from balancing.errors import reading_of
 from balancing.influence import Influence, Whitening, estimate_influence, match_speeds
+from balancing.noise import Noise
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import (
     ROUNDING,
+    covariance_column,
     largest_readings,
     reading_columns,
     rms,
@@ -41,22 +43,16 @@ from balancing.tables import (
 )
 from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import rpm_text
-from rotorid.base.text import figures, sentence
-from rotorid.regression import solution, stretch, unstretch
+from rotorid.base.result import Column, rows, text
+from rotorid.base.text import figures, listing, sentence
+from rotorid.regression import solution, unstretch
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from balancing.correction import Correction
 
 DRAWS = 400
-MOVED_AMPLITUDE, MOVED_ANGLE = 0.5, np.deg2rad(45)
-"""Relative change of the size of a coefficient, and of its phase, above which it is named."""
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,34 +117,18 @@ class CheckComparison(Answered):
         return np.asarray(self.achieved - self.predicted)
 
     @property
-    def improvement_predicted(self) -> float | None:
-        """Rms before by rms predicted; None where nothing should be left."""
-        return _factor(self.before, self.predicted)
-
-    @property
-    def improvement_achieved(self) -> float | None:
-        """Rms before by rms achieved; None where nothing was left."""
-        return _factor(self.before, self.achieved)
-
-    @property
-    def worst(self) -> tuple[int, int, int]:
-        """Run, speed and sensor of the reading that differs most: in its errors, or in size without them."""
-        size = np.abs(self.difference) if self.explained is None else self.distance
-        r, s, c = np.unravel_index(int(np.argmax(size)), size.shape)
-        return int(r), int(s), int(c)
-
-    @property
     def verdict(self) -> str:
         """One or two sentences: whether the errors explain the differences, and what else may."""
-        r, s, k = self.worst
+        size = np.abs(self.difference) if self.explained is None else self.distance
+        r, s, k = np.unravel_index(int(np.argmax(size)), size.shape)
         where = f"sensor {self.sensors[k]!r} at {self.labels.speed_words(self.speeds[s])}"
         if len(self.runs) > 1:
             where += f" in run {self.runs[r]!r}"
-        if self.explained is None or self.probability is None:
-            size = self.labels.vibration(self.difference)[0][r, s, k]
+        if self.probability is None:
+            most = figures(size[r, s, k] * self.labels.vibration_scale, 3)
             return (
                 "no verdict: the errors of the readings are not known (state them, or repeat readings); "
-                f"{where} differs most, by {figures(size, 3)} {self.labels.vibration_in}".rstrip()
+                f"{where} differs most, by {most} {self.labels.vibration_in}".rstrip()
             )
         share = 100 * self.probability
         chance = f"probability {f'{share:.0f}' if share > 1 else 'below 1'} %"
@@ -160,7 +140,7 @@ class CheckComparison(Answered):
         )
         return (
             f"the differences are not explained by the errors ({chance}): {likely}; {where} differs most, by "
-            f"{figures(self.distance[r, s, k], 2)} standard deviations"
+            f"{figures(size[r, s, k], 2)} standard deviations"
         )
 
     def _as_if(self) -> str:
@@ -204,15 +184,11 @@ class CheckComparison(Answered):
                 "rms_before": rms(sizes["before"]),
                 "rms_predicted": rms(sizes["predicted"]),
                 "rms_achieved": rms(sizes["achieved"]),
-                "improvement_predicted": self.improvement_predicted,
-                "improvement_achieved": self.improvement_achieved,
+                "improvement_predicted": _factor(self.before, self.predicted),
+                "improvement_achieved": _factor(self.before, self.achieved),
                 "warnings": self.warnings,
             }
         )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
-        return frame([column for column in self._columns() if column.name != "covariance"])
 
     @property
     def headline(self) -> str:
@@ -239,46 +215,30 @@ class CheckComparison(Answered):
 
     def _columns(self) -> tuple[Column, ...]:
         """One row per run, speed and sensor."""
-        R, S, C = self.achieved.shape
-        labels = self.labels
-        before = np.broadcast_to(self.before, (R, S, C))
+        R, labels = len(self.runs), self.labels
         rounding = ROUNDING * float(np.abs(self.before).max()) * labels.vibration_scale
-        blocks: Sequence[Any] | FloatArray = [None] * (R * S * C)
-        if self.explained is not None:
-            blocks = labels.vibration_covariance(self.covariance).reshape(-1, 2, 2)
+        before = np.broadcast_to(self.before, self.achieved.shape)
+        each = (("predicted", self.predicted), ("achieved", self.achieved), ("difference", self.difference))
+        vectors = (
+            vector_columns(labels, name, values, rounding) for name, values in (("before", before), *each)
+        )
+        places = reading_columns(labels, self.speeds, self.sensors)
+        known = None if self.explained is None else self.covariance
         return (
-            Column("run", np.repeat(self.runs, S * C)),
-            *(
-                replace(column, values=list(column.values) * R)
-                for column in reading_columns(labels, self.speeds, self.sensors)
-            ),
-            *vector_columns(labels, "before", before, rounding),
-            *vector_columns(labels, "predicted", self.predicted, rounding),
-            *vector_columns(labels, "achieved", self.achieved, rounding),
-            *vector_columns(labels, "difference", self.difference, rounding),
-            Column("covariance", blocks),
-            Column(
-                "distance",
-                self.distance.ravel(),
-                lambda distance: figures(distance, 2),
-                "std",
-            ),
+            Column("run", np.repeat(self.runs, before[0].size), str if R > 1 else None),
+            *(replace(column, values=list(column.values) * R) for column in places),
+            *chain.from_iterable(vectors),
+            covariance_column(labels, "covariance", known, before.size),
+            Column("distance", self.distance.ravel(), partial(figures, digits=2), "off by std"),
         )
 
     def _readings_text(self) -> str:
-        shown = {column.name: column for column in self._columns()}
-        if len(self.runs) > 1:
-            named = zip(shown["sensor"].values, shown["run"].values, strict=True)
-            shown["sensor"] = Column("sensor", [f"{sensor} ({run})" for sensor, run in named], str)
-        for name in ("before", "before_phase_deg", "difference_phase_deg"):
-            del shown[name]
-        foot = ""
-        if self.explained is None:
-            del shown["distance"]
-        else:
-            foot = "\nstd: the difference in its standard deviations"
+        hidden = {"before", "before_phase_deg", "difference_phase_deg"}
+        hidden |= {"distance"} if self.explained is None else set()
+        shown = [column for column in self._columns() if column.name not in hidden]
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        return f"Vibration{unit}, predicted and achieved\n{text(list(shown.values()), left=2)}{foot}"
+        table = text(shown, left=2 + (len(self.runs) > 1))
+        return f"Vibration{unit}, predicted and achieved\n{table}"
 
 
 def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
@@ -317,33 +277,30 @@ def compare_check(
     """
     today = influence if baseline is None else influence.rebased(baseline)
     at = match_speeds(check.speeds, today.speeds)
-    sensors = [_index(name, today.sensors, "sensor") for name in check.sensors]
-    part = today.part(at, sensors)
+    part = today.part(at, [index_of(name, today.sensors, "sensor") for name in check.sensors])
     T = np.zeros((len(check.runs), len(part.planes)), dtype=complex)
-    for plane, weights in mounted_in(check, correction).items():
+    for plane, weights in _mounted(check, correction).items():
         if plane in part.planes or weights.any():
-            T[:, _index(plane, part.planes, "plane")] = weights
+            T[:, index_of(plane, part.planes, "plane")] = weights
     predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, T)
     difference = check.mean - predicted
-    R, S, C = difference.shape
     reading = reading_of(check)
-    warnings = check.warnings + (reading.warnings if reading.source != "assumed" else ())
-    covariance, distance = np.full((R, S, C, 2, 2), np.nan), np.full((R, S, C), np.nan)
+    covariance = np.full((*difference.shape, 2, 2), np.nan)
+    distance = covariance[..., 0, 0]
     chi_square = probability = explained = change = None
     if part.known_errors:
         local = replace(check, planes=part.planes, weights=T, speeds=part.speeds)
         noise = part.difference_noise(local, predicted)
         V = noise.covariance(part.errors.sizes)
+        R, S, C = difference.shape
         covariance = np.einsum("scrarb->rscab", V.reshape(S, C, R, 2, R, 2))
         d = real_parts(difference[..., None])
         distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, np.linalg.solve(covariance, d[..., None])[..., 0]))
-        white = Whitening(noise, part.errors.sizes)
-        chi_square = white.chi_square(np.moveaxis(difference, 0, -1))
-        drawn = [white.chi_square(each) for block in part.noise_draws(noise, DRAWS) for each in block]
-        probability = (1 + np.count_nonzero(np.array(drawn) >= chi_square)) / (1 + len(drawn))
+        target, drawn = _white(part, noise, difference)
+        chi_square = float(np.sum(target**2))
+        probability = (1 + np.count_nonzero(np.sum(drawn**2, axis=0) >= chi_square)) / (1 + DRAWS)
         explained = bool(probability >= 1 - LEVEL)
-        if not explained:
-            change = _change(part.W, np.moveaxis(difference, 0, -1), white, np.quantile(drawn, LEVEL))
+        change = None if explained else _change(part, local, difference)
     return CheckComparison(
         runs=check.runs,
         sensors=check.sensors,
@@ -362,39 +319,64 @@ def compare_check(
         explained=explained,
         change=change,
         labels=today.labels,
-        warnings=warnings,
+        warnings=check.warnings + (reading.warnings if reading.source != "assumed" else ()),
     )
 
 
-def _change(W: ComplexArray, difference: ComplexArray, white: Whitening, limit: float) -> ComplexArray | None:
-    """Weights δ (P,), the same in all runs, that leave no more than errors do; None if none do.
+def _white(part: Influence, noise: Noise, *differences: ComplexArray) -> list[FloatArray]:
+    """Differences (R, S, C) and draws of their noise divided by its size: (n,) each, and (n, DRAWS)."""
+    white = Whitening(noise, part.errors.sizes)
+    each = [white.white(real_parts(np.moveaxis(one, 0, -1))[..., None])[:, 0] for one in differences]
+    drawn = [white.white(np.moveaxis(real_parts(block), 0, -1)) for block in part.noise_draws(noise, DRAWS)]
+    return [*each, np.column_stack(drawn)]
 
-    Generalised least squares, δ of one plane first, then of all: `limit` is what errors leave with 95 %.
+
+def _change(part: Influence, check: Trials, difference: ComplexArray) -> ComplexArray | None:
+    """Weights δ (P,), the same in all runs, of one plane, else of all, with which errors explain the rest.
+
+    By least squares, errors those of the readings as they are with δ mounted; None: there are none.
     """
-    S, C, P = W.shape
-    R = difference.shape[-1]
-    target = white.white(real_parts(difference)[..., None])[:, 0]
-    rows_ = stretch(W.reshape(S * C, 1, P)).reshape(S, C, 1, 2, 2 * P)
-    A = white.white(np.repeat(rows_, R, axis=2).reshape(S, C, 2 * R, 2 * P))
-    best: tuple[float, ComplexArray] | None = None
-    for planes in ([[p] for p in range(P)], [list(range(P))]):
-        for chosen in planes:
-            real = [2 * p + part for p in chosen for part in (0, 1)]
-            if len(target) <= len(real):
-                continue
-            delta = solution(A[:, real], target, rcond=1e-10)
-            left = float(np.sum((target - A[:, real] @ delta) ** 2))
-            # errors leave less where weights take part of them
-            if left <= limit * (1 - len(real) / len(target)) and (best is None or left < best[0]):
-                found = np.zeros(P, dtype=complex)
-                found[chosen] = unstretch(delta)
-                best = left, found
-        if best is not None:
-            return best[1]
-    return None
+    P = len(part.planes)
+    fits: list[tuple[float, ComplexArray]] = []
+    for planes in (*([p] for p in range(P)), list(range(P))):
+        if len(planes) >= difference.size or (len(planes) > 1 and fits):
+            continue
+        effects = [np.broadcast_to(z * part.W[..., p], difference.shape) for p in planes for z in (1, 1j)]
+        change = np.zeros(P, dtype=complex)
+        for _ in range(2):  # errors depend on what is mounted
+            noise = part.difference_noise(replace(check, weights=check.weights + change), check.mean)
+            target, *columns, drawn = _white(part, noise, difference, *effects)
+            A = np.column_stack(columns)
+            change[planes] = unstretch(solution(A, target, rcond=1e-10))
+        basis = np.linalg.qr(A)[0]
+        left, usual = (
+            np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (target, drawn)
+        )
+        if left <= (most := np.quantile(usual, LEVEL)):
+            fits.append((left / most, change))
+    return min(fits, key=lambda fit: fit[0])[1] if fits else None
 
 
-def _index(name: str, names: tuple[str, ...], what: str) -> int:
+def last_run(runs: Trials) -> Trials:
+    """The last of several runs.
+
+    Parameters
+    ----------
+    runs
+        One or more.
+
+    Returns
+    -------
+    Trials
+        With its readings and weights.
+    """
+    parts = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
+    last = {name: part[..., -1:, :, :] for name, part in parts.items() if part is not None}
+    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
+
+
+def index_of(name: str, names: tuple[str, ...], what: str) -> int:
+    """Where a name of a check run stands among those of the coefficients."""
     if name not in names:
         raise ValueError(
             f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "
@@ -403,208 +385,101 @@ def _index(name: str, names: tuple[str, ...], what: str) -> int:
     return names.index(name)
 
 
-def refine(
-    trials: Trials, *checks: Trials, corrections: Correction | Mapping[str, complex] | None = None
-) -> Influence:
+def refine(trials: Trials, check: Trials, corrections: Correction | None = None) -> Influence:
     """Influence coefficients from trial runs and check runs together.
 
     Parameters
     ----------
     trials
         Trial runs, as for `estimate_influence`.
-    checks
-        Check runs in their order, of all sensors and speeds of the trial runs (speeds within 0.5 % count as
-        one). Weights of their planes are all that was mounted in them.
+    check
+        Check runs in their order, of the same sensors and speeds (speeds within 0.5 % count as one). Weights
+        of their planes are all that was mounted in them.
     corrections
-        What was mounted in check runs that have no planes: a correction, or weights by plane.
+        What was mounted in check runs that have no planes.
 
     Returns
     -------
     Influence
-        Its last run is the last check run, so that `Correction.to_add` is what to add to it. A warning names
-        the coefficient that moved most, where it moved by more than 50 % or 45°.
+        Its last run is the last check run, so that `Correction.to_add` is what to add to it.
 
     Raises
     ------
     UndeterminedError
         Where all runs together do not determine the coefficients.
     ValueError
-        Without check runs; for sensors and speeds that only some of the runs have, and where nobody says
-        what was mounted.
+        For other sensors and speeds, and where nobody says what was mounted.
     """
-    if not checks:
-        raise ValueError("there is no check run: give one or more beside the trial runs")
-    joint = with_check_runs(trials, *checks, corrections=corrections)
-    if joint.mean[0].size < trials.mean[0].size:
-        lacking = [name for name in trials.sensors if name not in joint.sensors]
-        words = f"sensor {lacking[0]!r}" if lacking else "every speed of the trial runs"
-        raise ValueError(
-            f"the check runs have no readings of {words}: read all of them, or leave it out of the trial runs"
-        )
-    refined = estimate_influence(joint)
-    try:
-        alone = estimate_influence(trials)
-    except UndeterminedError:
-        return refined
-    remarks = refined.remarks
-    return replace(refined, remarks=remarks._replace(warnings=remarks.warnings + _moved(alone, refined)))
+    return estimate_influence(with_check_runs(trials, check, corrections))
 
 
-def mounted_in(
-    check: Trials, corrections: Correction | Mapping[str, complex] | None = None
-) -> dict[str, ComplexArray]:
-    """Weights of each run of a check by plane, shape (R,).
-
-    Parameters
-    ----------
-    check
-        R runs; their weights count where they have any.
-    corrections
-        What is taken to be mounted else.
-
-    Raises
-    ------
-    ValueError
-        Where nobody says what was mounted.
-    """
-    R = len(check.runs)
+def _mounted(check: Trials, correction: Correction | None) -> dict[str, ComplexArray]:
+    """Weights of each run of a check by plane, (R,): its own, or else what was proposed."""
     if check.planes:
-        return {plane: check.weights[:, p] for p, plane in enumerate(check.planes)}
-    if corrections is None:
+        return dict(zip(check.planes, check.weights.T, strict=True))
+    if correction is None:
         raise ValueError(
             f"what was mounted in the check run {check.runs[0]!r} is not known: give its weights table, or "
             "the corrections that were mounted"
         )
-    if isinstance(corrections, Mapping):
-        return {plane: np.full(R, weight, dtype=complex) for plane, weight in corrections.items()}
-    pairs = zip(corrections.planes, corrections.weights.tolist(), strict=True)
-    return {plane: np.full(R, weight, dtype=complex) for plane, weight in pairs}
+    every = np.tile(correction.weights[:, None], len(check.runs))
+    return dict(zip(correction.planes, every, strict=True))
 
 
-def _runs_and_weights(
-    trials: Trials, checks: Sequence[Trials], corrections: Correction | Mapping[str, complex] | None
-) -> tuple[tuple[str, ...], tuple[str, ...], ComplexArray]:
-    """Names of all runs (R), of the planes with a weight in any (P), and the weights (R, P)."""
-    mounted = [mounted_in(check, corrections) for check in checks]
-    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
-    planes = tuple(dict.fromkeys((*trials.planes, *later)))
-    names = list(trials.runs)
-    for check in checks:
-        for name in check.runs:
-            names.append(_different(name, names))
-    weights = np.zeros((len(names), len(planes)), dtype=complex)
-    weights[: len(trials.runs), : len(trials.planes)] = trials.weights
-    first = len(trials.runs)
-    for check, each in zip(checks, mounted, strict=True):
-        last = first + len(check.runs)
-        for p, plane in enumerate(planes):
-            weights[first:last, p] = each.get(plane, 0.0)
-        first = last
-    return tuple(names), planes, weights
-
-
-def _different(name: str, names: Sequence[str]) -> str:
-    """The name, marked where there is such a run already."""
-    new, k = name, 1
-    while new in names:
-        new = f"{name} (check)" if k == 1 else f"{name} (check {k})"
-        k += 1
-    return new
-
-
-def with_check_runs(
-    trials: Trials, *checks: Trials, corrections: Correction | Mapping[str, complex] | None = None
-) -> Trials:
-    """Trial runs and check runs as one table, of the speeds and sensors that all have.
+def with_check_runs(trials: Trials, check: Trials, corrections: Correction | None = None) -> Trials:
+    """Trial runs and check runs as one table.
 
     Parameters
     ----------
-    trials, checks, corrections
+    trials, check, corrections
         As of `refine`.
+
+    Raises
+    ------
+    ValueError
+        For check runs of other sensors and speeds, and where nobody says what was mounted.
     """
-    rows_ = [match_speeds(check.speeds, trials.speeds, "trial runs") for check in checks]
-    for name in (name for check in checks for name in check.sensors):
-        if name not in trials.sensors:
-            raise ValueError(
-                f"the check run has readings of sensor {name!r}, which the trial runs do not have; they have "
-                f"those of {', '.join(map(repr, trials.sensors))}"
-            )
-    common = [s for s in range(len(trials.speeds)) if all(s in speeds for speeds in rows_)]
-    sensors = [name for name in trials.sensors if all(name in check.sensors for check in checks)]
-    if not (common and sensors):
+    at = match_speeds(trials.speeds, check.speeds, "readings of the check run")
+    if {*check.sensors} != {*trials.sensors}:
         raise ValueError(
-            "the check runs have no sensor and speed in common: give those together that were read alike"
+            f"the check runs have readings of {listing(map(repr, check.sensors), 'and')}, the trial runs of "
+            f"{listing(map(repr, trials.sensors), 'and')}: give those of the same sensors"
         )
-    names, planes, weights = _runs_and_weights(trials, checks, corrections)
-    tables = (trials, *checks)
-    picks = [
-        ([speeds.index(s) for s in common], [each.sensors.index(name) for name in sensors])
-        for each, speeds in zip(tables, [list(range(len(trials.speeds))), *rows_], strict=True)
-    ]
+    pick = np.ix_(at, [check.sensors.index(name) for name in trials.sensors])
+    mounted, R = _mounted(check, corrections), len(trials.runs)
+    planes = tuple(dict.fromkeys((*trials.planes, *(p for p, weights in mounted.items() if weights.any()))))
+    T = np.zeros((R + len(check.runs), len(planes)), dtype=complex)
+    T[:R, : len(trials.planes)] = trials.weights
+    for p, plane in enumerate(planes):
+        T[R:, p] = mounted.get(plane, 0.0)
+    stated = trials.errors or check.errors
+    measured = [each.covariance for each in (trials, check) if each.covariance is not None]
+    # of typed readings beside measured ones: the mean of these, or none beside stated errors
+    usual = 0.0 if stated or not measured else float(np.nanmean(measured[0][[0, 1], [0, 1]]))
 
-    def of_all(arrays: Iterable[AnyArray]) -> AnyArray:
-        return _side_by_side([a[..., at, :][..., of] for a, (at, of) in zip(arrays, picks, strict=True)])
+    def joined(name: str, missing: FloatArray) -> Any:  # noqa: ANN401
+        """Arrays (…, K, R, S, C) of both as one, NaN where one has fewer repeats."""
+        both = [getattr(trials, name), getattr(check, name)]
+        if all(array is None for array in both):
+            return None
+        both[1] = None if both[1] is None else both[1][..., *pick]
+        most, padded = max(len(trials.readings), len(check.readings)), []
+        for runs, array in zip((trials, check), both, strict=True):
+            K, R = runs.readings.shape[:2]
+            full = np.multiply.outer(missing, np.ones((K, R, *trials.readings.shape[2:])))
+            gap = [*[(0, 0)] * missing.ndim, (0, most - K), *[(0, 0)] * 3]
+            padded.append(np.pad(full if array is None else array, gap, constant_values=np.nan))
+        return np.concatenate(padded, axis=-3)
 
-    rounded = any(each.steps is not None for each in tables)
-    measured = any(each.covariance is not None for each in tables)
     return replace(
         trials,
-        runs=names,
-        speeds=trials.speeds[common],
-        sensors=tuple(sensors),
+        runs=(*trials.runs, *(f"{name} (check)" if name in trials.runs else name for name in check.runs)),
         planes=planes,
-        readings=of_all(each.readings for each in tables),
-        weights=weights,
-        errors=next((each.errors for each in tables if each.errors is not None), None),
-        run_errors=next((each.run_errors for each in tables if each.run_errors is not None), None),
-        warnings=tuple(dict.fromkeys(word for each in tables for word in each.warnings)),
-        steps=of_all(map(_steps, tables)) if rounded else None,
-        covariance=of_all(_covariances(tables)) if measured else None,
-    )
-
-
-def _steps(trials: Trials) -> FloatArray:
-    """Of readings that are not rounded: zero."""
-    return np.zeros((2, *trials.readings.shape)) if trials.steps is None else trials.steps
-
-
-def _covariances(tables: Sequence[Trials]) -> list[FloatArray]:
-    """As measured; of a table without them zero where errors are stated, else the mean of the others."""
-    known = [np.nanmean(each.covariance[[0, 1], [0, 1]]) for each in tables if each.covariance is not None]
-    variance = 0.0 if any(each.errors is not None for each in tables) else np.mean(known)
-    usual = variance * np.eye(2)[..., None, None, None, None]
-    return [
-        np.tile(usual, each.readings.shape) if each.covariance is None else each.covariance for each in tables
-    ]
-
-
-def _side_by_side(blocks: Sequence[AnyArray]) -> AnyArray:
-    """Runs of several tables, arrays (…, K, R, S, C), as those of one: NaN where one has fewer repeats."""
-    most = max(block.shape[-4] for block in blocks)
-    padded = []
-    for block in blocks:
-        gap = np.full((*block.shape[:-4], most - block.shape[-4], *block.shape[-3:]), np.nan, block.dtype)
-        padded.append(np.concatenate((block, gap), axis=-4))
-    return np.concatenate(padded, axis=-3)
-
-
-def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
-    """Name the coefficient that moved most, if it moved by more than 50 % or 45°."""
-    planes = [refined.planes.index(plane) for plane in alone.planes]
-    old, new = alone.W, refined.W[..., planes]
-    rounding = _ROUNDING * np.abs(old).max()
-    far = np.abs(new - old) / np.maximum(np.abs(old), rounding)
-    turned = np.abs(np.angle(new * np.conj(old))) > MOVED_ANGLE
-    moved = np.where((np.abs(np.abs(new / old) - 1) > MOVED_AMPLITUDE) | turned, far, 0.0)
-    if not moved.any():
-        return ()
-    s, c, p = np.unravel_index(int(np.argmax(moved)), moved.shape)
-    ratio = new[s, c, p] / old[s, c, p]
-    more = f" (and {np.count_nonzero(moved) - 1} more)" if np.count_nonzero(moved) > 1 else ""
-    return (
-        f"the check runs move the coefficient of plane {alone.planes[p]!r} on sensor {alone.sensors[c]!r} at "
-        f"{rpm_text(alone.speeds[s])} by {100 * (abs(ratio) - 1):+.0f} % and "
-        f"{np.degrees(np.angle(ratio)):+.0f}°"
-        f"{more}: check what was mounted in each run, and where; else the rotor does not repeat itself or is "
-        "not linear",
+        readings=joined("readings", np.ones(())),
+        weights=T,
+        errors=stated,
+        run_errors=trials.run_errors or check.run_errors,
+        warnings=tuple(dict.fromkeys(trials.warnings + check.warnings)),
+        steps=joined("steps", np.zeros(2)),
+        covariance=joined("covariance", usual * np.eye(2)),
     )

@@ -7,7 +7,6 @@ people of the job write them. The signs are derived in docs/conventions.md.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -122,18 +121,8 @@ class Labels:
         """A phase as the job writes it as a lead; the same turns it back. Any unit."""
         return self.phase_sign * phase
 
-    def arc_from(self, first: float, last: float, *, opposite: bool = False) -> tuple[float, float]:
-        """First angle and width, rad with the rotation, of the degrees from → to as the job writes them.
-
-        Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material
-        is removed a job says where nothing can be taken away; the weight that would have to be added instead
-        stands `opposite`, and so does the arc of the correction.
-        """
-        start = (first if self.angle_sign > 0 else -last) + (180.0 if opposite else 0.0)
-        return math.radians(start % 360.0), math.radians((last - first) % 360.0)
-
     def arc(self, start: float, width: float, *, opposite: bool = False) -> list[float]:
-        """From and to, degrees as the job writes them, of an arc in rad: turns back `arc_from`."""
+        """From and to, degrees as the job writes them, of an arc's first angle and width, rad."""
         ends = np.degrees([start, start + width])[:: self.angle_sign] * self.angle_sign
         return [float(round(end, 9)) for end in np.mod(ends + (180.0 if opposite else 0.0), 360.0)]
 

@@ -224,8 +224,7 @@ class Correction(Prediction, Answered):
         """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown).
 
         Where material is taken away from a plane, `action` says so, `angle_deg` is the place to work at, and
-        `equivalent_added_deg` the angle of the added weight that would do the same. Where a convention is
-        assumed, `mass_if_…` and `angle_deg_if_…` say what the other reading gives.
+        `equivalent_added_deg` the angle of the added weight that would do the same.
         """
         *numbers, _, action, _ = self._weight_columns()
         shown = frame(numbers)
@@ -233,10 +232,6 @@ class Correction(Prediction, Answered):
             shown.insert(1, "action", list(action.values))
             shown["equivalent_added_deg"] = shown["angle_deg"]
             shown["angle_deg"] = self.places(self.planes, self.weights)
-        for other in self.others:
-            word = other.words.replace(" ", "_")
-            shown[f"mass_if_{word}"] = [row["mass"] for row in other.rows]
-            shown[f"angle_deg_if_{word}"] = other.places
         return shown
 
     def otherwise(self, words: str) -> OtherReading:
@@ -354,21 +349,15 @@ class Correction(Prediction, Answered):
         return "\n".join([text(columns, width=COLUMNS), *lines])
 
     def _vibration_text(self) -> str:
-        columns, scale = list(self.vibration_columns(INVISIBLE)), self.labels.vibration_scale
+        columns = list(self.vibration_columns(INVISIBLE))
         if self.errors_known:
             columns.append(Column("95 % within", self.within.ravel(), lambda width: f"± {figures(width, 2)}"))
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        old, new = np.abs(self.before).max() * scale, np.abs(self.after).max() * scale
-        head = f"Vibration{unit}, bare rotor before and predicted after"
-        return f"{head}\n{text(columns, left=2)}\nlargest {three_figures(old)} → {small(new, old)}"
+        return f"Vibration{unit}, bare rotor before and predicted after\n{text(columns, left=2)}"
 
     def _quality_text(self) -> str:
         """What the method makes small, what is determined, and with what errors."""
         lines = [self.method_in_words, self.conditioning.sentence()]
-        if self.fitted.gap is not None:
-            lines[0] += (
-                f" The optimum is certified: at most {max(self.fitted.gap, 0.0):.1e} better is possible."
-            )
         if self.errors_known:
             lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))
         return "\n".join(wrap(line, "") for line in lines)

@@ -15,7 +15,7 @@ Weights are not worth mounting
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -24,7 +24,6 @@ import numpy as np
 
 from balancing.conditioning import REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
-from balancing.methods import solve
 from balancing.planes import error_form
 from balancing.tables import reading_names, rms
 from rotorid.base.text import figures, listing
@@ -50,61 +49,9 @@ WEAK, CLEAR = 3.0, 5.0
 """Effect of a trial weight in units of its errors: too small below, and of a good one."""
 COARSE = 0.1
 """Of a reading: a digit that is one of few."""
-ILL_CONDITIONED = 30.0
-"""Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""
-STRENGTHS = (0.03, 0.1, 0.3)
-"""Of a ridge that is proposed."""
 _ALL = 4
-
-
-@dataclass(frozen=True, eq=False)
-class Forms:
-    """R and F of the module, (P + 1, P + 1), readings by their weights."""
-
-    R: ComplexArray
-    F: ComplexArray
-
-    @classmethod
-    def of(cls, part: Influence, row_weights: FloatArray | None) -> Forms:
-        """Of coefficients with the vibration to correct as baseline."""
-        N, P = part.baseline.size, len(part.planes)
-        w = np.ones(N) if row_weights is None else row_weights
-        w = w / np.linalg.norm(w)
-        A = w[:, None] * np.column_stack((part.baseline.ravel(), part.W.reshape(N, P)))
-        F = error_form(part.channels().reshape(N, 2 * P + 2, 2 * P + 2), w)
-        return cls(np.asarray(A.conj().T @ A, dtype=complex), F)
-
-    @property
-    def before(self) -> float:
-        """Root mean square of the vibration to correct."""
-        return float(np.sqrt(self.R[0, 0].real))
-
-    @property
-    def effect(self) -> FloatArray:
-        """Root mean square effect of a unit weight in each plane, (P,)."""
-        return np.asarray(np.sqrt(np.diag(self.R).real[1:]))
-
-    @property
-    def clearness(self) -> FloatArray:
-        """Effect of each plane in units of its errors, (P,)."""
-        error = np.sqrt(np.maximum(np.diag(self.F).real[1:], 0.0))
-        return np.asarray(np.where(error > 0, self.effect / np.where(error > 0, error, 1.0), np.inf))
-
-    def choice(
-        self, names: Sequence[str], planes: Sequence[int], weights: ComplexArray | None = None
-    ) -> Choice:
-        """Some of the planes, by least squares or with given weights."""
-        at = [1 + p for p in planes]
-        D = -solution(self.R[np.ix_(at, at)], self.R[at, 0]) if weights is None else weights
-        z = np.zeros(len(self.R), dtype=complex)
-        z[[0, *at]] = [1.0, *D]
-        left, errors = (np.sqrt(max(float(np.vdot(z, form @ z).real), 0.0)) for form in (self.R, self.F))
-        return Choice(tuple(names[p] for p in planes), np.asarray(D), float(left), float(errors))
-
-    def sound(self, choice: Choice) -> bool:
-        """Whether errors leave most of what the weights promise."""
-        more = choice.error**2 - self.F[0, 0].real
-        return bool(more <= 0 or more < EATEN * (self.before**2 - choice.rms**2))
+_MORE = 1 + 1e-6
+"""Above a limit by more than rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +65,6 @@ class Case:
     today: Influence
     row_weights: FloatArray | None
     limits: Limits | None
-
-    @cached_property
-    def forms(self) -> Forms:
-        """Of the part."""
-        return Forms.of(self.part, self.row_weights)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -139,28 +81,68 @@ class Case:
         """Coefficients, (N, P)."""
         return np.asarray(self.part.W.reshape(-1, len(self.names)))
 
+    @cached_property
+    def forms(self) -> tuple[ComplexArray, ComplexArray]:
+        """R and F of the module, (P + 1, P + 1), readings by their weights."""
+        N, P = self.W.shape
+        w = np.ones(N) if self.row_weights is None else self.row_weights
+        w = w / np.linalg.norm(w)
+        A = w[:, None] * np.column_stack((self.part.baseline.ravel(), self.W))
+        F = error_form(self.part.channels().reshape(N, 2 * P + 2, 2 * P + 2), w)
+        return np.asarray(A.conj().T @ A), F
+
     @property
-    def max_weight(self) -> FloatArray:
-        """Of each plane."""
-        return np.full(len(self.names), np.inf) if self.limits is None else self.limits.max_weight
+    def before(self) -> float:
+        """Root mean square of the vibration to correct."""
+        return float(np.sqrt(self.forms[0][0, 0].real))
+
+    @property
+    def effect(self) -> FloatArray:
+        """Root mean square effect of a unit weight in each plane, (P,)."""
+        return np.asarray(np.sqrt(np.diag(self.forms[0]).real[1:]))
+
+    @property
+    def clearness(self) -> FloatArray:
+        """Effect of each plane in units of its errors, (P,)."""
+        error = np.sqrt(np.diag(self.forms[1]).real[1:].clip(0.0))
+        return np.asarray(np.where(error > 0, self.effect / np.where(error > 0, error, 1.0), np.inf))
 
     @property
     def weak(self) -> list[int]:
         """Planes whose effect is not clear of its errors."""
-        return [int(p) for p in np.flatnonzero(self.forms.clearness < WEAK)]
+        return [int(p) for p in np.flatnonzero(self.clearness < WEAK)]
+
+    @property
+    def max_weight(self) -> FloatArray:
+        """Of each plane, (P,)."""
+        return np.full(len(self.names), np.inf) if self.limits is None else self.limits.max_weight
+
+    def choice(self, planes: Sequence[int], weights: ComplexArray | None = None) -> Choice:
+        """Some of the planes, by least squares or with given weights."""
+        (R, F), at = self.forms, [1 + p for p in planes]
+        D = -solution(R[np.ix_(at, at)], R[at, 0]) if weights is None else weights
+        z = np.zeros(len(R), dtype=complex)
+        z[[0, *at]] = [1.0, *D]
+        left, errors = (float(np.sqrt((z.conj() @ form @ z).real.clip(0.0))) for form in (R, F))
+        return Choice(tuple(self.names[p] for p in planes), np.asarray(D), left, errors)
+
+    def sound(self, choice: Choice) -> bool:
+        """Whether errors leave most of what the weights promise."""
+        more = choice.error**2 - self.forms[1][0, 0].real
+        return bool(more <= 0 or more < EATEN * (self.before**2 - choice.rms**2))
+
+    def strength(self, choice: Choice) -> float:
+        """Root mean square effect of the largest weight."""
+        at = [self.names.index(plane) for plane in choice.planes]
+        return float((np.abs(choice.weights) * self.effect[at]).max())
 
     def fewer(self) -> tuple[Choice, ...]:
         """Choices of fewer planes within the limits of weights: all of four planes, one left out of more."""
         P = len(self.names)
         every = (p for k in (range(1, P) if P <= _ALL else [P - 1]) for p in combinations(range(P), k))
-        choices = [(self.forms.choice(self.names, planes), list(planes)) for planes in every]
+        choices = [(self.choice(planes), list(planes)) for planes in every]
         kept = [c for c, planes in choices if (np.abs(c.weights) <= self.max_weight[planes]).all()]
         return tuple(sorted(kept, key=lambda c: c.expected))
-
-    def proposed(self, choices: Sequence[Choice]) -> Choice | None:
-        """The sound one with the smallest 95 % bound, if that is not much above the vibration before."""
-        good = [c for c in choices if self.forms.sound(c) and c.most < WORTH * self.forms.before]
-        return min(good, key=lambda c: c.most, default=None)
 
     def trial_weight(self, p: int) -> float:
         """The largest one of a plane, kg; 0: there was none."""
@@ -188,63 +170,43 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
     limits
         Of all speeds and planes; None: none.
     """
-    forms, D, today = case.forms, result.weights, case.today
-    whole = forms.choice(case.names, range(len(D)), D)
-    fewer = case.fewer()
-    calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * forms.before]
-    fighting = any(_effect(case, whole) >= FIGHTING * _effect(case, c) for c in calm)
-    sound = forms.sound(whole) and not fighting
-    bound = result.check_rms / rms(result.before) if result.errors_known else 0.0
-    stop: tuple[str, str, tuple[str, ...]] | None = None  # word, cause, instead
-    better = _better_run(result, case, whole.rms) if sound and D.any() else None
-    if better is not None:
-        stop = ("do not mount", *better)
-    elif D.any() and (not sound or bound > HARDLY_BELOW or (unclear and bound**2 > 1 - EATEN)):
-        stop = _stopped(result, case, whole, fewer, unclear, sound=sound)
-    made = {"before": forms.before, "expected": whole.expected, "choices": fewer}
-    if stop is not None:
-        return MountDecision(*stop, **made, warnings=_contradicted(result))  # type: ignore[arg-type]
-    warnings = (
-        *_not_determined(result, case, unclear),
-        *_contradicted(result),
-        *_rising(result, today, limits),
+    D, before = result.weights, case.before
+    whole, fewer = case.choice(range(len(D)), D), case.fewer()
+    made = MountDecision(
+        before=before, expected=whole.expected, choices=fewer, warnings=_contradicted(result)
     )
-    return MountDecision(**made, warnings=warnings, notes=coarse(today))  # type: ignore[arg-type]
-
-
-def _stopped(
-    result: Correction,
-    case: Case,
-    whole: Choice,
-    fewer: Sequence[Choice],
-    unclear: Sequence[str],
-    *,
-    sound: bool,
-) -> tuple[str, str, tuple[str, ...]]:
-    """Word, cause and what to do instead of weights that are not worth mounting."""
-    before = case.forms.before
+    calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * before]
+    fighting = any(case.strength(whole) >= FIGHTING * case.strength(c) for c in calm)
+    sound = case.sound(whole) and not fighting
+    if sound and D.any() and (better := _better_run(result, case, whole.rms)):
+        return replace(made, word="do not mount", cause=better[0], instead=better[1:])
+    bound = result.check_rms / rms(result.before) if result.errors_known else 0.0
+    if not D.any() or (sound and bound <= HARDLY_BELOW and not (unclear and bound**2 > 1 - EATEN)):
+        together = "; each weight alone is uncertain, what they leave together is not"
+        alike = () if result.combination else unclear
+        open_ = (words.removesuffix(REMEDY) + together for words in alike)
+        warnings = (*open_, *made.warnings, *_rising(result, case.today, limits))
+        return replace(made, warnings=warnings, notes=coarse(case.today))
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
         f"with the weights, expect rms {case.shown(whole.expected)} rather than {promised}; without them "
         f"it is {case.shown(before)}"
     )
-    contradictions = case.today.remarks.contradictions
-    if contradictions:
+    if contradictions := case.today.remarks.contradictions:
         instead = ("Instead: mend the table, or measure these runs again until they agree.",)
-        return "measure again", "; ".join((*contradictions, outlook)), instead
+        return replace(
+            made, word="measure again", cause="; ".join((*contradictions, outlook)), instead=instead
+        )
     causes = [words.removesuffix(REMEDY) + "; their weights are not determined" for words in unclear]
     if not sound:
         causes = _causes(result, case)
     elif not causes:
         causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
-    return (
-        "do not mount",
-        "; ".join((*causes, outlook)),
-        remedies(case, fewer, ridge=result.method != "ridge"),
-    )
+    cause = "; ".join((*causes, outlook))
+    return replace(made, word="do not mount", cause=cause, instead=remedies(case, fewer))
 
 
-def remedies(case: Case, fewer: Sequence[Choice] | None = None, *, ridge: bool = True) -> tuple[str, ...]:
+def remedies(case: Case, fewer: Sequence[Choice] | None = None) -> tuple[str, ...]:
     """What to do instead of mounting weights in all the planes, in sentences with numbers.
 
     Parameters
@@ -253,40 +215,32 @@ def remedies(case: Case, fewer: Sequence[Choice] | None = None, *, ridge: bool =
         What weights would be made of.
     fewer
         Choices of fewer planes, if they are known.
-    ridge
-        Whether one may be proposed.
     """
-    weak = case.weak
-    alike = len(case.names) > 1 and not weak
-    words = []
-    if best := case.proposed(case.fewer() if fewer is None else fewer):
+    weak, words = case.weak, []
+    every = case.fewer() if fewer is None else fewer
+    good = [c for c in every if case.sound(c) and c.most < WORTH * case.before]
+    if good:
+        best = min(good, key=lambda c: c.most)
         planes = listing(map(repr, best.planes), "and")
         named = f"plane {planes} alone" if len(best.planes) == 1 else f"only planes {planes}"
         mass = ", ".join(case.labels.weight_words(float(m)) for m in np.abs(best.weights))
-        words.append(f"{named} (--planes {','.join(best.planes)}; {mass}) would leave {_left(case, best)}")
-    if alike and ridge and case.limits is None:
-        tried = {strength: _ridge(case, strength) for strength in STRENGTHS}
-        if best := case.proposed(list(tried.values())):
-            strength = next(s for s, c in tried.items() if c is best)
-            words.append(f"--ridge {strength:g} would leave {_left(case, best)}")
+        left, most, before = (case.shown(size) for size in (best.rms, best.most, case.before))
+        words.append(
+            f"{named} (--planes {','.join(best.planes)}; {mass}) would leave rms {left}, at most {most} "
+            f"with 95 %, of {before}"
+        )
     words += [_trial(case, p) for p in weak if case.trial_weight(p)]
     if coarse(case.today):
         words.append("read the instrument in a range that shows more digits")
-    if alike:
+    if len(case.names) > 1 and not weak:
         planes = listing((repr(case.names[p]) for p in acting_alike(case.W)), "and")
         words.append(f"add a sensor or a speed at which planes {planes} act differently")
     return tuple(f"{'Or' if i else 'Instead'}: {w}." for i, w in enumerate(words))
 
 
-def _ridge(case: Case, strength: float) -> Choice:
-    Y = case.part.baseline.ravel()
-    D = solve(case.W, Y, "least-squares", row_weights=case.row_weights, strength=strength).weights
-    return case.forms.choice(case.names, range(len(D)), D)
-
-
 def _trial(case: Case, p: int) -> str:
     """A trial weight whose effect is clear of its error."""
-    ratio, name = float(case.forms.clearness[p]), case.names[p]
+    ratio, name = float(case.clearness[p]), case.names[p]
     needed, most = case.trial_weight(p) * CLEAR / ratio, float(case.max_weight[p])
     if needed > most:
         words = case.labels.weight_words(most)
@@ -295,57 +249,40 @@ def _trial(case: Case, p: int) -> str:
     return f"repeat the trial run of plane {name!r} with {'at least' if ratio < 2 else 'about'} {size}"
 
 
-def _left(case: Case, choice: Choice) -> str:
-    left, most, before = (case.shown(size) for size in (choice.rms, choice.most, case.forms.before))
-    return f"rms {left}, at most {most} with 95 %, of {before}"
-
-
-def _effect(case: Case, choice: Choice) -> float:
-    """Root mean square effect of the largest weight."""
-    at = [case.names.index(plane) for plane in choice.planes]
-    return float((np.abs(choice.weights) * case.forms.effect[at]).max())
-
-
 def _causes(result: Correction, case: Case) -> list[str]:
     """What makes the weights uncertain: digits, trial weights, planes that act alike, or little to gain."""
-    labels, names, weights = case.labels, case.names, result.weights
+    words, names, sizes = case.labels.weight_words, case.names, np.abs(result.weights)
     causes = list(coarse(case.today))
     widths = result.half_widths()[0]
     for p in case.weak:
         trial = case.trial_weight(p)
-        of = f" of its trial weight ({labels.weight_words(trial)})" if trial else ""
-        width = (
-            f" ± {labels.weight_words(float(f'{widths[p]:.2g}'))} (95 %)" if np.isfinite(widths[p]) else ""
-        )
+        of = f" of its trial weight ({words(trial)})" if trial else ""
+        width = f" ± {words(float(f'{widths[p]:.2g}'))} (95 %)" if np.isfinite(widths[p]) else ""
         causes.append(
-            f"the weight in plane {names[p]!r} is {labels.weight_words(abs(weights[p]))}{width}, for the "
-            f"effect{of} is only {case.forms.clearness[p]:.2g} times its error"
+            f"the weight in plane {names[p]!r} is {words(float(sizes[p]))}{width}, for the effect{of} is "
+            f"only {case.clearness[p]:.2g} times its error"
         )
     if not case.weak and len(names) > 1:
-        alike = acting_alike(case.W)
-        at = result.places(names, weights)
-        each = [f"{labels.weight_words(abs(weights[p]))} at {at[p]:.0f}°" for p in alike]
+        alike, at = acting_alike(case.W), result.places(names, result.weights)
+        each = " against ".join(f"{words(float(sizes[p]))} at {at[p]:.0f}°" for p in alike)
         planes = listing((repr(names[p]) for p in alike), "and")
-        causes.append(
-            f"planes {planes} act alike, and their weights fight each other ({' against '.join(each)})"
-        )
+        causes.append(f"planes {planes} act alike, and their weights fight each other ({each})")
     return causes or ["the weights promise little"]
 
 
-def _better_run(result: Correction, case: Case, predicted: float) -> tuple[str, tuple[str, ...]] | None:
+def _better_run(result: Correction, case: Case, predicted: float) -> tuple[str, str] | None:
     """A run within the limits that reads less than is promised (95 %), and than predicted or `GOOD`."""
-    trials = case.today.trials
-    if not result.errors_known or trials is None or len(trials.speeds) != len(result.speeds):
+    trials, limits = case.today.trials, result.limits
+    if not result.errors_known or trials is None or trials.mean.shape[1:] != result.before.shape:
         return None
-    if trials.sensors != result.sensors or trials.runs[-1] != result.mounted.run:
+    if trials.runs[-1] != result.mounted.run:
         return None
+    largest = dict(zip(case.names, case.max_weight * _MORE, strict=True))
     read, weights = np.abs(trials.mean), np.abs(trials.weights)
-    inside = np.array([plane in case.names for plane in trials.planes])
-    kept = weights[:, inside].any(axis=1) & ~weights[:, ~inside].any(axis=1)
-    if result.limits is not None:
-        most = dict(zip(case.names, result.limits.max_weight * (1 + 1e-9), strict=True))
-        kept &= (weights <= [most.get(plane, np.inf) for plane in trials.planes]).all(axis=1)
-        kept &= (read <= result.limits.residual).all(axis=(1, 2))
+    most = [largest.get(plane, 0.0) for plane in trials.planes]
+    kept = (weights <= most).all(axis=1) & weights.any(axis=1)
+    if limits is not None:
+        kept &= (read <= limits.residual).all(axis=(1, 2))
     sizes = np.where(kept, np.sqrt(np.mean(read**2, axis=(1, 2))), np.inf)
     best = int(np.argmin(sizes))
     if sizes[best] >= min(result.check_rms, max(predicted, GOOD * rms(result.before))):
@@ -357,8 +294,8 @@ def _better_run(result: Correction, case: Case, predicted: float) -> tuple[str, 
     )
     strange = "; ".join(case.today.remarks.contradictions)
     if strange:
-        return cause, (f"The runs do not fit one linear machine: {strange}.",)
-    return cause, ("To promise less, add a run with other weights near these.",)
+        return cause, f"The runs do not fit one linear machine: {strange}."
+    return cause, "To promise less, add a run with other weights near these."
 
 
 def coarse(influence: Influence) -> tuple[str, ...]:
@@ -375,25 +312,6 @@ def coarse(influence: Influence) -> tuple[str, ...]:
     return (f"the readings have one digit (steps of {steps}, readings of {readings})",)
 
 
-def _not_determined(result: Correction, case: Case, unclear: Sequence[str]) -> tuple[str, ...]:
-    if result.combination:
-        return ()
-    if unclear:
-        together = "; each weight alone is uncertain, what they leave together is not"
-        return tuple(words.removesuffix(REMEDY) + together for words in unclear)
-    empty = [p for p, w in zip(case.names, result.weights, strict=True) if not w]
-    if empty and case.limits is not None:
-        return (f"the limits leave no weight in plane {listing(map(repr, empty), 'and')}",)
-    condition = result.conditioning.condition_number
-    if condition <= ILL_CONDITIONED:
-        return ()
-    planes = listing((repr(case.names[p]) for p in acting_alike(case.W)), "and")
-    return (
-        f"planes {planes} act nearly alike (condition number {condition:.3g}): small errors of the readings "
-        "become large weights; leave one out, or add sensors or speeds",
-    )
-
-
 def _contradicted(result: Correction) -> tuple[str, ...]:
     fitted = result.fitted
     if fitted.explained or result.active or fitted.chi_square is None or not fitted.dof:
@@ -407,23 +325,19 @@ def _contradicted(result: Correction) -> tuple[str, ...]:
 
 
 def _rising(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:
-    """Readings, also at speeds that were left out, that rise above all today, or pass their limits."""
+    """The reading that rises most above all today, or above its limit at a speed that was left out."""
     planes = [today.planes.index(plane) for plane in result.planes]
-    after = today.baseline + today.W[..., planes] @ result.weights
-    old, new = np.abs(today.baseline), np.abs(after)
-    most = np.abs(result.before).max()
-    bad = (new > most * (1 + 1e-6)) & (new > old * (1 + 1e-6))
+    old, new = np.abs(today.baseline), np.abs(today.baseline + today.W[..., planes] @ result.weights)
+    left_out = ~np.isin(today.speeds, result.speeds)[:, None]
+    most = np.maximum(old, np.abs(result.before).max())
     if limits is not None:
-        bad |= (new > limits.residual * (1 + 1e-6)) & ~np.isin(today.speeds, result.speeds)[:, None]
-    places = sorted(map(tuple, np.argwhere(bad)), key=lambda place: old[place] - new[place])
-    if not places:
+        most = np.where(left_out, np.minimum(most, limits.residual), most)
+    bad = new > most * _MORE
+    if not bad.any():
         return ()
-    names = reading_names(today.labels, today.sensors, today.speeds)
-    s, c = places[0]
-    left_out = "" if today.speeds[s] in result.speeds else ", a speed left out,"
+    s, c = divmod(int(np.argmax(np.where(bad, new - old, -np.inf))), len(today.sensors))
+    name = reading_names(today.labels, today.sensors, today.speeds)[s * len(today.sensors) + c]
     scale, unit = today.labels.vibration_scale, today.labels.vibration_in
-    more = f" (and {len(places) - 1} more)" if len(places) > 1 else ""
     to = f"{new[s, c] * scale:.3g} {unit}".rstrip()
     to = f"rise from {old[s, c] * scale:.3g} to {to}" if new[s, c] > old[s, c] else f"pass its limit: {to}"
-    where = f"{names[s * len(today.sensors) + c]}{left_out}"
-    return (f"the vibration of {where} is predicted to {to}{more}",)
+    return (f"the vibration of {name} is predicted to {to}",)

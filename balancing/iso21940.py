@@ -172,28 +172,10 @@ def _limit_columns(positions: FloatArray, limits: FloatArray) -> tuple[Column, .
     )
 
 
-def parse_grade(text: str | float) -> float:
-    """Read "G2.5", "g 2.5", "2,5" or 2.5 as a grade, mm/s.
-
-    Raises
-    ------
-    ValueError
-        For a grade that the standard does not have, with its neighbours.
-    """
-    body = str(text).strip().lstrip("Gg").strip().replace(",", ".")
-    value = float(body) if body.replace(".", "", 1).isdecimal() else math.nan
-    if value in GRADES:
-        return value
-    near = [g for g in GRADES if g < value][-1:] + [g for g in GRADES if g > value][:1]
-    hint = f"the nearest are {' and '.join(f'G{g:g}' for g in near)}; " if near else ""
-    known = ", ".join(f"G{g:g}" for g in GRADES)
-    raise ValueError(f"there is no balance quality grade {str(text)!r}: {hint}the grades are {known}")
-
-
 def tolerance(
     mass: float,
     speed: float,
-    grade: str | float,
+    grade: float,
     *,
     planes: Mapping[str, float | None] | None = None,
     bearings: tuple[float, float] | None = None,
@@ -208,7 +190,7 @@ def tolerance(
     speed
         Highest service speed, rad/s.
     grade
-        "G2.5", or mm/s.
+        mm/s, one of `GRADES`: 2.5 for G2.5.
     planes
         Position, m, of each correction plane (one or two), from any origin; None: without positions. Without
         any position two planes have half each (a symmetric rotor), one plane has all.
@@ -231,7 +213,7 @@ def tolerance(
     Examples
     --------
     >>> from math import pi
-    >>> found = tolerance(500, 100 * pi, "G2.5")
+    >>> found = tolerance(500, 100 * pi, 2.5)
     >>> f"{found.total * 1e6:.0f} g·mm, {found.eccentricity * 1e6:.2f} µm"
     '3979 g·mm, 7.96 µm'
     """
@@ -273,8 +255,9 @@ def tolerance(
     ):
         if not right:
             raise ValueError(words)
-    G = parse_grade(grade)
-    total = mass * G * 1e-3 / speed
+    if grade not in GRADES:
+        raise ValueError(f"there is no balance quality grade {grade}: the grades, mm/s, are {GRADES}")
+    total = mass * grade * 1e-3 / speed
     at, rule = np.zeros(0), ""
     warnings: tuple[str, ...] = ()
     if centre is not None:
@@ -290,7 +273,7 @@ def tolerance(
         limits = _safe_pair(np.abs(transfer(positions, ends)), at)
         rule += "In the planes: safe at the bearings whatever the angles of the residuals are."
     return Tolerance(
-        grade=G,
+        grade=float(grade),
         mass=float(mass),
         speed=float(speed),
         planes=tuple(named),

@@ -1,14 +1,14 @@
 """Pieces in holes that make a correction: chosen for all planes together, the fewest that are enough.
 
-A set of pieces is enough where every reading's 95 % bound in a check run is within its limit; without
-limits, where the bound of the root mean square is at most 1.2 times that of the exact weights, or the root
-mean square a fifth of the present vibration. Errors of a check run with pieces are those with the exact
-weights.
+A set of pieces is enough where every reading passes its limit in a check run (`balancing.verdict`: all of its
+95 % region is within); without limits, where the bound of the root mean square of a check run is at most the
+larger of 1.2 times that of the exact weights and a fifth of the present vibration. Errors of a check run with
+pieces are those with the exact weights.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.correction import Correction
-from balancing.holes import Holes, Mounting, equal_together
+from balancing.decision import HARDLY_BELOW
+from balancing.holes import Holes, equal_together
 from balancing.influence import Influence, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
+from balancing.regions import LEVEL
 from balancing.tables import (
     covariance_column,
     largest_readings,
@@ -30,8 +32,9 @@ from balancing.tables import (
     weight_columns,
 )
 from balancing.trials import Trials
+from balancing.verdict import largest
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import figures
@@ -41,8 +44,6 @@ if TYPE_CHECKING:
 
 _ANY = "any"
 """Hole of a plane that takes any weight at any angle."""
-AGAINST = 3.0
-"""Pieces that weigh more than this times what they make are said to act against each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,8 @@ class Mounted(Answered):
         Pieces of each plane, and what fewer would leave.
     after
         Predicted vibration with them, (S, C).
-    after_covariance
-        Of a reading in a check run around it, (S, C, 2, 2); NaN where errors are unknown.
+    check_rms
+        Root mean square below which 95 of 100 check runs stay; NaN where errors are unknown.
     on_top_of
         Run whose weights stay mounted; None: everything is removed before.
     """
@@ -69,24 +70,8 @@ class Mounted(Answered):
     holes: tuple[Holes | None, ...]
     discrete: Discrete
     after: ComplexArray
-    after_covariance: FloatArray
+    check_rms: float
     on_top_of: str | None = None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Planes in which pieces act mostly against each other, for a gain that may be nothing."""
-        labels, words = self.correction.labels, []
-        for plane, chosen in zip(self.correction.planes, self.discrete.mountings, strict=True):
-            if chosen is None:
-                continue
-            total, made = float(chosen.amounts.sum()), abs(chosen.vector)
-            if total > AGAINST * made:
-                words.append(
-                    f"plane {plane}: pieces of {labels.weight_words(total)} together make "
-                    f"{labels.weight_words(made)}, they act against each other: state a "
-                    "stock, or fewer pieces per hole, if fewer would do"
-                )
-        return tuple(words)
 
     @property
     def weights(self) -> ComplexArray:
@@ -96,37 +81,29 @@ class Mounted(Answered):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's units and conventions."""
         c, labels = self.correction, self.correction.labels
+        covariance = c.after_covariance if c.errors_known else None
         actions = Column("action", [_action(c, plane) for plane in c.planes])
         residuals = (
             *reading_columns(labels, c.speeds, c.sensors),
             *vector_columns(labels, "after", self.after),
-            covariance_column(
-                labels, "after_covariance", self.after_covariance if c.errors_known else None, self.after.size
-            ),
+            covariance_column(labels, "after_covariance", covariance, self.after.size),
         )
-        after = labels.vibration(self.after)[0]
         return plain(
             {
                 "planes": rows((*weight_columns(labels, c.planes, self.weights), actions)),
                 "on_top_of": self.on_top_of,
-                "warnings": self.warnings,
+                "warnings": [],
                 "holes": rows(_columns(self)),
                 "residuals": rows(residuals),
-                "rms_after": rms(after),
-                "max_after": after.max(),
-                "pieces": self.discrete.pieces,
-                "fewer": rows(self._ladder()),
+                **self._left(self.discrete, self.after),
+                "fewer": [self._left(one, one.residual) for one in self.discrete.fewer],
             }
         )
 
-    def _ladder(self) -> tuple[Column, ...]:
-        """What fewer pieces would leave."""
-        left = [self.correction.labels.vibration(one.residual)[0] for one in self.discrete.fewer]
-        return (
-            Column("pieces", [one.pieces for one in self.discrete.fewer]),
-            Column("rms_after", [rms(size) for size in left]),
-            Column("max_after", [size.max() for size in left]),
-        )
+    def _left(self, discrete: Discrete, after: ComplexArray) -> dict[str, Any]:
+        """How many pieces leave how much."""
+        size = self.correction.labels.vibration(after)[0]
+        return {"pieces": discrete.pieces, "rms_after": rms(size), "max_after": size.max()}
 
     def to_frame(self) -> pd.DataFrame:
         """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
@@ -136,55 +113,43 @@ class Mounted(Answered):
     def answer(self) -> Answer:
         """What goes into which hole and what it leaves; then hole by hole."""
         c, labels = self.correction, self.correction.labels
-        unit, columns = labels.vibration_in, _columns(self)
-        used = columns[0].values
+        unit = labels.vibration_in
         old, new, free = (labels.vibration(z)[0] for z in (c.before, self.after, c.after))
         left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
         first = "Mount or remove these pieces:" if c.remove else "Mount these pieces:"
-        first = first if c.sound else "These pieces would leave"
+        if not c.sound or self.check_rms > HARDLY_BELOW * rms(c.before):
+            first = "These pieces would leave"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
-        lines = [f"Pieces in {labels.weight_in}{stays}:", *self._in_planes(columns)]
-        if labels.assumed:
-            taken = " and ".join(labels.assumed)
-            lines.append(
-                f"For {taken} as assumed: if that is otherwise, state it and choose the pieces anew."
-            )
-        largest = largest_readings(labels, c.speeds, c.sensors, c.before, self.after)
-        lines += ["", f"Largest left{largest}", *self._fewer_words()]
+        lines = [f"Pieces in {labels.weight_in}{stays}:", *(f"  {words}" for words in self._in_planes())]
+        lines += ["", f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}"]
+        fewer = (self._left(one, one.residual) for one in self.discrete.fewer)
+        each = [f"{one['pieces']} → {three_figures(one['rms_after'])} {unit}".rstrip() for one in fewer]
+        lines += [f"With fewer pieces: {', '.join(each)}."] if each else []
+        if not self.discrete.enough:
+            lines.append("No set of pieces is enough: this one leaves hardly more than the best.")
         return Answer(
             f"{first} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),
-            self.warnings,
-            tables=(f"Hole by hole:\n{text(columns, left=2)}",) if used else (),
+            tables=(f"Hole by hole:\n{text(_columns(self), left=2)}",) if self.weights.any() else (),
             more="hole by hole",
         )
 
     def in_holes(self) -> str:
         """What is in which hole of each plane, in a line."""
-        planes = map(str.strip, self._in_planes(_columns(self)))
-        return f"{' · '.join(planes)}, in {self.correction.labels.weight_in}"
+        return f"{' · '.join(self._in_planes())}, in {self.correction.labels.weight_in}"
 
-    def _in_planes(self, columns: Sequence[Column]) -> list[str]:
-        shown = list(zip(*(column.values for column in columns), strict=True))
-        lines = []
+    def _in_planes(self) -> list[str]:
+        lines, every = [], rows(_columns(self))
         for plane in self.correction.planes:
-            rows_ = [row for row in shown if row[0] == plane]
-            words = [f"{figures(row[4])} at {row[3]:.1f}°" for row in rows_ if row[2] == _ANY]
-            words += equal_together((row[6] or figures(row[4]), row[2]) for row in rows_ if row[2] != _ANY)
+            here = [row for row in every if row["plane"] == plane]
+            words = [
+                f"{figures(row['mass'])} at {row['angle_deg']:.1f}°" for row in here if row["hole"] == _ANY
+            ]
+            words += equal_together(
+                (row["pieces"] or figures(row["mass"]), row["hole"]) for row in here if row["hole"] != _ANY
+            )
             gone = " (remove)" if plane in self.correction.remove else ""
-            lines.append(f"  {plane}{gone}: {'; '.join(words) or 'nothing'}")
-        return lines
-
-    def _fewer_words(self) -> list[str]:
-        """The ladder: what fewer pieces would leave, and what none less is enough for."""
-        labels, unit = self.correction.labels, self.correction.labels.vibration_in
-        each = [
-            f"{one.pieces} → {three_figures(rms(labels.vibration(one.residual)[0]))} {unit}".rstrip()
-            for one in self.discrete.fewer
-        ]
-        lines = [f"With fewer pieces: {', '.join(each)}."] if each else []
-        if not self.discrete.enough:
-            lines.append("No set of pieces is enough: this one leaves least.")
+            lines.append(f"{plane}{gone}: {'; '.join(words) or 'nothing'}")
         return lines
 
 
@@ -220,53 +185,63 @@ def mount(
     each = {plane: holes.get(plane) for plane in planes}
     if not any(each.values()):
         raise ValueError("no plane has holes: holes = N or holes_deg = [...] in [planes.NAME] of the job")
-    W = c.influence.W.reshape(-1, len(planes))
-    Y = c.before
-    there: dict[str, complex] = {}
-    if on_top:
-        there = dict(zip(c.mounted.planes, c.mounted.weights.tolist(), strict=True))
-        unnamed = [p for p, h in each.items() if h and there.get(p) and not h.taken.any()]
-        if unnamed:
-            raise ValueError(
-                f"the holes in which weights of run {c.mounted.run!r} stand are not named, and must stay "
-                f'free: taken = {{ "3" = 10 }} (hole and weight) in [planes.{unnamed[0]}] of the job'
-            )
+    mounted = dict(zip(c.mounted.planes, c.mounted.weights.tolist(), strict=True))
+    W, Y, there = c.influence.W.reshape(-1, len(planes)), c.before, mounted if on_top else {}
+    unnamed = [p for p, h in each.items() if h and there.get(p) and not h.taken.any()]
+    if unnamed:
+        raise ValueError(
+            f"the holes in which weights of run {c.mounted.run!r} stand are not named, and must stay "
+            f'free: taken = {{ "3" = 10 }} (hole and weight) in [planes.{unnamed[0]}] of the job'
+        )
+    if there:
         today = influence if baseline is None else influence.rebased(baseline)
-        at = match_speeds(c.speeds, today.speeds)
-        Y = Y + today.W[at] @ np.array([there.get(plane, 0.0) for plane in today.planes])
-    rows_ = c.row_weights
+        loads = np.array([there.get(plane, 0.0) for plane in today.planes])
+        Y = Y + today.W[match_speeds(c.speeds, today.speeds)] @ loads
+    counts = c.row_weights
     if c.method == "weighted" and c.errors_known:
         variance = np.trace(c.after_covariance, axis1=-2, axis2=-1).ravel()
-        rows_ = (1.0 if rows_ is None else rows_) / np.sqrt(np.maximum(variance, 1e-6 * variance.max()))
-    stays = np.array([there.get(plane, 0.0) for plane in planes], dtype=complex)
+        counts = (1.0 if counts is None else counts) / np.sqrt(variance.clip(1e-6 * variance.max()))
+    bound = _bound(c)
     discrete = solve_discrete(
         W,
         Y.ravel(),
         each,
-        _enough(c, Y),
-        wanted=c.weights - stays,
+        _enough(c, Y, bound),
+        wanted=c.weights - [there.get(plane, 0.0) for plane in planes],
         method="minmax" if c.method == "minmax" else "least-squares",
-        row_weights=rows_,
+        row_weights=counts,
         limits=c.limits,
     )
     after = Y + (W @ discrete.weights).reshape(Y.shape)
-    run = c.mounted.run if on_top and any(there.values()) else None
-    return Mounted(c, tuple(each.values()), discrete, after, c.after_covariance, run)
+    check_rms = bound(after) if c.errors_known else np.nan
+    return Mounted(
+        c, tuple(each.values()), discrete, after, check_rms, c.mounted.run if any(there.values()) else None
+    )
 
 
-def _enough(c: Correction, Y: ComplexArray) -> Callable[[ComplexArray], bool]:
+def _bound(c: Correction) -> Callable[[ComplexArray], float]:
+    """Root mean square that 95 of 100 check runs stay below around a prediction (S, C)."""
+    influence, after = c.influence, c.after
+    each = zip(influence.draws(), influence.further(after, c.weights), strict=False)
+    drawn = [Y + W @ c.weights + more - after for (Y, W), more in each]
+    errors = np.concatenate(drawn) if drawn else np.zeros((1, *after.shape))
+    return lambda left: float(np.quantile(np.sqrt(np.mean(np.abs(left + errors) ** 2, axis=(1, 2))), LEVEL))
+
+
+def _enough(
+    c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float]
+) -> Callable[[ComplexArray], bool]:
     """Whether weights D (P,), added to what reads Y, leave little enough."""
-    W = c.influence.W
-    more = c.check_rms**2 - rms(c.after) ** 2 if c.errors_known else 0.0
-    bound, little = FEW * np.hypot(rms(c.after), np.sqrt(max(more, 0.0))), LITTLE * rms(Y)
-    limits = None if c.limits is None else c.limits.residual
-    within = np.nan_to_num(c.within) / c.labels.vibration_scale
+    limits = np.full(Y.shape, np.inf) if c.limits is None else c.limits.residual
+    limited = np.isfinite(limits)
+    covariance = np.nan_to_num(c.after_covariance)[limited]
+    most = max(FEW * bound(c.after), LITTLE * rms(Y))
 
     def enough(D: ComplexArray) -> bool:
-        left = np.abs(Y + W @ D)
-        if limits is not None and np.isfinite(limits).any():
-            return bool((left + within <= limits).all())
-        return bool(rms(left) <= little or np.sqrt(max(rms(left) ** 2 + more, 0.0)) <= bound)
+        left = Y + c.influence.W @ D
+        if limited.any():
+            return bool((largest(left[limited], covariance) <= limits[limited]).all())
+        return bound(left) <= most
 
     return enough
 
@@ -279,34 +254,25 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
     """A row for each hole that gets something; one without hole for a plane where any angle is possible."""
     c, labels = m.correction, m.correction.labels
     places: list[tuple[str, str, complex, str]] = []
-    for plane, holes, mounting, weight in zip(
-        c.planes, m.holes, m.discrete.mountings, m.weights, strict=True
-    ):
+    each = zip(c.planes, m.holes, m.discrete.mountings, m.weights.tolist(), strict=True)
+    for plane, holes, mounting, weight in each:
         if holes is None or mounting is None:
-            places.append((plane, _ANY, complex(weight), ""))
+            places.append((plane, _ANY, weight, ""))
             continue
+        vectors, scale = mounting.amounts * np.exp(1j * holes.angles), labels.weight_scale
         for h in np.flatnonzero(mounting.amounts > 0):
-            vector = mounting.amounts[h] * np.exp(1j * holes.angles[h])
-            words = _pieces(holes, mounting, int(h), labels.weight_scale)
-            places.append((plane, holes.names[h], vector, words))
+            pieces = zip(mounting.counts[h], holes.pieces * scale, strict=True)
+            words = [f"{n} × {figures(piece)}" if n > 1 else figures(piece) for n, piece in pieces if n]
+            places.append((plane, holes.names[h], vectors[h], " + ".join(words)))
     planes = [place[0] for place in places]
-    actions = [_action(c, plane) for plane in planes]
     size, angle = labels.weight([place[2] for place in places])
-    gone = np.where(np.array(actions) == "remove", 180.0, 0.0)
+    gone = np.array([plane in c.remove for plane in planes])
     return (
         Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),
-        Column("action", actions),
+        Column("action", [_action(c, plane) for plane in planes]),
         Column("hole", [place[1] for place in places], str),
-        Column("angle_deg", np.mod(angle + gone, 360), "{:.1f}°".format, "angle"),
+        Column("angle_deg", np.mod(angle + 180.0 * gone, 360), "{:.1f}°".format, "angle"),
         Column("mass", size, figures, labels.weight_in),
         Column("unit", [labels.weight_unit] * len(places)),
         Column("pieces", [place[3] for place in places], str),
-    )
-
-
-def _pieces(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
-    return " + ".join(
-        f"{int(count)} × {figures(float(piece) * scale)}" if count > 1 else figures(float(piece) * scale)
-        for piece, count in zip(holes.pieces, mounting.counts[h], strict=True)
-        if count
     )

@@ -26,6 +26,8 @@ from rotorid.base.text import capital, figures, listing
 WORTH = 0.9
 """Of the vibration in the check run: what a trim has to stay below."""
 
+Word = Literal["done", "trim", "take off what is mounted", "add nothing yet"]
+
 
 @dataclass(frozen=True, eq=False)
 class LeftToDo(Answered):
@@ -45,7 +47,7 @@ class LeftToDo(Answered):
         The trim as pieces in holes; None: at any angle.
     """
 
-    word: Literal["done", "trim", "take off what is mounted", "add nothing yet"]
+    word: Word
     why: str
     correction: Correction
     run: str
@@ -69,26 +71,22 @@ class LeftToDo(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What to do; what is mounted, and the trim."""
-        c, scale, unit = (
-            self.correction,
-            self.correction.labels.weight_scale,
-            self.correction.labels.weight_in,
-        )
+        """What to do; what is mounted."""
+        c = self.correction
         mounted = [c.labels.weight_at(w) if w else "nothing" for w in self.there]
-        trim = [
-            f"{'take away' if plane in c.remove else 'add'} {figures(abs(w) * scale)} {unit} at {at:.1f}°"
-            if w
-            else "nothing"
-            for plane, w, at in zip(self.planes, self.trim, c.places(self.planes, self.trim), strict=True)
-        ]
-        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
         what = capital(self.word)
-        if self.word == "trim":
-            columns.append(Column("trim, beside that", trim, str))
-            pairs = zip(self.planes, trim, self.trim, strict=True)
-            each = [f"{words} in plane {plane!r}" for plane, words, w in pairs if w]
-            what += f": {listing(each, 'and') if self.pieces is None else self.pieces.in_holes()}"
+        if self.word == "trim" and self.pieces is not None:
+            what += f": {self.pieces.in_holes()}"
+        elif self.word == "trim":
+            at = c.places(self.planes, self.trim)
+            each = [
+                f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(float(abs(w)))} at "
+                f"{at[p]:.1f}° in plane {plane!r}"
+                for p, (plane, w) in enumerate(zip(self.planes, self.trim, strict=True))
+                if w
+            ]
+            what += f": {listing(each, 'and')}"
+        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
         return Answer(f"{what}; {self.why}.", text(columns, width=COLUMNS))
 
 
@@ -100,6 +98,7 @@ def after_check_run(
     judged: str = "",
     stop: str = "",
     pieces: Mounted | None = None,
+    bare: ComplexArray | None = None,
 ) -> LeftToDo:
     """Decide what is left to do after the last check run.
 
@@ -117,47 +116,48 @@ def after_check_run(
         Why nothing may be added before something else is done; empty: nothing speaks against it.
     pieces
         The trim as pieces beside what is mounted, where it is to be one of pieces.
+    bare
+        Vibration of the bare rotor at the speeds and sensors of the check, (S, C); None: the correction's.
     """
     c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
     run, planes, there = c.mounted
     pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
-    now, before = rms(check.mean[-1]), rms(c.before[pick])
-    after = c.after[pick] if pieces is None else pieces.after[pick]
-    bound = c.check_rms if pieces is None and c.errors_known else None
-    left = rms(after) if bound is None or judged == "fail" else bound
-    change = f"rms {three_figures(now * scale)} → {small(rms(after) * scale, now * scale)} {unit}".rstrip()
+    now, before = rms(check.mean[-1]), rms(c.before[pick] if bare is None else bare)
+    trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
+    after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
+    change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
     change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
-
-    def end(
-        word: Literal["done", "trim", "take off what is mounted", "add nothing yet"], why: str
-    ) -> LeftToDo:
-        trim = c.to_add if pieces is None else _in_planes(pieces, planes)
-        return LeftToDo(word, why, c, run, planes, there, trim if word == "trim" else 0 * trim, pieces)
-
+    left = after if bound is None or judged == "fail" else bound
+    worth = trim.any() and left < WORTH * now
+    again = c.decision.cause if c.decision.word == "measure again" else ""
+    blocked = stop or "; ".join(c.contradictions) or again
+    settled = not blocked and judged != "fail" and explained is not False
+    word: Word = "add nothing yet"
+    why = (
+        f"{'a trim' if pieces is None else 'pieces beside these'} would not make it clearly better ({change})"
+    )
     if judged == "pass":
-        return end("done", "every limit is kept")
-    if now >= before and explained is not True and there.any():
+        word, why = "done", "every limit is kept"
+    elif now >= before and explained is not True and there.any():
+        word = "take off what is mounted"
         why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
-        return end("take off what is mounted", f"{why}; {stop or 'check what was mounted, and where'}")
-    open_ = stop or c.contradictions or c.decision.word == "measure again"
-    if not open_ and judged != "fail" and explained is not False and _within_its_error(c):
-        return end("done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})")
-    if stop or not (c.sound or pieces is not None):
-        return end("add nothing yet", stop or c.decision.cause)
-    trim = c.to_add if pieces is None else _in_planes(pieces, planes)
-    if not trim.any() or left >= WORTH * now:
-        added = "a trim" if pieces is None else "pieces beside these"
-        still_open = judged == "fail" or explained is False
-        why = f"{added} would not make it clearly better ({change})"
-        return end("add nothing yet" if still_open else "done", why)
-    return end("trim", change)
+        why += f"; {stop or 'check what was mounted, and where'}"
+    elif settled and _within_its_error(c):
+        word, why = "done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})"
+    elif settled and not worth:
+        word = "done"
+    elif blocked or (worth and not c.sound and pieces is None):
+        why = blocked or c.decision.cause
+    elif worth:
+        word, why = "trim", change
+    return LeftToDo(word, why, c, run, planes, there, trim if word == "trim" else 0 * trim, pieces)
 
 
 def _within_its_error(c: Correction) -> bool:
     """Whether what is mounted may be the right weights."""
     if not c.region_known:
         return False
-    there = dict(zip(c.mounted.planes, c.mounted.weights, strict=True))
+    there = dict(zip(*c.mounted[1:], strict=True))
     return c.region().holds(np.array([there.get(plane, 0.0) for plane in c.planes], dtype=complex))
 
 

@@ -12,12 +12,13 @@ Predicted: what is mounted, M, less what the readings ask for, D; û = M − D. 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.check_run import index_of, last_run
 from balancing.conditioning import chance, check_planes
 from balancing.conventions import Labels
 from balancing.correct import fit_part
@@ -26,18 +27,14 @@ from balancing.influence import Influence, match_speeds
 from balancing.iso21940 import Tolerance
 from balancing.methods import solve
 from balancing.planes import plane_indices
-from balancing.regions import NORMAL_RADIUS, Region
+from balancing.regions import NORMAL_RADIUS, Region, region_edge
 from balancing.tables import INVISIBLE
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.result import Column, frame, rows
-from rotorid.base.rpm import RPM, rpm
+from rotorid.base.rpm import rpm
 from rotorid.base.text import capital, counted
 from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Kind = Literal["plane", "bearing", "sensor"]
 Word = Literal["pass", "fail", "not decidable"]
@@ -64,8 +61,6 @@ class Judgement:
         In the same unit.
     low, high
         Least and largest size in the 95 % region; None where errors are unknown.
-    region
-        Points on the edge of the region; None as before.
     """
 
     kind: Kind
@@ -75,7 +70,6 @@ class Judgement:
     limit: float
     low: float | None = None
     high: float | None = None
-    region: ComplexArray | None = None
 
     @property
     def size(self) -> float:
@@ -110,7 +104,7 @@ class Verdict(Answered):
 
     rows: tuple[Judgement, ...]
     source: str
-    labels: Labels = field(default_factory=Labels)
+    labels: Labels
     warnings: tuple[str, ...] = ()
 
     @property
@@ -126,75 +120,68 @@ class Verdict(Answered):
         return {
             "source": self.source,
             "verdict": self.overall,
-            "rows": rows(self._columns()),
+            "rows": [self._row(row) for row in self.rows],
             "warnings": list(self.warnings),
         }
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per judgement: the keys of `to_dict`."""
-        return frame(self._columns())
 
     @property
     def answer(self) -> Answer:
         """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
-        lines = [self._row_words(row) for row in rows(self._columns())]
-        same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
-        near = sorted(same, key=lambda k: round(self.rows[k].limit / (self.rows[k].size or 1e-30), 6))
-        shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
-        shown += [k for k in near if k not in shown][:_SHOWN]
-        others = [words for k, words in enumerate(lines) if k not in shown]
+        same = sum(row.verdict == self.overall for row in self.rows)
+        near = [row for row in self.rows if row.kind == "sensor"]
+        near.sort(key=lambda row: (row.verdict != self.overall, -round(row.size / max(row.limit, 1e-30), 6)))
+        shown = [*(row for row in self.rows if row.kind != "sensor"), *near[:_SHOWN]]
         why = {
             "pass": "kept",
             "fail": "not kept",
             "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; repeated "
             "readings or stated errors would tell",
         }[self.overall]
-        of = f"{len(same)} of {counted(len(lines), 'limit')}"
+        others = near[_SHOWN:]
         return Answer(
-            f"{capital(self.overall)} ({self.source}): {of} {why}.",
-            "\n".join(lines[k] for k in shown),
+            f"{capital(self.overall)} ({self.source}): {same} of {counted(len(self.rows), 'limit')} {why}.",
+            "\n".join(map(self._words, shown)),
             self.warnings,
-            tables=("\n".join(["The other limits:", *others]),) if others else (),
+            tables=("\n".join(["The other limits:", *map(self._words, others)]),) if others else (),
             more="the other limits",
         )
 
-    def _row_words(self, row: dict[str, Any]) -> str:
-        sensor = row["kind"] == "sensor"
-        unit = vibration_unit_words(row["unit"]) if sensor else weight_unit_words(row["unit"])
-        at = "" if row["speed_rpm"] is None else f" at {self.labels.speed_words(row['speed_rpm'] / RPM)}"
-        within = "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
-        size = row["size"] if row["size"] > INVISIBLE * row["limit"] else 0.0
-        value = f"{size:.4g} {unit}".rstrip()
-        name = f"{row['kind']} {row['name']}{at}"
-        return f"  {name}: {value} ({within}), limit {row['limit']:.4g}: {row['verdict']}"
+    def _words(self, row: Judgement) -> str:
+        cells = self._row(row)
+        unit = (vibration_unit_words if row.kind == "sensor" else weight_unit_words)(cells["unit"])
+        at = "" if row.speed is None else f" at {self.labels.speed_words(row.speed)}"
+        within = "errors unknown"
+        if row.low is not None:
+            within = f"{cells['low']:.3g} … {cells['high']:.3g} with 95 %"
+        value = f"{cells['size'] if row.size > INVISIBLE * row.limit else 0.0:.4g} {unit}".rstrip()
+        name = f"{row.kind} {row.name}{at}"
+        return f"  {name}: {value} ({within}), limit {cells['limit']:.4g}: {row.verdict}"
 
-    def _columns(self) -> tuple[Column, ...]:
+    def _row(self, row: Judgement) -> dict[str, Any]:
         labels = self.labels
-        scales = {
-            "plane": (labels.weight_scale, labels.weight_unit),
-            "bearing": (_GRAM_MM, "g_mm"),
-            "sensor": (labels.vibration_scale, labels.vibration_unit),
+        scale, unit, shown = {
+            "plane": (labels.weight_scale, labels.weight_unit, labels.weight),
+            "bearing": (_GRAM_MM, "g_mm", labels.weight),
+            "sensor": (labels.vibration_scale, labels.vibration_unit, labels.vibration),
+        }[row.kind]
+        amount, angle = shown(row.value)
+        return {
+            "kind": row.kind,
+            "name": row.name,
+            "speed_rpm": None if row.speed is None else float(rpm(row.speed)),
+            "size": row.size * scale,
+            "angle_deg": float(angle) if amount else None,
+            "low": None if row.low is None else row.low * scale,
+            "high": None if row.high is None else row.high * scale,
+            "limit": row.limit * scale,
+            "unit": unit,
+            "verdict": row.verdict,
         }
-        scale = np.array([scales[row.kind][0] for row in self.rows])
-        values = [
-            (labels.vibration if row.kind == "sensor" else labels.weight)(row.value) for row in self.rows
-        ]
-        size, low, high, limit, speeds = (
-            np.array([getattr(row, name) for row in self.rows], dtype=float)
-            for name in ("size", "low", "high", "limit", "speed")
-        )
-        return (
-            Column("kind", [row.kind for row in self.rows]),
-            Column("name", [row.name for row in self.rows]),
-            Column("speed_rpm", [rpm(speed) for speed in speeds]),
-            Column("size", size * scale),
-            Column("angle_deg", [float(angle) if amount else np.nan for amount, angle in values]),
-            Column("low", low * scale),
-            Column("high", high * scale),
-            Column("limit", limit * scale),
-            Column("unit", [scales[row.kind][1] for row in self.rows]),
-            Column("verdict", [row.verdict for row in self.rows]),
-        )
+
+
+def largest(values: ComplexArray, covariance: FloatArray) -> FloatArray:
+    """Largest size (…) in the 95 % regions of normal values (…) with covariances (…, 2, 2)."""
+    return np.asarray(np.abs(region_edge(values, covariance, _POINTS)).max(axis=-1))
 
 
 def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | None = None) -> Judgement:
@@ -208,21 +195,13 @@ def judge(kind: Kind, name: str, limit: float, region: Region, speed: float | No
         In the unit of the value.
     region
         The value with its 95 % region; NaN covariance: errors unknown.
-
-    Raises
-    ------
-    ValueError
-        For a limit that is not a number ≥ 0.
     """
-    if not (np.isfinite(limit) and limit >= 0):
-        raise ValueError(f"the limit of {kind} {name!r} must be a finite number ≥ 0, not {limit}")
-    value = complex(region.centre[0])
+    judged = Judgement(kind, name, speed, complex(region.centre[0]), float(limit))
     if np.isnan(region.covariance).any():
-        return Judgement(kind, name, speed, value, float(limit))
-    edge = region.edge(_POINTS)
-    size = np.abs(edge)
-    low = 0.0 if region.holds(np.zeros(1, dtype=complex)) else float(size.min())
-    return Judgement(kind, name, speed, value, float(limit), low, float(size.max()), edge)
+        return judged
+    size = np.abs(region.edge(_POINTS))
+    around = region.holds(np.zeros(1, dtype=complex))
+    return replace(judged, low=0.0 if around else float(size.min()), high=float(size.max()))
 
 
 def judge_unbalance(
@@ -251,16 +230,14 @@ def judge_unbalance(
     Raises
     ------
     ValueError
-        For planes that the tolerance does not name, and radii that are lacking or not positive.
+        For planes that the tolerance does not name.
     """
     if sorted(planes) != sorted(tolerance.planes):
         raise ValueError(
             f"the tolerance is for the planes {', '.join(map(repr, tolerance.planes)) or '(none)'}, "
             f"the residual unbalance is in {', '.join(map(repr, planes))}: name the same planes in both"
         )
-    radius = np.array([1.0 if radii is None else radii.get(p, 0.0) for p in planes])
-    if not (np.isfinite(radius) & (radius > 0)).all():
-        raise ValueError(f"the radius of plane {planes[int(np.argmin(radius))]!r} must be a number above 0")
+    radius = np.array([1.0 if radii is None else radii[p] for p in planes])
     order = [tolerance.planes.index(p) for p in planes]
     u = np.asarray(residual, dtype=complex)
 
@@ -316,13 +293,11 @@ def verdict_of_check(
     influence: Influence,
     check: Trials,
     *,
-    run: int = -1,
     tolerance: Tolerance | None = None,
     radii: Mapping[str, float] | None = None,
     limits: Limits | None = None,
-    planes: Sequence[str] | None = None,
 ) -> Verdict:
-    """Judge one check run, everything mounted that shall stay.
+    """Judge the last check run, everything mounted that shall stay.
 
     Parameters
     ----------
@@ -330,14 +305,10 @@ def verdict_of_check(
         Coefficients, at the speeds and for the sensors of the check run (there may be more).
     check
         Check runs; what was mounted in them does not matter here.
-    run
-        Which of them, by index; default the last.
     tolerance, radii
         As of `judge_unbalance`.
     limits
         Of readings, in the order of the coefficients' speeds and sensors.
-    planes
-        Use these planes only; None: those of the tolerance, or all.
 
     Raises
     ------
@@ -347,25 +318,13 @@ def verdict_of_check(
         Where nothing is given to judge by, for unknown planes, sensors or speeds, and as `judge_unbalance`.
     """
     at = match_speeds(check.speeds, influence.speeds)
-    unknown = [name for name in check.sensors if name not in influence.sensors]
-    if unknown:
-        raise ValueError(f"there are no coefficients of sensor {unknown[0]!r}, which the check run has")
-    sensors = [influence.sensors.index(name) for name in check.sensors]
-    name, only = check.runs[run], [range(len(check.runs))[run]]
-    bare = replace(
-        check,
-        runs=(name,),
-        readings=check.readings[:, only],
-        steps=None if check.steps is None else check.steps[:, :, only],
-        covariance=None if check.covariance is None else check.covariance[:, :, :, only],
-        planes=(),
-        weights=np.zeros((1, 0), dtype=complex),
-    )
+    sensors = [index_of(name, influence.sensors, "sensor") for name in check.sensors]
+    bare = replace(last_run(check), planes=(), weights=np.zeros((1, 0), dtype=complex))
     left = influence.part(at, sensors).rebased(bare)
     judged: list[Judgement] = []
     warnings = left.remarks.warnings
     if tolerance is not None:
-        part = left.part(range(len(at)), None, plane_indices(left, planes or tolerance.planes))
+        part = left.part(range(len(at)), None, plane_indices(left, tolerance.planes))
         S, C, P = part.W.shape
         check_planes(part.W.reshape(-1, P), part.planes)
         fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
@@ -379,29 +338,19 @@ def verdict_of_check(
                 "elsewhere, or the coefficients are wrong",
             )
     if limits is not None:
-        covariance = (
-            left.channels()[..., :2, :2]
-            if left.known_errors
-            else np.full((*left.baseline.shape, 2, 2), np.nan)
-        )
-        pick = np.ix_(at, sensors)
-        judged += _readings(left, left.baseline, covariance, limits.residual[pick])
-    return _verdict(judged, f"check run {name}", left.labels, warnings)
+        covariance = left.channels()[..., :2, :2] if left.known_errors else np.full((2, 2), np.nan)
+        judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(at, sensors)])
+    return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
 
 
 def _readings(
     of: Influence, readings: ComplexArray, covariance: FloatArray, limit: FloatArray
 ) -> list[Judgement]:
-    return [
-        judge(
-            "sensor",
-            of.sensors[c],
-            limit[s, c],
-            Region(readings[[s], c], covariance[s, c], NORMAL_RADIUS),
-            float(of.speeds[s]),
-        )
-        for s, c in np.argwhere(np.isfinite(limit))
-    ]
+    V = np.broadcast_to(covariance, (*limit.shape, 2, 2))
+    each = (
+        (s, c, Region(readings[[s], c], V[s, c], NORMAL_RADIUS)) for s, c in np.argwhere(np.isfinite(limit))
+    )
+    return [judge("sensor", of.sensors[c], limit[s, c], region, float(of.speeds[s])) for s, c, region in each]
 
 
 def _verdict(

@@ -36,7 +36,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     print(check.summary(), end="\n\n")
 
     # The check run is one more run to learn from; trim is what to add to what is mounted now.
-    refined = balancing.refine(checked.trials, checked.check, corrections=correction)
+    refined = balancing.refine(checked.trials, checked.check, correction)
     better = balancing.correct(refined)
     run, planes, _ = better.mounted
     print(f"Trim, to be added to the weights of run {run!r}:")

@@ -121,7 +121,7 @@ def amplitudes(
     """
     labels, result = c.labels, mounted or c
     vectors = [c.before, result.after, np.full_like(c.before, np.nan)]
-    covariance, sensors, speeds = result.after_covariance, c.sensors, c.speeds
+    covariance, sensors, speeds = c.after_covariance, c.sensors, c.speeds
     if check is not None:
         vectors = [check.before, check.predicted[-1], check.achieved[-1]]
         covariance, sensors, speeds = check.covariance[-1], check.sensors, check.speeds

@@ -39,7 +39,6 @@ def draw_disc(  # noqa: PLR0913
     *,
     remove: bool = False,
     weight: complex = 0j,
-    tolerance: float | None = None,
     loose: Sequence[complex] = (),
     forbidden: Sequence[tuple[float, float]] = (),
 ) -> Axes:
@@ -61,8 +60,6 @@ def draw_disc(  # noqa: PLR0913
         Whether material is taken away: at the equivalent weight's angle + 180°.
     weight
         Wanted weight (equivalent added), kg or kg·m: the open arrow.
-    tolerance
-        Permissible residual in the same unit: a circle around the tip of the wanted weight.
     loose
         Further weights at any angles, in one place each.
     forbidden
@@ -101,9 +98,6 @@ def draw_disc(  # noqa: PLR0913
     lines = [f"{name}: {labels.weight_at(vector)}" for name, vector in shown.items()]
     size = _ARROW / (np.abs([*vectors.values()]).max() or 1.0)
     arrows(ax, 0.0, size * on_paper(labels, [*shown.values()]), [name[-6:-1] for name in shown])
-    if tolerance is not None:
-        lines.append(f"permissible (dotted): {labels.weight_words(tolerance)}")
-        _circle(ax, complex(size * on_paper(labels, weight)), size * tolerance, fill=False, ls=":")
     lines = [f"like adding, {line}" if remove else line for line in lines]
     lines += ["hatched arcs: nothing goes there"] if forbidden else []
     ax.text(0, -_EDGE, "\n".join(lines), ha="center", va="top", fontsize=TEXT)

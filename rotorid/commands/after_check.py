@@ -80,28 +80,36 @@ def left_to_do(
     pieces
         Those of a trim.
     """
-    from balancing import after_check_run, mount
+    from balancing import after_check_run, last_run, mount
 
     runs, (result, known, *_) = job.check, solved
     assert runs is not None
     stop = "; ".join(result.contradictions)
     if not options.refine:
         influence, baseline = known
+        misplaced = check is not None and check.change is not None
         measured = baseline is None and influence.trials is not None and options.machine_type is None
         try:
-            known = (
-                choose(job, options.coefficients, options.model_error, refined=True)
-                if measured
-                else (influence, runs)
-            )
+            if misplaced:  # what is really there is not known, what it leaves is
+                known = influence, last_run(runs)
+            elif measured:
+                known = choose(job, options.coefficients, options.model_error, refined=True)
+            else:
+                known = influence, runs
             result = correct_job(job, known, result.planes, options)
         except ValueError as error:
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
             there = runs.runs[-1], runs.planes, runs.weights[-1]
             result = replace(result, mounted=type(result.mounted)(*there))
-    if job.check_pieces is not None and pieces is None and not stop:
-        with suppress(ValueError):  # nothing more can be mounted in holes: a trim at any angle
+    if pieces is None and not stop:
+        with suppress(ValueError):  # no holes, or none that can be used: a trim at any angle
             pieces = mount(result, *known, job.holes, on_top=True)
-    explained = None if check is None else check.explained
-    judged = "" if verdict is None else verdict.overall
-    return after_check_run(result, runs, explained=explained, judged=judged, stop=stop, pieces=pieces)
+    return after_check_run(
+        result,
+        runs,
+        explained=None if check is None else check.explained,
+        judged="" if verdict is None else verdict.overall,
+        stop=stop,
+        pieces=pieces,
+        bare=None if check is None else check.before,
+    )

@@ -282,10 +282,8 @@ def _judge(
                 f"plane, radius_mm in [planes.{lost[0]}] of the job"
             )
     if job.check is not None:
-        limits, planes = job.limits_of(influence.planes), result.planes
-        return verdict_of_check(
-            influence, job.check, tolerance=tolerance, radii=radii, limits=limits, planes=planes
-        )
+        limits = job.limits_of(influence.planes)
+        return verdict_of_check(influence, job.check, tolerance=tolerance, radii=radii, limits=limits)
     return verdict_of_prediction(
         result,
         tolerance=tolerance,

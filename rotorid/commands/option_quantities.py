@@ -317,3 +317,23 @@ def _weight_unit(word: str, text: str, what: str) -> Unit:
 def _si(unit: str) -> Unit:
     """The SI unit of the same kind of weights."""
     return units.MASS["kg"] if unit in units.MASS else units.UNBALANCE["kg_m"]
+
+
+def grade(text: str | float) -> float:
+    """Read "G2.5", "g 2.5", "2,5" or 2.5 as a grade, mm/s.
+
+    Raises
+    ------
+    ValueError
+        For a grade that the standard does not have, with its neighbours.
+    """
+    from balancing import GRADES
+
+    body = str(text).strip().lstrip("Gg").strip().replace(",", ".")
+    value = float(body) if body.replace(".", "", 1).isdecimal() else float("nan")
+    if value in GRADES:
+        return value
+    near = [g for g in GRADES if g < value][-1:] + [g for g in GRADES if g > value][:1]
+    hint = f"the nearest are {' and '.join(f'G{g:g}' for g in near)}; " if near else ""
+    known = ", ".join(f"G{g:g}" for g in GRADES)
+    raise ValueError(f"there is no balance quality grade {str(text)!r}: {hint}the grades are {known}")

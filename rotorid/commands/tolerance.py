@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from rotorid.commands.option_quantities import length, mass, positions, speed_with_unit, two_positions
+from rotorid.commands.option_quantities import grade, length, mass, positions, speed_with_unit, two_positions
 from rotorid.commands.outcome import USUAL, Found, command, provenance
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def permissible(options: ToleranceOptions, names: tuple[str, str] = ("--mass", "
     return balancing.tolerance(
         mass(options.mass, names[0]),
         speed_with_unit(options.speed, names[1]),
-        options.grade,
+        grade(options.grade),
         planes=None if planes is None else positions(planes),
         bearings=None if bearings is None else two_positions(bearings),
         centre=None if centre is None else length(centre, "--centre", "350mm"),

@@ -19,7 +19,6 @@ from balancing import (
     Remarks,
     Trials,
     UndeterminedError,
-    chance,
     estimate_influence,
     local_runs,
     reading_of,
@@ -50,6 +49,8 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     ValueError
         For runs without these sensors, speeds or planes.
     """
+    from scipy.special import chdtrc
+
     runs = local_runs(expected, trials)
     R, (S, C, P) = len(runs.runs), expected.W.shape
     reading, run = reading_of(runs), usual_run_errors(runs)
@@ -95,4 +96,4 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
         remarks=Remarks(tuple(warnings)),
     )
     spare = N * (R - 1)
-    return result, chance(float(np.sum((rows @ values - right) ** 2)), spare) if spare else 1.0
+    return result, float(chdtrc(spare, np.sum((rows @ values - right) ** 2))) if spare else 1.0

@@ -21,7 +21,7 @@ from rotorid.tables.reader import units
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from balancing import Correction, Influence, Mounted, Verdict
+    from balancing import Correction, Influence, Mounted
     from rotorid.tables import Job
 
 _SOURCES = {
@@ -67,7 +67,7 @@ def balance_report(
     """
     from balancing.plots import residual_figure
 
-    result, mounted, verdict = (parts[key] for key in ("", "mounting", "verdict"))
+    result, mounted = (parts[key] for key in ("", "mounting"))
     labels = result.labels
     sheet = sheet_data(result, influence, job, mounted)
     whole = {**document, "sheet": sheet}
@@ -88,11 +88,11 @@ def balance_report(
         "speed": labels.speed_in,
         "speed_scale": 1.0 if labels.speed_unit == "rpm" else units.SPEED[labels.speed_unit].scale / RPM,
     }
-    discs = [] if left is not None else _discs(result, job, mounted, verdict, text["seen"])
+    discs = [] if left is not None else _discs(result, job, mounted, text["seen"])
     if left is not None and left.word == "trim":
         add = dict(zip(left.planes, left.trim.tolist(), strict=True))
         trim = replace(left.correction, weights=np.array([add[plane] for plane in left.correction.planes]))
-        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, None, text["seen"])
+        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, text["seen"])
     return render_report(
         "balance.html",
         whole,
@@ -155,12 +155,8 @@ def _turn(result: Correction) -> str:
     return "is added to" if result.labels.phase_sign == result.labels.angle_sign else "is taken from"
 
 
-def _discs(
-    result: Correction, job: Job, mounted: Mounted | None, verdict: Verdict | None, seen: str
-) -> list[tuple[str, Markup]]:
+def _discs(result: Correction, job: Job, mounted: Mounted | None, seen: str) -> list[tuple[str, Markup]]:
     """Each plane with its picture."""
-    rows = () if verdict is None else verdict.rows
-    tolerances = {row.name: row.limit for row in rows if row.kind == "plane"}
     return [
         (
             plane,
@@ -170,7 +166,6 @@ def _discs(
                     plane,
                     holes=job.holes.get(plane),
                     mounted=mounted,
-                    tolerance=tolerances.get(plane),
                 ),
                 f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
             ),

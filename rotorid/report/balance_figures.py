@@ -21,7 +21,6 @@ def plane_figure(
     *,
     holes: Holes | None = None,
     mounted: Mounted | None = None,
-    tolerance: float | None = None,
 ) -> Figure:
     """Draw one plane with what goes into it; material to remove is drawn as a crossed circle.
 
@@ -35,8 +34,6 @@ def plane_figure(
         Of the plane, where nothing was chosen for them.
     mounted
         Pieces in the holes of all planes, or None: the weight is drawn where it stands.
-    tolerance
-        Permissible residual, kg or kg·m.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -55,7 +52,7 @@ def plane_figure(
         loose = (complex(mounted.weights[p]),)
     with mpl.rc_context({"font.size": 10.0}):
         arcs = () if result.limits is None else result.limits.forbidden[p]
-        lines = 1 + 2 * (mounted is not None) + (tolerance is not None) + bool(arcs)
+        lines = 1 + 2 * (mounted is not None) + bool(arcs)
         reach = _REACH[len(result.planes) > 2]
         axes = _WIDTH * _TALL / reach
         height = axes + 0.37 + 0.15 * lines  # a title above the axes, lines of text below
@@ -69,7 +66,6 @@ def plane_figure(
             labels,
             remove=plane in result.remove,
             weight=wanted,
-            tolerance=tolerance,
             loose=loose,
             forbidden=arcs,
         )

@@ -211,6 +211,3 @@ def test_what_cannot_be_combined():
         combine(measured, model(W[:, :3], 0.1, sensors=("s0", "s1", "s2")))
     with pytest.raises(ValueError, match="no computed coefficients at 2864"):
         combine(measured, model(W[:2], 0.1, speeds=(100.0, 200.0)))
-
-
-TWO = np.array([100.0, 200.0])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from balancing.iso21940 import GRADES, parse_grade, tolerance
+from balancing.iso21940 import GRADES, tolerance
 from balancing.plots import draw_tolerance as plot
+from rotorid.commands.option_quantities import grade as parse_grade
 
 RPM3000 = 100 * pi
 TOTAL = 1000 * 2.5 * 500 / RPM3000  # g·mm, 3978.87
@@ -18,7 +19,7 @@ def shares(found):
 
 
 def rotor(**places):
-    return tolerance(500, RPM3000, "G2.5", **places)
+    return tolerance(500, RPM3000, 2.5, **places)
 
 
 def test_500_kg_at_3000_rpm():
@@ -33,7 +34,7 @@ def test_500_kg_at_3000_rpm():
 @pytest.mark.parametrize(
     ("grade", "rpm", "micrometres"),
     # eω = G: the standard's diagram passes 1 g·mm/kg for G6.3 at 60160 rpm, 10 for G1 at 955 rpm
-    [("G6.3", 60160.6, 1.0), ("G1", 954.93, 10.0), ("G0.4", 95493, 0.04), ("G4000", 95.493, 400000.0)],
+    [(6.3, 60160.6, 1.0), (1, 954.93, 10.0), (0.4, 95493, 0.04), (4000, 95.493, 400000.0)],
 )
 def test_specific_unbalance(grade, rpm, micrometres):
     assert tolerance(1, rpm * pi / 30, grade).eccentricity * 1e6 == pytest.approx(micrometres, rel=1e-5)
@@ -41,7 +42,7 @@ def test_specific_unbalance(grade, rpm, micrometres):
 
 def test_imperial_form():
     # U = 6.015 G W / N in oz·in, lb, rpm (quoted in the trade press)
-    found = tolerance(100 * 0.45359237, 3600 * pi / 30, "G6.3").total
+    found = tolerance(100 * 0.45359237, 3600 * pi / 30, 6.3).total
     assert found / (0.45359237 / 16 * 0.0254) == pytest.approx(6.015 * 6.3 * 100 / 3600, rel=2e-4)
 
 
@@ -157,6 +158,7 @@ def test_grades():
 @each_of(
     ("arguments", "words"),
     [
+        ({"grade": 3}, "no balance quality grade 3"),
         ({"mass": 0}, "mass of the rotor must be a finite number above 0"),
         ({"speed": float("nan")}, "service speed"),
         ({"planes": {"A": 0.0, "B": 0.0}, "centre": 1.0}, "both planes are at the same place"),
@@ -170,7 +172,7 @@ def test_grades():
     ],
 )
 def test_what_cannot_be_is_refused(arguments, words):
-    usual = {"mass": 500, "speed": RPM3000, "grade": "G2.5"}
+    usual = {"mass": 500, "speed": RPM3000, "grade": 2.5}
     with pytest.raises(ValueError, match=words):
         tolerance(**{**usual, **arguments})
 

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from balancing_data import GRAM, complex_normal, job, rms
 
-from balancing import Limits, correct, equal_holes, estimate_influence, from_list, mount
+from balancing import (
+    Limits,
+    correct,
+    equal_holes,
+    estimate_influence,
+    from_list,
+    mount,
+    verdict_of_prediction,
+)
 
 HOLES = from_list(equal_holes(12), np.array([1, 2, 5]) * GRAM, per_hole=2)
 BOTH = {"A": HOLES, "B": HOLES}
@@ -68,3 +76,15 @@ def test_pieces_beside_what_is_mounted():
     total = found.weights + c.mounted.weights
     assert np.allclose(found.after, c.before + influence.W @ total)
     assert rms(found.after) < 0.5 * rms(c.before)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.15, 0.25, 0.4])
+def test_a_set_is_enough_where_every_limit_passes_by_the_verdict(share):
+    influence = drawn(4)
+    most = share * np.abs(influence.baseline).max()
+    limits = Limits(np.full(2, np.inf), np.full((1, 2), most), ((), ()))
+    c = correct(influence, limits=limits)
+    found = mount(c, influence, None, BOTH)
+    verdict = verdict_of_prediction(c, mounted=found.weights, after=found.after)
+    assert found.discrete.enough == (verdict.overall == "pass")
+    assert ("No set of pieces is enough" in found.answer.found) == (not found.discrete.enough)

@@ -79,12 +79,6 @@ def test_angles_are_written_as_the_job_counts_them():
     assert {"↺ rotation", "↻ rotation"} <= set(same) | set(behind)
 
 
-def test_tolerance_is_a_circle_around_the_wanted_weight_in_its_scale():
-    ax = disc(HOLES, MOUNTED, GRAMS, weight=0.08j, tolerance=0.02)
-    (ring,) = [p for p in ax.patches if isinstance(p, Circle) and not p.get_fill()]
-    assert complex(*ring.center) == pytest.approx(4j * ring.radius)
-
-
 def test_all_planes_side_by_side():
     correction = SimpleNamespace(
         planes=("left", "right", "fan", "coupling"),

@@ -25,9 +25,7 @@ ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
 
 def rigid(limit, **options):
     """A tolerance of `limit` kg·m in each of the planes A and B."""
-    return tolerance(
-        2 * limit * 100 * pi / 2.5e-3, 100 * pi, "G2.5", planes={"A": None, "B": None}, **options
-    )
+    return tolerance(2 * limit * 100 * pi / 2.5e-3, 100 * pi, 2.5, planes={"A": None, "B": None}, **options)
 
 
 def one(value, limit, covariance):
@@ -57,12 +55,10 @@ def test_unknown_errors_and_no_errors():
     assert one(1.0, 2.0, np.full((2, 2), np.nan)).verdict == "not decidable"
     assert one(1.0, 2.0, np.zeros((2, 2))).verdict == "pass"
     assert one(1.0, 0.9, np.zeros((2, 2))).verdict == "fail"
-    with pytest.raises(ValueError, match="limit of sensor 's' must be"):
-        one(1.0, np.nan, np.eye(2))
 
 
 def test_planes_bearings_and_radii():
-    whole = tolerance(100, 300, "G2.5", planes={"A": 0.25, "B": 0.75}, bearings=(0, 1), centre=0.5)
+    whole = tolerance(100, 300, 2.5, planes={"A": 0.25, "B": 0.75}, bearings=(0, 1), centre=0.5)
     u = whole.total * np.array([0.6, -0.2])  # A over its half, but together below at the bearings
     exact = np.tile(u, (400, 1)).astype(complex)
     rows = judge_unbalance(u / [0.2, 0.4], exact / [0.2, 0.4], whole, ("A", "B"), radii={"A": 0.2, "B": 0.4})
@@ -87,8 +83,6 @@ def test_planes_bearings_and_radii():
     none = np.zeros((0, 2), dtype=complex)
     with pytest.raises(ValueError, match="name the same planes in both"):
         judge_unbalance(u, none, whole, ("A", "C"))
-    with pytest.raises(ValueError, match="radius of plane 'B'"):
-        judge_unbalance(u, none, whole, ("A", "B"), radii={"A": 0.2})
 
 
 @pytest.fixture
@@ -134,7 +128,7 @@ def test_vibration_that_the_planes_do_not_explain_is_named(job):
     assert "does not explain the readings within their errors" in found.warnings[0]
     assert "Warning: unbalance in these planes" in found.answer.brief()
     # one plane alone does not explain what two leave
-    one = tolerance(1, 100, "G1", planes={"A": None})
+    one = tolerance(1, 100, 1, planes={"A": None})
     assert len(verdict_of_check(influence, check, tolerance=one).warnings) == 1
 
 
@@ -216,5 +210,4 @@ def test_words_and_table(job):
     assert found.answer.tables == ()  # with five limits no other is left
     assert all(whole.count(f"  {row['kind']} {row['name']}") >= 1 for row in rows)
     assert whole.count(": pass\n") + whole.count(": fail\n") + whole.count(": not decidable") >= len(rows) - 1
-    frame = found.to_frame()
-    assert list(frame.verdict[:2]) == ["fail", "pass"]
+    assert [row["verdict"] for row in rows[:2]] == ["fail", "pass"]

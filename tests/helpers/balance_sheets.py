@@ -64,12 +64,16 @@ def hard(folder, drop=""):
 
 
 def on_top(folder):
-    """After a check run whose weights stay: further pieces in other holes."""
-    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
+    """A trial run again as a check run, whose weight stays: further pieces in other holes."""
+    for name in ("runs.csv", "weights.csv"):
         (folder / name).write_text((DATA / "turbo_job" / name).read_text())
+    head, *lines = (folder / "runs.csv").read_text().splitlines(keepends=True)
+    again = [line.replace("trial 3", "check") for line in lines if line.startswith("trial 3")]
+    (folder / "check.csv").write_text("".join([head, *again]))
+    (folder / "check_weights.csv").write_text("run,plane,unbalance_g_mm,angle_deg\ncheck,right,800,0\n")
     planes = "".join(
-        f"[planes.{plane}]\nholes = 12\navailable_g_mm = [5, 10]\ntaken = {{ '{hole}' = {size} }}\n"
-        for plane, hole, size in (("left", 7, 417), ("middle", 10, 282), ("right", 1, 448))
+        f"[planes.{p}]\nholes = 12\navailable_g_mm = [100, 200]\n" for p in ("left", "middle", "right")
     )
-    (folder / "job.toml").write_text((DATA / "turbo_job" / "checked.toml").read_text() + planes)
+    job = (DATA / "turbo_job" / "checked.toml").read_text()
+    (folder / "job.toml").write_text(job + planes + "taken = { '1' = 800 }\n")
     return folder / "job.toml"

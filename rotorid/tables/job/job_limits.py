@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Limits, Trials
+from balancing import Labels, Limits, Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.job.job_keys import FORBIDDEN
 from rotorid.tables.job.job_planes import Planes
@@ -37,6 +37,17 @@ def read_limits(said: Said, planes: Planes) -> tuple[Limits | None, FloatArray |
     return _limits(said, planes), _row_weights(said, planes.trials)
 
 
+def _arc(labels: Labels, first: float, last: float, *, opposite: bool) -> tuple[float, float]:
+    """First angle and width, rad with the rotation, of the degrees from → to as the job writes them.
+
+    Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material
+    is removed a job says where nothing can be taken away; the weight that would have to be added instead
+    stands `opposite`, and so does the arc of the correction.
+    """
+    start = (first if labels.angle_sign > 0 else -last) + (180.0 if opposite else 0.0)
+    return math.radians(start % 360.0), math.radians((last - first) % 360.0)
+
+
 def _limits(said: Said, planes: Planes) -> Limits | None:
     trials, labels = planes.trials, planes.trials.labels
     amount, arcs = {}, {}
@@ -52,7 +63,7 @@ def _limits(said: Said, planes: Planes) -> Limits | None:
                 amount[name] = value[0]
         forbidden = plane[FORBIDDEN.name]
         if forbidden:
-            arcs[name] = tuple(labels.arc_from(*pair, opposite=plane["remove"]) for pair in forbidden)
+            arcs[name] = tuple(_arc(labels, *pair, opposite=plane["remove"]) for pair in forbidden)
     residual: dict[str, float | FloatArray] = {}
     for name, sensor in said["sensors"].items():
         if name in trials.sensors and sensor["limit"]:

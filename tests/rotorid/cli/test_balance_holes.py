@@ -38,7 +38,7 @@ def test_prediction_of_what_is_mounted():
     found = correct(influence)
     m = mount(found, influence, None, job.holes)
     np.testing.assert_allclose(m.after, found.before + influence.W @ m.weights, rtol=1e-12)
-    assert m.after_covariance.shape == (*m.after.shape, 2, 2)
+    assert np.sqrt(np.mean(np.abs(m.after) ** 2)) < m.check_rms < 0.2 * np.abs(found.before).max()
     assert np.linalg.norm(m.after) >= np.linalg.norm(found.after)
 
 
