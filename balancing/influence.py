@@ -44,7 +44,17 @@ SAME = 1e-9
 
 
 class Remarks(NamedTuple):
-    """Sentences: what the user should know, may want to know, and which warnings say that runs disagree."""
+    """Sentences about coefficients.
+
+    Attributes
+    ----------
+    warnings
+        What the user should know.
+    notes
+        What the user may want to know.
+    contradictions
+        Those of the warnings that say that runs disagree.
+    """
 
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -294,6 +304,17 @@ class Influence:
 def local_runs(influence: Influence, trials: Trials) -> Trials:
     """Runs at the speeds, sensors and planes of coefficients.
 
+    Parameters
+    ----------
+    influence
+        The coefficients.
+    trials
+        Runs with these sensors, speeds (within 0.5 %) and planes, perhaps more.
+
+    Returns
+    -------
+    The readings and weights that belong to the coefficients, in their order.
+
     Raises
     ------
     ValueError
@@ -327,7 +348,18 @@ def local_runs(influence: Influence, trials: Trials) -> Trials:
 
 
 def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients") -> list[int]:
-    """Indices of known speeds (rad/s) equal to the wanted ones within 0.5 %.
+    """Indices of known speeds equal to the wanted ones within 0.5 %.
+
+    Parameters
+    ----------
+    wanted, known
+        rad/s, one or many.
+    what
+        What the known speeds have, for the complaint.
+
+    Returns
+    -------
+    For each wanted speed the place of the known one, from 0.
 
     Raises
     ------

@@ -67,7 +67,23 @@ class Region:
 def region_edge(
     values: ArrayLike, covariance: FloatArray, points: int, radius: float = NORMAL_RADIUS
 ) -> ComplexArray:
-    """Edges (…, points) of regions of single numbers (…) with covariances (…, 2, 2), counter-clockwise."""
+    """Edges of regions of single complex numbers.
+
+    Parameters
+    ----------
+    values
+        Complex, shape (…).
+    covariance
+        Of their real and imaginary parts, shape (…, 2, 2).
+    points
+        How many of each edge, first and last alike.
+    radius
+        In standard deviations; default: of 95 %.
+
+    Returns
+    -------
+    Complex, shape (…, points), counter-clockwise.
+    """
     turn = 2 * np.pi * np.arange(points) / (points - 1)
     variances, axes = np.linalg.eigh(covariance)
     reach = radius * np.sqrt(np.maximum(variances, 0.0))
@@ -86,5 +102,15 @@ def half_width(deviations: FloatArray) -> FloatArray:
 
 
 def real_parts(values: ComplexArray) -> FloatArray:
-    """(…, k) complex as (…, 2k) real: Re, Im, …"""
+    """Complex numbers as real ones.
+
+    Parameters
+    ----------
+    values
+        Shape (…, k).
+
+    Returns
+    -------
+    Shape (…, 2k): Re, Im, Re, …
+    """
     return np.ascontiguousarray(values, dtype=complex).view(np.float64)

@@ -365,6 +365,18 @@ def _with(response: Response, speeds: FloatArray) -> Response:
 
 
 def separation(speed: float, operating: tuple[float, float]) -> float:
-    """Distance of a speed from the operating range, percent of its nearest end; 0 inside."""
+    """Distance of a speed from the operating range, percent of its nearest end.
+
+    Parameters
+    ----------
+    speed
+        rad/s.
+    operating
+        Lowest and highest operating speed, rad/s.
+
+    Returns
+    -------
+    Percent; 0 inside the range.
+    """
     low, high = operating
     return 100 * max(0.0, (speed - high) / high, (low - speed) / max(low, 1e-300))

@@ -1,8 +1,9 @@
 """The equations of motion of a rotor as plain matrices, and as a linear state space.
 
-In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass. Of
-these a have entries in C, b have none. Each kind is solved in turn: K for b, C for a', M for the acceleration
-of what has mass. The states are q₁, q₁' and a.
+In M q'' + C q' + K q = f some coordinates move no mass: nodes of a massless shaft, feet without mass.
+Singular vectors V of the columns of their damping part them in a, which is damped, and b, which is not:
+q₂ = V (a, b); the equations are multiplied by Uᵀ, C₂₂ V = U R, so that those of b are free of a'. Each kind
+is solved in turn: K for b, C for a', M for the acceleration of what has mass. The states are q₁, q₁' and a.
 """
 
 from __future__ import annotations
@@ -110,7 +111,8 @@ class StateSpace:
     A, B, C, D
         Shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs); SI.
     states
-        Names: `x7` a deflection, `v_x7` its velocity; of massless coordinates that are damped the deflection.
+        Names: `x7` a deflection, `v_x7` its velocity; `damped1` … massless coordinates that are damped, or
+        combinations of them.
     inputs
         `f_x7` is a force on coordinate `x7`, N (on a tilt: N·m).
     outputs
@@ -167,7 +169,7 @@ def state_space(
     ------
     ValueError
         For names that do not exist, numbers that are not finite, a singular mass matrix without a zero row,
-        and massless coordinates that nothing holds, or that are damped against each other only.
+        and massless coordinates that nothing holds or whose velocity acts without being damped.
 
     Examples
     --------
@@ -184,21 +186,28 @@ def state_space(
     M, C, K = matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
     if matrices.shape != (3, n, n) or not np.isfinite(matrices).all():
         raise ValueError(f"a state space of {n} coordinates needs finite matrices, {n} × {n}")
-    massive, touched = M.any(axis=0) | M.any(axis=1), C.any(axis=0) | C.any(axis=1)
-    one, damped, free = map(np.flatnonzero, (massive, ~massive & touched, ~(massive | touched)))
+    massive = M.any(axis=0) | M.any(axis=1)
+    one, two = np.flatnonzero(massive), np.flatnonzero(~massive)
     every, velocities = [f"f_{name}" for name in names], [f"v_{names[i]}" for i in one]
     inputs = tuple(every if inputs is None else inputs)
     outputs = tuple(names if outputs is None else outputs)
     forces, shown = _places(inputs, every, "input"), _places(outputs, [*names, *velocities], "output")
-    states = (*(names[i] for i in one), *velocities, *(names[i] for i in damped))
+
+    U, V, light = np.eye(n), np.eye(n), np.ix_(two, two)
+    _, sigma, right = np.linalg.svd(C[:, two])
+    V[light] = right.T
+    U[light] = np.linalg.qr(C[light] @ right.T)[0]
+    C, K = U.T @ C @ V, U.T @ K @ V
+    damped, free = np.split(two, [np.count_nonzero(sigma > 1e-12 * sigma.max(initial=0.0))])
+    states = (*(names[i] for i in one), *velocities, *(f"damped{i + 1}" for i in range(damped.size)))
     order = len(states)
     # Over the states and the inputs.
     q, v, rate, load = np.zeros((4, n, order + len(inputs)))
     q[one], v[one], q[damped] = np.split(np.eye(order, q.shape[1]), [one.size, 2 * one.size])
-    load[:, order:] = np.eye(n)[:, forces]
+    load[:, order:] = U.T[:, forces]
     for unknown, matrix, rows, what in (
         (q, K, free, "massless coordinates are held neither by stiffness nor by damping"),
-        (v, C, damped, "massless coordinates are damped against each other only, or turned; give them mass"),
+        (v, C, damped, "velocities of massless coordinates act on others, but are not damped themselves"),
         (rate, M, one, "the mass matrix is singular without a zero row, as with shear but no rotary inertia"),
     ):
         square = matrix[np.ix_(rows, rows)]
@@ -207,7 +216,7 @@ def state_space(
             raise ValueError(f"{what}: there is no state space")
         unknown[rows] = np.linalg.solve(square, (load - C @ v - K @ q)[rows])
     A, B = np.split(np.vstack((v[one], rate[one], v[damped])), [order], axis=1)
-    Y, D = np.split(np.vstack((q, v[one]))[shown], [order], axis=1)
+    Y, D = np.split(np.vstack((V @ q, v[one]))[shown], [order], axis=1)
     return StateSpace(A, B, Y, D, states, inputs, outputs, motion.speed)
 
 

@@ -30,7 +30,7 @@ def test_amplitudes_and_phases_in_each_others_columns_are_not_mounted(cli):
 
 def test_the_region_of_planes_that_act_nearly_alike_holds_the_truth(cli):
     ran = cli("balance", JOBS / "near_alike/job.toml")
-    assert "Warning: planes 'A' and 'B' act alike" in ran.out
+    assert "planes 'A' and 'B' together do what" in ran.out
     rows = cli("balance", JOBS / "near_alike/job.toml", "--json").json["corrections"]
     truth = np.array([10.7, 11.9]) * np.exp(1j * np.radians([56, 109]))
     for row, off in zip(rows, vectors(rows) - truth, strict=True):
@@ -76,7 +76,7 @@ def test_pairs_of_weights_as_runs(cli):
     np.testing.assert_allclose(vectors(rows), truth, atol=1.5)
     ran = cli("balance", folder / "runs_s.csv", folder / "weights_s.csv")
     assert ran.code == 2
-    assert "add a run with a weight in only one of them" in ran.err
+    assert "add runs with a weight in only one of them" in ran.err
 
 
 @pytest.mark.parametrize("runs", ["blank.csv", "na.csv"])

@@ -117,7 +117,7 @@ def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
         errors = {"errors": last.errors, "run_errors": last.run_errors}
         return Trials(names, readings=last.readings[:, runs], weights=last.weights[runs], **shared, **errors)
 
-    refined = refine(part([0, 1, 2]), part([3]), part([4]))
+    refined = refine(part([0, 1, 2]), part([3, 4]))
     assert first.weights == pytest.approx(last.weights[:3])
     assert correct(refined).weights == pytest.approx(correct(real(last)).weights, rel=1e-9)
 

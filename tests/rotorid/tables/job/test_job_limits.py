@@ -9,6 +9,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 from balancing import Labels
 from rotorid.commands.option_quantities import limited
 from rotorid.tables import job_from_files, read_job
+from rotorid.tables.job.job_limits import _arc
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 TWO_SPEEDS = [*RUNS, *FAST]
@@ -102,7 +103,7 @@ def test_a_job_without_any(job):
 )
 def test_arcs(pair, side, first, last):
     labels = Labels(angles=f"{side} rotation")
-    start, width = labels.arc_from(*pair)
+    start, width = _arc(labels, *pair, opposite=False)
     assert np.degrees(start) == pytest.approx(first)
     assert np.degrees(width) == pytest.approx(last - first)
     assert labels.arc(start, width) == pytest.approx([pair[0] % 360, pair[1] % 360])
