@@ -11,8 +11,8 @@ import fem
 from fem import GRAVITY
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import number
-from rotorid.motion.small_model import SmallModel
 from rotorid.motion.system import MotionSystem, system
+from rotorid.reduction import SmallModel
 
 
 def rotor_system(

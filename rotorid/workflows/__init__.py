@@ -26,6 +26,8 @@ from rotorid.commands import (
     unbalance,
 )
 from rotorid.commands.outcome import Delivered
+from rotorid.commands.reduce import ReduceOptions, reduce
+from rotorid.commands.reduce_result import ReducedRotor
 from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
@@ -35,8 +37,6 @@ from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
-from rotorid.workflows.reduce import ReduceOptions, reduce
-from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts

@@ -16,7 +16,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Key, Kind, take

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.motion.reduced_system import ReducedSystem
     from rotorid.motion.run import MotionRun
-    from rotorid.motion.small_model import SmallModel
     from rotorid.motion.steady_end import SteadyEnd
     from rotorid.motion.system import MotionSystem
+    from rotorid.reduction import SmallModel
     from rotorid.workflows.motion.moving_system import Moving
 
 View = Literal["motion", "orbits", "bode", "polar"]

@@ -11,8 +11,8 @@ from rotorid.commands.input_checks import rotor_source
 
 if TYPE_CHECKING:
     from fem import Rotor
-    from rotorid.motion.small_model import SmallModel
     from rotorid.motion.system import MotionSystem
+    from rotorid.reduction import SmallModel
 
 Table = Mapping[int, complex] | Path | str
 
@@ -65,7 +65,7 @@ def moving(
     ValueError
         For files that cannot be read.
     """
-    from rotorid.motion.small_model import SmallModel
+    from rotorid.reduction import SmallModel
     from rotorid.tables import read_bow, read_small_model, read_unbalance, rotor_files
     from rotorid.tables.models.small_model_file import is_small_model
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from rotorid.motion.continuation import Branch
     from rotorid.motion.periodic_table import Readings
     from rotorid.motion.reduced_system import ReducedSystem
-    from rotorid.motion.small_model import SmallModel
     from rotorid.motion.system import MotionSystem
+    from rotorid.reduction import SmallModel
 
 _SMALL = 24
 """Unknowns above which a rotor is reduced, to so many or more."""

@@ -31,9 +31,9 @@ from rotorid.commands.quantities import (
 if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.registry import Method
+    from rotorid.commands.reduce_result import ReducedRotor
     from rotorid.reduction import InputErrors, Placement, Reduction
     from rotorid.tables.data.modes_table import MeasuredModes
-    from rotorid.workflows.reduce_result import ReducedRotor
 
 Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
@@ -41,14 +41,14 @@ Normalise = Literal["first", "largest", "length"]
 """How shapes are scaled."""
 Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
-View = Literal["shapes", "methods", "trade-off", "placement", "response", "stability", "errors", "what-if"]
+View = Literal["shapes", "methods", "placement", "response", "stability"]
 """What a picture shows."""
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
 def choices() -> dict[str, Sequence[Method[Any]]]:
     """What `methods` compares."""
-    from rotorid.reduction.guyan_irs_serep import METHODS
+    from rotorid.reduction.condensation import METHODS
 
     return {"methods": METHODS}
 
@@ -94,8 +94,6 @@ class ReduceOptions:
         Rank all places of the masses.
     candidates : LIST
         Nodes that places are chosen from.
-    trade_off
-        Other masses at these nodes: frequencies against shapes.
     methods
         Beside other reductions.
     response : A:B:STEP
@@ -109,8 +107,8 @@ class ReduceOptions:
     force : LIST
         Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
     keep_supports
-        For motion: masses of the shaft alone, found with rigid bearings in place of bearings and films; all
-        supports and forces stay in the model, at nodes of their own.
+        For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
+        all supports and forces stay in the model, at nodes of their own.
     """
 
     nodes: Nodes | None = None
@@ -129,7 +127,6 @@ class ReduceOptions:
     speed: str | float | None = None
     rank: bool = False
     candidates: Nodes | None = None
-    trade_off: bool = False
     methods: bool = False
     response: Speeds | None = None
     stability: Band | None = None
@@ -158,7 +155,7 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     ValueError
         For a rotor or an option that cannot be, and for options that would have no effect.
     """
-    from rotorid.workflows.reduce_result import ReducedRotor
+    from rotorid.commands.reduce_result import ReducedRotor
 
     options = options or ReduceOptions()
     how = {"normalise": options.normalise, "rows": options.rows, "nonnegative": options.nonnegative}
@@ -166,22 +163,22 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     if rotor is None:
         result, files = _of_tables(options, how)
         forces = _forces(options)
-        found = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
+        reduced = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
     else:
-        found = _of_rotor(rotor, options, how)
-    solved = found.result.masses
+        reduced = _of_rotor(rotor, options, how)
+    solved = reduced.result.masses
     log.info("rank = %s", solved.rank)
     log.info("degrees_of_freedom = %s", solved.dof)
     log.info("singular_values = %s", ", ".join(f"{value:.6g}" for value in solved.singular_values))
     if options.what_if is None:
-        return found
+        return reduced
     changes = shares(options.what_if, "--what-if", "alpha12=1.3")
-    return dataclasses.replace(found, shift=found.result.what_if(changes))
+    return dataclasses.replace(reduced, shift=reduced.result.what_if(changes))
 
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
-    computed = ("rank", "place", "methods", "trade_off", "response", "stability")
+    computed = ("rank", "place", "methods", "response", "stability")
     of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed", "keep_supports")
     asked = {name: getattr(options, name) for name in of_rotor}
     given = [name for name, value in asked.items() if value is not None and value is not False]
@@ -212,11 +209,10 @@ def _forces(options: ReduceOptions) -> list[str | int]:
 
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
     """The masses of a rotor, and what is asked for beside them."""
-    from rotorid.motion.kept_supports import check_free, held_nodes, held_rigidly, keep_supports
-    from rotorid.reduction import rank_nodes
+    from rotorid.commands.reduce_result import ReducedRotor
+    from rotorid.reduction import check_free, held_nodes, held_rigidly, keep_supports, rank_nodes
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
-    from rotorid.workflows.reduce_result import ReducedRotor
 
     machine, files = rotor_source(rotor)
     whole, held = machine, held_nodes(machine) if options.keep_supports else ()
@@ -261,7 +257,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         **how,
     )
     tables = [support.speeds[0] for support in machine.supports if support.speeds]
-    found = ReducedRotor(
+    reduced = ReducedRotor(
         result=result,
         placement=placement if options.rank else None,
         damping=damping_ratios(options.damping),
@@ -270,11 +266,10 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         forces=[machine.node(node) for node in _forces(options)],
         provenance=provenance(files, options),
     )
-    found = _beside(found, machine, options, at)
-    if not options.keep_supports:
-        return found
-    model = keep_supports(whole, places, found.result.masses.solution, modal_damping=found.damping)
-    return dataclasses.replace(found, motion_model=model)
+    if options.keep_supports:
+        model = keep_supports(whole, places, result.masses.solution, modal_damping=reduced.damping)
+        reduced = dataclasses.replace(reduced, small=model, keeps_supports=True)
+    return _beside(reduced, machine, options, at)
 
 
 def _places(
@@ -349,28 +344,26 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
     return result, (Path(options.compliance), Path(options.measured))
 
 
-def _beside(found: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
-    """With other masses, other methods, response and stability as asked for."""
-    from rotorid.reduction import compare_methods, compare_response, compare_stability, trade_off
+def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
+    """With other methods, response and stability as asked for."""
+    from rotorid.reduction import compare_methods, compare_response, compare_stability
 
-    places = [int(node) for node in found.result.nodes]
-    how: dict[str, Any] = {"normalise": options.normalise, "speed": at}
+    places = [int(node) for node in reduced.result.nodes]
+    how: dict[str, Any] = {"normalise": options.normalise, "rows": options.rows, "speed": at}
     beside: dict[str, Any] = {}
-    if options.trade_off:
-        beside["trade_off"] = trade_off(rotor, places, **how)
     if options.methods:
-        beside["methods"] = compare_methods(rotor, places, modes=found.result.modes, rows=options.rows, **how)
+        beside["methods"] = compare_methods(rotor, places, modes=reduced.result.modes, **how)
     stable = band(options.stability, "--stability")
-    damped = found.damping and not options.keep_supports
-    if damped or options.response is not None or stable is not None:
-        beside["small"] = small = found.result.small(found.damping)
+    if reduced.damping or options.response is not None or stable is not None:
+        reduced = reduced.with_small()
+        assert reduced.small is not None
         if options.response is not None:
             automatic = str(options.response) == "auto"
             speeds = None if automatic else rising_speeds(options.response, "--response")
-            beside["response"] = compare_response(small, speeds)
+            beside["response"] = compare_response(rotor, reduced.small, speeds)
         if stable is not None:
-            beside["stability"] = compare_stability(small, stable[1], lowest=stable[0])
-    return dataclasses.replace(found, **beside)
+            beside["stability"] = compare_stability(rotor, reduced.small, stable[1], lowest=stable[0])
+    return dataclasses.replace(reduced, **beside)
 
 
 def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:

@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
@@ -21,16 +21,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     import fem
-    from rotorid.motion.small_model import SmallModel
     from rotorid.reduction import (
         Methods,
         Placement,
         Reduction,
         ResponseCost,
         Shift,
-        SmallRotor,
+        SmallModel,
         StabilityCost,
-        TradeOff,
     )
 
 NAMED = ("states", "inputs", "outputs")
@@ -44,25 +42,26 @@ class ReducedRotor(Parts):
     ----------
     result
         The masses.
-    placement, trade_off, methods, response, stability, shift
+    placement, methods, response, stability, shift
         What was asked for beside them.
     small
-        The model in both planes, with what turns, couples and damps; `damping`: its modal damping ratios.
-    motion_model
-        The model for motion, with supports and forces, where the supports are kept.
+        The model in both planes, with supports, forces and what turns, couples and damps.
+    keeps_supports
+        Whether its masses are those of the shaft on rigid supports.
+    damping
+        Its modal damping ratios.
     speed, both_planes, forces
         Of the files of the small model: rad/s, whether both planes are written, nodes of forces.
     """
 
     result: Reduction
     placement: Placement | None = None
-    trade_off: TradeOff | None = None
     methods: Methods | None = None
     response: ResponseCost | None = None
     stability: StabilityCost | None = None
     shift: Shift | None = None
-    small: SmallRotor | None = None
-    motion_model: SmallModel | None = None
+    small: SmallModel | None = None
+    keeps_supports: bool = False
     damping: Sequence[float] = ()
     speed: float = 0.0
     both_planes: bool = False
@@ -75,19 +74,17 @@ class ReducedRotor(Parts):
             "": self.result,
             "what_if": self.shift,
             "placement": self.placement,
-            "trade_off": self.trade_off,
             "methods": self.methods,
             "response": self.response,
             "stability": self.stability,
             "small_model": self.small,
-            "motion_model": self.motion_model,
         }
 
     @property
     def answer(self) -> Answer:
         """The ranking where it was asked for, before the masses at its compromise."""
         first = [] if self.placement is None else [self.placement.answer]
-        if self.motion_model is not None and self.result.rotor is not None:
+        if self.keeps_supports and self.result.rotor is not None:
             at = listing((str(support.node) for support in self.result.rotor.supports), "and")
             first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
         rest = (part for part in self.parts.values() if part not in (None, self.placement))
@@ -107,27 +104,21 @@ class ReducedRotor(Parts):
         """
         from rotorid.base.plot_style import new_figure
         from rotorid.plots import plot
-        from rotorid.reduction.plots import plot_changes
 
         parts = {
             "stability": self.stability,
             "response": self.response,
             "methods": self.methods,
-            "trade-off": self.trade_off,
             "placement": self.placement,
-            "what-if": self.shift,
-            "errors": self.result.uncertainty,
             "shapes": self.result,
         }
         name = view or next(name for name, part in parts.items() if part is not None)
         if parts[one_of(name, "view", [*parts])] is None:
             option = {"placement": "--rank"}.get(name, f"--{name}")
             raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
-        heights = {"methods": (1, 1), "trade-off": (1, 1), "response": (3, 2)}.get(name)
+        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
         figure = new_figure(6.2 if heights else 5.0)
-        if name in ("what-if", "errors"):
-            plot_changes(self.result, self.shift, figure.add_subplot())
-        elif heights:
+        if heights:
             plot(parts[name], [*figure.subplots(2, sharex=True, height_ratios=heights)])
         else:
             plot(parts[name], figure.add_subplot())
@@ -140,12 +131,25 @@ class ReducedRotor(Parts):
         return reduce_report(self.to_dict(), self.parts, self.provenance)
 
     def with_small(self) -> ReducedRotor:
-        """The same with the small model, which needs a rotor; that for motion is one."""
-        return (
-            self
-            if self.small or self.motion_model
-            else dataclasses.replace(self, small=self.result.small(self.damping))
-        )
+        """The same with the small model, which needs a rotor.
+
+        Raises
+        ------
+        ValueError
+            Without a rotor, or with masses that are not positive.
+        """
+        from rotorid.reduction import small_model
+
+        if self.small is not None:
+            return self
+        rotor, nodes = self.result.rotor, [int(node) for node in self.result.nodes]
+        if rotor is None:
+            raise ValueError(
+                "measured modes and a compliance alone say nothing of bearings and the second plane: "
+                "give a rotor"
+            )
+        model = small_model(rotor, nodes, self.result.masses.solution, modal_damping=self.damping)
+        return dataclasses.replace(self, small=model)
 
     def model_bytes(self, name: str = "") -> bytes:
         """The small model as a file for `fit` and `identify`, or that for motion; `name`: of the rotor.
@@ -155,12 +159,12 @@ class ReducedRotor(Parts):
         from rotorid.tables.models.model_writing import ode_model_bytes
         from rotorid.tables.models.small_model_file import small_model_bytes
 
-        found = (
+        made = (
             f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
             f"{counted(self.result.modes, 'mode')})"
         )
-        if self.motion_model is not None:
-            return small_model_bytes(self.motion_model, [f"{found}, its supports kept, SI"])
+        if self.keeps_supports and self.small is not None:
+            return small_model_bytes(self.small, [f"{made}, its supports kept, SI"])
         if (self.result.masses.solution <= 0).any():
             raise ValueError(
                 "a model with a mass that is not positive cannot be written: use other nodes or modes"
@@ -179,7 +183,7 @@ class ReducedRotor(Parts):
             )
         which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
         said = [
-            f"{found}, {which} at {motion.speed:.6g} rad/s, SI",
+            f"{made}, {which} at {motion.speed:.6g} rad/s, SI",
             "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
         ]
         if motion.M.any(axis=0).all() and not inputs:
@@ -227,8 +231,8 @@ class ReducedRotor(Parts):
         y = np.array(["y" in name for name in motion.coordinates])
         across = np.ix_(~y, y)
         coupled = bool(motion.C[across].any() or motion.K[across].any())
-        plane: Literal["both", "x"] = "both" if self.both_planes or coupled else "x"
+        plane = "both" if self.both_planes or coupled else "x"
         try:
-            return self.small.motion(self.speed, plane, "condensed")
+            return self.small.motion(self.speed, plane, condensed=True)
         except ValueError:  # damped supports stay, as states of first order
             return self.small.motion(self.speed, plane)
