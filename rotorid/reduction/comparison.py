@@ -112,8 +112,12 @@ class ResponseCost(Answered):
         """Bands around the critical speeds, rad/s."""
         return [(w * (1 - self.bands), w * (1 + self.bands)) for w in self.criticals.tolist()]
 
-    def _sizes(self) -> dict[str, float]:
-        """Largest and median of the differences that are not left out."""
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Largest and median difference of speeds that are not left out, also relative to the highest |full|.
+
+        Keys: `largest`, `median`, `largest_to_highest`, `median_to_highest`.
+        """
         sizes: dict[str, float] = {}
         for name, values in (("", self.worst), ("_to_highest", self.to_highest)):
             used = values[~self.excluded]
@@ -123,7 +127,7 @@ class ResponseCost(Answered):
     @property
     def answer(self) -> Answer:
         """What the reduction costs, in words."""
-        used, size = self.speeds[~self.excluded], self._sizes()
+        used, size = self.speeds[~self.excluded], self.sizes
         speed, sensor, plane = self.where
         left_out = "no critical speed of the full rotor lies near the range; no band is left out"
         if self.criticals.size:
@@ -174,7 +178,7 @@ class ResponseCost(Answered):
                 "bands": self.bands,
                 "excluded": self.excluded,
                 "relative_difference": self.worst,
-                **self._sizes(),
+                **self.sizes,
                 "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
                 "warnings": self.warnings,
             }
@@ -245,7 +249,7 @@ def compare_response(
                 "amplitudes computed there are never reached"
             )
     cost = ResponseCost(omega, full.W, response, nodes, sensors, criticals, float(bands), excluded)
-    largest = cost._sizes()["largest"]
+    largest = cost.sizes["largest"]
     if not largest <= CLOSE:
         remarks.append(
             f"at {cost.where[0]:.6g} rad/s the small model is {_percent(largest)} off: take more masses, "

@@ -97,6 +97,11 @@ class Method:
     diagonal: bool
     reason: str = ""
 
+    @property
+    def masses(self) -> FloatArray | None:
+        """The masses at the masters, kg, shape (n,); None where the mass matrix is not diagonal."""
+        return np.diag(self.M).copy() if self.diagonal and self.M is not None else None
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the transformation T is left to Python."""
         return plain(
@@ -104,7 +109,7 @@ class Method:
                 "method": self.name,
                 "mass_matrix_kg": self.M,
                 "stiffness_matrix_N_per_m": self.K,
-                "masses_kg": np.diag(self.M) if self.diagonal and self.M is not None else None,
+                "masses_kg": self.masses,
                 "diagonal": self.diagonal,
                 "natural_frequencies_rad_s": self.frequencies,
                 "relative_error": self.relative_error,

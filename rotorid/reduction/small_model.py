@@ -246,7 +246,7 @@ class SmallModel(Answered):
         n = Q.size if Q.P.planes == 2 else 2 * Q.size
         K = np.real(self.equations().at(omega[:1])[1][0]).diagonal()[: len(self.nodes)]
         massive = self.masses > 0
-        scale = float(np.sqrt(np.median(K[massive] / self.masses[massive])))
+        scale = float(np.sqrt(np.median(np.abs(K[massive]) / self.masses[massive])))
         return solve(Q, omega, n, scale)
 
     def response(self, speeds: ArrayLike) -> ComplexArray:
@@ -397,8 +397,8 @@ def small_model(
         nodes=kept,
         masses=np.concatenate((m, np.zeros(k - n))),
         weight=GRAVITY * (T.T @ multiply(A.mass, ones)[:, 0]),
-        stiffness=Q.K0[:k, :k],
-        material_damping=Q.D0[:k, :k],
+        stiffness=_without_rounding(Q.K0[:k, :k], A.shaft[-1, A.deflections]),
+        material_damping=_without_rounding(Q.D0[:k, :k], A.material[-1, A.deflections]),
         gyroscopic=np.real(Q.D1[:k, k : 2 * k]),
         supports=[replace(support, tilting_stiffness=0.0) for support in rotor.supports],
         forces=rotor.forces,
@@ -406,6 +406,11 @@ def small_model(
     )
     ratios = _ratios(modal_damping)
     return replace(model, damping=_modal(model, ratios)) if any(ratios) else model
+
+
+def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
+    """Zero where all is rounding of the shaft's entries, as of two nodes, which nothing bends."""
+    return matrix if np.abs(matrix).max() > NONE * np.abs(whole).max() else np.zeros_like(matrix)
 
 
 def static_shapes(rotor: fem.Rotor, kept: tuple[int, ...]) -> FloatArray:

@@ -9,7 +9,7 @@ import pytest
 
 import fem
 from fem import JournalBearing, MuszynskaSeal
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
 from rotorid.workflows import MotionOptions, motion

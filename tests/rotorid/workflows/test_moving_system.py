@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem import JournalBearing, Rotor
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.tables import InputError
 from rotorid.tables.models.small_model_file import small_model_bytes
 from rotorid.workflows.motion.moving_system import moving

@@ -3,8 +3,8 @@
 import pytest
 
 from rotorid import read_rotor
+from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.samples import sample_data
-from rotorid.workflows.reduce import ReduceOptions, reduce
 
 ROTOR = sample_data() / "rotor23.csv"
 BOOK = sample_data() / "book_task_9"

@@ -5,7 +5,7 @@ import pytest
 
 import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.tables import InputError, TableWarning
 from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes
 from tests.helpers.cases import each_of

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from cases import each_of
 from fem_rotors import ROOT, rotor23
+from small_models import compare_response, small_rotor
 
 import fem
 import rotorid
 from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.response_comparison import compare_response
-from rotorid.reduction.dynamics.small_rotor import small_rotor
 
 NODES = (7, 12, 18)
 
@@ -45,25 +44,25 @@ def test_reference_rotor():
     cost = compare_response(small)
     second = fem.critical_speeds(rotor23(), 2).frequencies[1]
     assert cost.speeds[-1] == pytest.approx(1.1 * second, rel=1e-12)
-    assert cost.largest < 0.08
-    assert cost.median < 0.01
-    assert cost.largest_to_highest < 0.08
-    assert cost.median_to_highest < 0.01
+    assert cost.sizes["largest"] < 0.08
+    assert cost.sizes["median"] < 0.01
+    assert cost.sizes["largest_to_highest"] < 0.08
+    assert cost.sizes["median_to_highest"] < 0.01
     assert cost.warnings == ()
     # The same in the compliance form of the book, without the small rotor's matrices.
-    alpha, m = fem.compliance(rotor23(), NODES), np.diag(small.masses)
+    alpha, m = fem.compliance(rotor23(), NODES), np.diag(small.small.masses[small.small.masses > 0])
     w2 = cost.speeds[:, None, None] ** 2
     W = np.linalg.solve(np.linalg.inv(alpha) - w2 * m, w2 * np.eye(3))
     difference = np.abs(W - cost.full) / np.abs(cost.full).max(axis=(1, 2))[:, None, None]
     used = difference[~cost.excluded].max(axis=(1, 2))
-    assert cost.largest == pytest.approx(used.max(), rel=1e-8)
-    assert cost.median == pytest.approx(np.median(used), rel=1e-8)
+    assert cost.sizes["largest"] == pytest.approx(used.max(), rel=1e-8)
+    assert cost.sizes["median"] == pytest.approx(np.median(used), rel=1e-8)
 
 
 def test_frequency_is_not_response():
     """Nodes 3, 11, 14 have the best frequencies of all triples, and follow the rotor badly; it is said."""
     cost = compare_response(book(nodes=(3, 11, 14)))
-    assert cost.largest > 1.0
+    assert cost.sizes["largest"] > 1.0
     assert "take more masses" in cost.summary()
     assert cost.where[1:] == (3, 3)
 
@@ -80,7 +79,7 @@ def test_bands():
     assert np.isnan(cost.relative_difference[0]).all()
     assert "Left out: " in cost.answer.whole()
     narrow = compare_response(book(), cost.speeds, bands=0.02)
-    assert narrow.largest > cost.largest
+    assert narrow.sizes["largest"] > cost.sizes["largest"]
     assert np.count_nonzero(narrow.excluded) < np.count_nonzero(cost.excluded)
 
 
@@ -89,9 +88,9 @@ def test_where():
     speed, sensor, plane = cost.where
     k = int(np.flatnonzero(cost.speeds == speed)[0])
     assert not cost.excluded[k]
-    assert cost.worst[~cost.excluded].max() == cost.largest
+    assert cost.worst[~cost.excluded].max() == cost.sizes["largest"]
     own = cost.relative_difference[k, cost.sensors.index(sensor), cost.nodes.index(plane)]
-    assert own == cost.largest
+    assert own == cost.sizes["largest"]
     assert cost.relative_difference.shape == cost.full.shape == cost.small.shape == (89, 3, 3)
 
 
@@ -119,7 +118,7 @@ def test_masses_that_are_lumped(kind):
     """A massless shaft with discs: nothing is lost by the reduction, in x and in y, with phases."""
     small = lumped(BEARINGS[kind], material=1e-5 if kind == "whirling" else 0.0)
     cost = compare_response(small, np.linspace(3.0, 700.0, 60), bands=0.05)
-    assert cost.largest < 1e-8
+    assert cost.sizes["largest"] < 1e-8
     assert worst_part(cost) < 1e-6
     assert cost.full.shape[1] == (3 if small.rotor.symmetric else 6)
     assert "No critical speed" in cost.answer.whole() or cost.criticals.size
@@ -130,7 +129,7 @@ def test_reads_as_the_small_rotor():
     for kind in BEARINGS:
         small = lumped(BEARINGS[kind])
         cost = compare_response(small, [20.0, 111.0, 340.0], bands=0.0)
-        assert cost.small[:, :3] == pytest.approx(small.response(cost.speeds), rel=1e-9)
+        assert cost.small[:, :3] == pytest.approx(small.small.small.response(cost.speeds)[:, :3], rel=1e-9)
 
 
 def test_gyroscopic_rotor_with_tables():
@@ -140,7 +139,7 @@ def test_gyroscopic_rotor_with_tables():
     cost = compare_response(small_rotor(rotor, nodes, reduce(rotor, nodes, 1).masses.solution))
     assert cost.speeds[0] == pytest.approx(1000 * np.pi / 30)
     assert len(cost.sensors) == 6
-    assert cost.median < 0.03
+    assert cost.sizes["median"] < 0.03
     assert (~cost.excluded).any()
     first = cost.speeds < 0.9 * cost.criticals[0]
     assert cost.worst[first].max() < 0.04
@@ -170,18 +169,17 @@ def test_outputs():
     cost = compare_response(book(), np.linspace(0.0, 500.0, 26))
     text = json.dumps(cost.to_dict(), allow_nan=False)
     back = json.loads(text)
-    assert back["largest"] == cost.largest
+    assert back["largest"] == cost.sizes["largest"]
     assert back["relative_difference"][0] is None
     assert back["where"]["plane"] == cost.where[2]
     frame = cost.to_frame()
     assert len(frame) == 26 * 9
     row = frame[(frame.speed_rad_s == cost.where[0]) & (frame.plane == cost.where[2])]
-    assert row.relative_difference.max() == cost.largest
+    assert row.relative_difference.max() == cost.sizes["largest"]
     k = int(np.flatnonzero(cost.speeds == 20.0)[0])
     at = frame[frame.speed_rad_s == 20.0]
     Z = at.small_m_per_kg_m * np.exp(1j * np.radians(at.small_phase_deg))
     assert Z.to_numpy() == pytest.approx(cost.small[k].ravel())
-    assert not cost.small.flags.writeable
 
 
 @each_of(
@@ -206,9 +204,14 @@ def test_bad_input(speeds, options, message):
 def test_modal_damping_is_left_out_of_the_comparison():
     """The full rotor has none: what it takes away from a peak is no error of the reduction."""
     small = book()
-    damped = small_rotor(small.rotor, small.nodes, small.masses, modal_damping=(0.05, 0.05))
+    damped = small_rotor(
+        small.rotor,
+        small.small.massive,
+        small.small.masses[small.small.masses > 0],
+        modal_damping=(0.05, 0.05),
+    )
     speeds = [120.0, 135.0]
     plain, more = (compare_response(each, speeds, bands=0.0) for each in (small, damped))
     np.testing.assert_allclose(more.small, plain.small, rtol=1e-12)
     assert more.warnings[0].startswith("the modal damping of the small model is left out")
-    assert np.abs(damped.response(speeds)[1]).max() < 0.1 * np.abs(plain.small[1]).max()
+    assert np.abs(damped.small.response(speeds)[1]).max() < 0.1 * np.abs(plain.small[1]).max()

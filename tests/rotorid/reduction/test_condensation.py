@@ -12,8 +12,8 @@ from scipy.linalg import eigh
 
 import fem
 from rotorid.reduction import reduce
-from rotorid.reduction.equivalent.plane_at_rest import plane_at_rest
-from rotorid.reduction.guyan_irs_serep import compare_methods, reduce_by
+from rotorid.reduction.condensation import compare_methods, reduce_by
+from rotorid.reduction.masses import plane_at_rest
 
 MASTERS = (7, 12, 18)
 
@@ -72,7 +72,8 @@ def check_against_textbook(rotor, nodes, tolerance=1e-6):
     np.testing.assert_allclose(result.rotor_frequencies, frequencies, rtol=tolerance)
     for name, T in transformations.items():
         row = result.row(name)
-        np.testing.assert_allclose(row.T, T, atol=tolerance * np.abs(T).max())
+        deflections = [motion.index(f"x{node}") for node in range(1, rotor.n_nodes + 1)]
+        np.testing.assert_allclose(row.T, T[deflections], atol=tolerance * np.abs(T).max())
         close(row.M, T.T @ motion.M @ T, tolerance)
         close(row.K, T.T @ motion.K @ T, tolerance)
         omega = np.sqrt(eigh(row.K, row.M, eigvals_only=True))

@@ -1,7 +1,5 @@
 """Formula (50) with other normalisations, row weights, bounds and seals."""
 
-import json
-
 import numpy as np
 import pytest
 from book_task_9 import COMPLIANCE, FREQUENCIES, SHAPES
@@ -10,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotorid.reduction import equivalent_masses, natural_frequencies
-from rotorid.reduction.equivalent.equivalent_masses_formula_50 import BoundedEstimate, design
+from rotorid.reduction.masses import BoundedEstimate, design
 
 NORMALISATIONS = ("first", "largest", "length")
 
@@ -144,11 +142,7 @@ def test_masses_that_would_be_negative_stand_at_their_bound():
     assert found.at_bounds == names
     assert np.isnan(found.std[held]).all()
     assert np.isfinite(found.std[~held]).all()
-    document = json.loads(json.dumps(found.to_dict()))
-    assert document["at_bounds"] == list(names)
-    assert document["parameters"][names[0]]["std"] is None
-    assert found.to_frame()["at_bound"].tolist() == held.tolist()
-    assert equivalent_masses(alpha, [1000.0], U, nonnegative=True).warnings == ()
+    assert equivalent_masses(alpha, [1000.0], U, nonnegative=True).at_bounds == ()
 
 
 @settings(max_examples=60, deadline=None)

@@ -10,14 +10,12 @@ from fem_rotors import ROOT, rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL
+from small_models import compare_stability, small_rotor, stability_threshold, whirl_of
 from whirl_rotors import whirling_rotors
 
 import fem
 import rotorid
 from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.small_rotor import small_rotor
-from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
-from rotorid.reduction.dynamics.stability_comparison import compare_stability, stability_threshold
 
 MASS, SHAFT, DIAMETER = 20.0, 1.0, 0.03
 STIFFNESS = 48 * fem.STEEL_MODULUS * math.pi / 64 * DIAMETER**4 / SHAFT**3  # of a simply supported shaft
@@ -66,12 +64,12 @@ def test_internal_damping(ratio):
     cost = compare_stability(
         jeffcott(fem.Support(2, 0.0, ratio * internal), material=material), 2.3 * expected
     )
-    for found, threshold in ((cost.full, cost.full_threshold), (cost.small, cost.small_threshold)):
+    for found, threshold in ((cost.full, cost.full.threshold), (cost.small, cost.small.threshold)):
         assert threshold == pytest.approx(expected, rel=1e-6)
         assert found.frequency == pytest.approx(CRITICAL, rel=1e-6)
         assert found.whirl_ratio == pytest.approx(1 / (1 + ratio), rel=1e-6)
         assert (found.mode, found.direction) == (2, 1)  # backward whirl comes first
-    assert cost.small_threshold == pytest.approx(cost.full_threshold, rel=1e-10)
+    assert cost.small.threshold == pytest.approx(cost.full.threshold, rel=1e-10)
 
 
 @settings(max_examples=25, deadline=None)
@@ -190,7 +188,7 @@ def test_lumped_rotor_is_the_full_one():
     small = small_rotor(rotor, (2, 4, 5), [40.0, 90.0, 25.0])
     cost = compare_stability(small, 900.0)
     assert cost.full.status == "threshold"
-    assert cost.small_threshold == pytest.approx(cost.full_threshold, rel=1e-8)
+    assert cost.small.threshold == pytest.approx(cost.full.threshold, rel=1e-8)
     assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=1e-8)
     assert (cost.small.mode, cost.small.direction) == (cost.full.mode, cost.full.direction)
     assert cost.small_decrement == pytest.approx(cost.full_decrement, rel=1e-6, abs=1e-9)
@@ -203,13 +201,13 @@ def test_compressor(nodes, modes):
     """Speed-dependent bearings and a swirling seal: the small models lose stability within 3 %."""
     small = compressor(nodes, modes)
     cost = compare_stability(small, 1600.0, lowest=110.0, steps=20)
-    assert cost.full_threshold == pytest.approx(1144.84, rel=1e-5)
+    assert cost.full.threshold == pytest.approx(1144.84, rel=1e-5)
     assert abs(cost.relative_difference) < 0.03
     assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=0.01)
     assert cost.small.whirl_ratio == pytest.approx(cost.full.whirl_ratio, rel=0.06)
     assert cost.small.direction == cost.full.direction == 1
     # The threshold by the state space's eigenvalues.
-    at = cost.small_threshold
+    at = cost.small.threshold
     assert abs(growth(small, at)) < 1e-9
     assert growth(small, 0.999 * at) < 0 < growth(small, 1.001 * at)
     assert np.sign(cost.small_decrement).tolist() == np.where(cost.speeds < at, 1.0, -1.0).tolist()
@@ -252,7 +250,7 @@ def test_undamped_is_not_unstable():
     small = small_rotor(rotor23(), (7, 12, 18), [89.0, 196.0, 198.0])
     cost = compare_stability(small, 1000.0)
     assert cost.full.status == cost.small.status == "stable"
-    assert cost.small_threshold is None
+    assert cost.small.threshold is None
     assert cost.relative_difference is None
     assert cost.answer.judgement == (
         "No damping acts on either model from 0 to 9549.3 rpm (0 to 1000 rad/s): no motion grows, and none "
@@ -295,7 +293,7 @@ def test_other_mode_is_said():
     assert "\nWarning: the full rotor loses stability with whirl at" in cost.summary()
 
 
-def test_full_threshold_is_checked(monkeypatch):
+def test_the_full_threshold_is_checked(monkeypatch):
     """Should the search of the full rotor confuse two modes, its threshold is not passed on unsaid."""
     search = fem.stability_threshold
     small = jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4)

@@ -10,10 +10,8 @@ from scipy.optimize import brentq
 import fem
 from fem import GRAVITY, CubicSpring, JournalBearing, SqueezeFilm, Stop, static_deflection
 from rotorid.motion.equilibrium import equilibrium
-from rotorid.motion.kept_supports import held_rigidly, keep_supports
 from rotorid.motion.rotor_system import rotor_system
-from rotorid.motion.small_model import SmallModel
-from rotorid.reduction import reduce, small_rotor
+from rotorid.reduction import SmallModel, held_rigidly, keep_supports, reduce, small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 from tests.helpers.cases import each_of
@@ -174,7 +172,7 @@ def test_gyroscopic_effect_supports_and_pedestals_are_those_of_the_small_rotor()
         material_damping=1e-5,
         model=fem.Model(shear=True, rotary_inertia=True, gyroscopic=True),
     )
-    model, twin = reduced(rotor, (4, 8)), small_rotor(rotor, (4, 8), (1.0, 1.0))
+    model, twin = reduced(rotor, (4, 8)), small_model(rotor, (4, 8), (1.0, 1.0))
     assert any("slopes that follow" in text for text in model.warnings)
     for speed in (0.0, 300.0):
         mine, theirs = model.motion(speed), twin.motion(speed)
