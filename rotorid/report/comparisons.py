@@ -133,12 +133,11 @@ def response_part(document: Document, response: ResponseCost) -> Part:
         said.append(
             Markup(
                 "The small model is within {} % of the largest influence coefficient at the same speed "
-                "(median {} %), within {} % of the largest of all speeds. Worst at {} rpm: reading at {}, "
+                "(median {} %). Worst at {} rpm: reading at {}, "
                 "unbalance at {}."
             ).format(
                 document.show("response.largest", 3, scale=100.0),
                 document.show("response.median", 3, scale=100.0),
-                document.show("response.largest_to_highest", 3, scale=100.0),
                 document.show("response.where.speed_rad_s", decimals=1, scale=RPM),
                 found["where"]["sensor"],
                 found["where"]["plane"],

@@ -46,8 +46,6 @@ def test_reference_rotor():
     assert cost.speeds[-1] == pytest.approx(1.1 * second, rel=1e-12)
     assert cost.sizes["largest"] < 0.08
     assert cost.sizes["median"] < 0.01
-    assert cost.sizes["largest_to_highest"] < 0.08
-    assert cost.sizes["median_to_highest"] < 0.01
     assert cost.warnings == ()
     # The same in the compliance form of the book, without the small rotor's matrices.
     alpha, m = fem.compliance(rotor23(), NODES), np.diag(small.small.masses[small.small.masses > 0])

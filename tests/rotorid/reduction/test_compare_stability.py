@@ -293,21 +293,6 @@ def test_other_mode_is_said():
     assert "\nWarning: the full rotor loses stability with whirl at" in cost.summary()
 
 
-def test_the_full_threshold_is_checked(monkeypatch):
-    """Should the search of the full rotor confuse two modes, its threshold is not passed on unsaid."""
-    search = fem.stability_threshold
-    small = jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4)
-    assert compare_stability(small, 900.0).warnings == ()
-    for part, words in ((0.9, "all modes still decay"), (1.1, "a mode grows already")):
-
-        def elsewhere(*args, part=part, **options):
-            found = search(*args, **options)
-            return dataclasses.replace(found, threshold=part * found.threshold)
-
-        monkeypatch.setattr(fem, "stability_threshold", elsewhere)
-        assert any(words in text for text in compare_stability(small, 900.0).warnings)
-
-
 @settings(max_examples=60 if FULL else 25, deadline=None)
 @given(rotor=whirling_rotors(elements=(4, 12)), seed=st.integers(0, 2**32 - 1))
 def test_thresholds_of_random_rotors(rotor, seed):
