@@ -24,7 +24,7 @@ from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.reader.value_kinds import TURN, each, number, plain_number
 from rotorid.tables.rotor.bearing import KEYS_OF, NODE, read_support
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, force_tables, read_force
-from rotorid.tables.rotor.rotor_writing import support_table
+from rotorid.tables.rotor.rotor_writing import bearing_table_bytes, support_table
 
 _HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
@@ -180,8 +180,17 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
     Raises
     ------
     ValueError
-        For a support whose coefficients depend on speed: they stand in tables of their own.
+        For a support whose coefficients depend on speed: they stand in a file of their own.
     """
+    path = Path("small.toml")
+    files = small_model_files(path, model, comments)
+    if len(files) > 1:
+        raise ValueError("coefficients of a support depend on speed: they stand in a file of their own")
+    return files[path]
+
+
+def small_model_files(path: Path, model: SmallModel, comments: Sequence[str] = ()) -> dict[Path, bytes]:
+    """All files of a small model, its own last: tables of supports over speed stand beside it."""
     import tomli_w
 
     lines = [*(f"# {comment}" for comment in comments), f"schema_version = {SCHEMA_VERSION}"]
@@ -192,13 +201,12 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
         elif array.any() or name == "stiffness":
             lines += [f"{key} = [", *(f"  {row}," for row in array.tolist()), "]"]
     tables: dict[str, list[dict[str, Any]]] = {}
-    for support in model.supports:
-        if support.speeds:
-            raise ValueError(
-                f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it "
-                f"out, and write [[{support.kind}]] with node and table, its file, into the small model"
-            )
-        tables.setdefault("bearing", []).append(support_table(support, None, mixed=True))
+    files: dict[Path, bytes] = {}
+    for count, support in enumerate(model.supports, start=1):
+        beside = path.with_name(f"{path.stem}_{support.kind}_{count}.csv") if support.speeds else None
+        if beside is not None:
+            files[beside] = bearing_table_bytes(support)
+        tables.setdefault("bearing", []).append(support_table(support, beside, mixed=True))
     tables |= force_tables(model.forces)
     for name, size in (("unbalance", "unbalance_kg_m"), ("bow", "bow_m")):
         tables[name] = [
@@ -207,4 +215,4 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
         ]
     for name, sections in tables.items():
         lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
-    return ("\n".join(lines) + "\n").encode("utf-8")
+    return {**files, path: ("\n".join(lines) + "\n").encode("utf-8")}

@@ -9,10 +9,8 @@ from scipy.optimize import brentq
 
 from fem import CubicSpring, InternalDamping, JournalBearing, Motion, SqueezeFilm, Stop
 from fem.forces import law, tables
-from rotorid.motion.bifurcation_diagram import draw_bifurcations
-from rotorid.motion.continuation import DOUBLING, FOLD, HOPF, TORUS
-from rotorid.motion.periodic import periodic_motion
-from rotorid.motion.periodic_table import Readings
+from rotorid.motion.periodic import DOUBLING, FOLD, HOPF, TORUS, Readings, periodic_motion
+from rotorid.motion.plots import draw_bifurcations
 from rotorid.motion.system import system
 
 SPEEDS = np.array([0.01, 1e4])
@@ -51,14 +49,13 @@ def crossings(found, speed):
 
 def exact(problem, found, speed, near):
     """The motion at a speed that is nearest to an amplitude: Newton's method from the branch's own point."""
-    from rotorid.motion.collocation import Periodic
-    from rotorid.motion.continuation import at_speed
+    from rotorid.motion.periodic import Periodic
 
     points = [p for branch in found.branches for p in branch.points]
     sizes = [abs(np.hypot(*p.orbit.ends.T).max() - near) + abs(p.orbit.speed - speed) for p in points]
     guess = points[int(np.argmin(sizes))].orbit
-    start = at_speed(Periodic(problem, 1), guess)
-    return Periodic(problem, 1).solve(guess, start.rows, np.array([speed]))[0]
+    sought = Periodic(problem, 1)
+    return sought.solve(guess, sought.at_speed(guess)[0], np.array([speed]))[0]
 
 
 def test_three_circular_orbits_in_a_squeeze_film():
@@ -252,10 +249,7 @@ def test_hopf_point_of_a_rigid_rotor_in_a_short_bearing(critical, eccentricity, 
     (point,) = found.branches[0].bifurcations
     assert point.kind == HOPF
     assert point.point.orbit.speed == pytest.approx(NOMINAL, rel=3e-6)
-    (row,) = [
-        c.values for c in Readings(found, ("1",), np.eye(2)[:1]).bifurcations() if c.name == "whirl_ratio"
-    ]
-    assert row[0] == pytest.approx(whirl, abs=1e-5)
+    assert point.frequency / point.point.orbit.speed == pytest.approx(whirl, abs=1e-5)
     assert any("no unbalance" in warning for warning in found.warnings)
 
 
@@ -363,7 +357,7 @@ def test_what_cannot_be_sought_is_refused(low, high, options, words):
 
 
 def test_too_few_steps_are_said(monkeypatch):
-    monkeypatch.setattr("rotorid.motion.continuation._MOST_STEPS", 4)
+    monkeypatch.setattr("rotorid.motion.periodic.MOST_STEPS", 4)
     monkeypatch.setattr("rotorid.motion.periodic.LEAST_STEPS", 4)
     found = periodic_motion(damper(0.05, 0.3), 0.5, 1.5)
     assert any("too few steps" in warning for warning in found.warnings)
@@ -398,9 +392,10 @@ def test_the_whirl_that_begins_is_told_by_its_shape(external):
     damping = [InternalDamping(1, "", damping=internal)]
     problem = disc(mass, damping, damping=external, stiffness=(stiffness,) * 2, unbalance=1e-4)
     found = periodic_motion(problem, 1.05 * natural, 1.1 * natural * (1 + external / internal))
-    (row,) = Readings(found, ("1",), np.eye(2)[:1]).to_dict()["bifurcations"]
-    assert row["bifurcation"] == TORUS
-    assert row["whirl_ratio"] == pytest.approx(internal / (internal + external), rel=1e-4)
+    (lost,) = found.branches[0].bifurcations
+    assert lost.kind == TORUS
+    ratio = lost.frequency / lost.point.orbit.speed
+    assert ratio == pytest.approx(internal / (internal + external), rel=1e-4)
 
 
 def test_time_that_runs_out_leaves_what_is_known(monkeypatch):

@@ -1,4 +1,4 @@
-"""What `motion` and `periodic` move: a rotor or a small model, with its unbalance, its bow and its weight."""
+"""What `bearings`, `motion` and `periodic` take: a rotor or a small model, its unbalance, bow and weight."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class Moving:
         return self.model.node(name)
 
     def system(self, lowest: float, highest: float) -> MotionSystem:
-        """Its equations from one speed to another, rad/s, as `rotorid.motion.rotor_system` has them."""
-        from rotorid.motion.rotor_system import rotor_system
+        """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
+        from rotorid.motion.system import rotor_system
 
         return rotor_system(
             self.model, lowest, highest, unbalance=self.unbalance, bow=self.bow, direction=self.direction

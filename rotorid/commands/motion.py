@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
-from rotorid.commands.outcome import Delivered, command, phase, provenance
+from rotorid.commands.moving import moving
+from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
@@ -26,21 +29,19 @@ from rotorid.commands.quantities import (
     pairs,
     speeds,
 )
-from rotorid.workflows.motion.moving_system import moving
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.motion.reduced_system import ReducedSystem
+    from rotorid.commands.moving import Moving
     from rotorid.motion.run import MotionRun
-    from rotorid.motion.steady_end import SteadyEnd
-    from rotorid.motion.system import MotionSystem
+    from rotorid.motion.steady import SteadyEnd
+    from rotorid.motion.system import MotionSystem, ReducedSystem
     from rotorid.reduction import SmallModel
-    from rotorid.workflows.motion.moving_system import Moving
 
-View = Literal["motion", "orbits", "bode", "polar"]
+View = Literal["motion", "orbits", "bode"]
 """What a picture shows."""
 Start = Literal["rest", "steady"]
 _SMALL = 24
@@ -63,7 +64,7 @@ class MotionOptions:
     time : TIME
         How long, 2s.
     acceleration : A
-        Of a run-up or a run-down, in place of its time: 300rpm/s.
+        Of a run-up or a run-down, in place of its time: 300rpm/s; without a unit rad/s².
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
@@ -76,7 +77,7 @@ class MotionOptions:
         Nodes moved from there, with the direction from x: 7=20um@90,12=5um.
     sensors : NODES
         Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
-    modes : N
+    modes : N from 0
         Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
         together; default: as many as its natural frequencies up to twice the highest speed need to agree
         to 0.03 %; small models keep all.
@@ -84,6 +85,8 @@ class MotionOptions:
         Samples a second; default: 64 a turn at the highest speed.
     tolerance : T
         Error of one step, by how far the rotor has moved from where it began.
+    view
+        What --plot draws: x and y over time with the spectrum, orbits, or a run-up over speed.
     """
 
     speed: str | float | None = None
@@ -99,6 +102,13 @@ class MotionOptions:
     modes: int | None = None
     rate: float | None = None
     tolerance: float = 1e-6
+    view: View = "motion"
+    panels: ClassVar[Mapping[str, str]] = {
+        "Start": "start displaced",
+        "Method": "modes rate tolerance",
+        "Output": "view",
+    }
+    to: ClassVar[tuple[str, ...]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -118,6 +128,8 @@ class Motion(Delivered):
         the error itself is smaller, except where two motions part.
     warnings
         What the reader must know.
+    view
+        What the picture shows.
     """
 
     motion: MotionRun
@@ -125,6 +137,7 @@ class Motion(Delivered):
     end: SteadyEnd | None
     error: float
     warnings: tuple[str, ...]
+    view: View = "motion"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
@@ -140,7 +153,16 @@ class Motion(Delivered):
                 "speed_rad_s": motion.speed,
                 "angle_rad": motion.turned,
                 "positions_m": {node: deflections[:, i] for i, node in enumerate(nodes)},
+                "furthest": {
+                    **dict(
+                        zip(("node", "time_s", "speed_rad_s", "distance_m"), self._furthest(), strict=True)
+                    )
+                },
                 "steady": end and end.steady,
+                "at_rest": end and end.at_rest,
+                "chaotic": end and end.chaotic,
+                "trend": end and (end.trend or None),
+                "change": end and end.change,
                 "periodic": end and end.periodic,
                 "period_s": end and end.period,
                 "whirl_ratio": end and end.whirl_ratio,
@@ -217,12 +239,10 @@ class Motion(Delivered):
         if end is None and first == last:
             return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
         if end is None:
-            size = abs(motion.z)
-            k, i = divmod(int(size.argmax()), len(motion.nodes))
+            node, _, speed, distance = self._furthest()
             return (
                 f"From {rpm_text(first)} to {rpm_text(last)} in {figures(motion.time[-1])} s: furthest from "
-                f"the line of bearings at node {motion.nodes[i]}, {figures(1e6 * size[k, i])} µm at "
-                f"{rpm_text(motion.speed[k])}."
+                f"the line of bearings at node {node}, {figures(1e6 * distance)} µm at {rpm_text(speed)}."
             )
         where = f"At {rpm_text(first)}"
         if end.at_rest:
@@ -232,7 +252,14 @@ class Motion(Delivered):
             way = ", against the rotation" if end.frequency < 0 else ""
             whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
         if not end.steady:
-            more = "give it more --time" if end.trend else "with more --time still so, it beats or is chaotic"
+            more = {
+                "grows": "it grows, to a limit cycle or to a wall: more --time shows which",
+                "decays": "it dies down: give it more --time to settle",
+                "drifts": "its mean drifts: give it more --time to settle",
+                "": "with more --time still so, it beats",
+            }[end.trend]
+            if end.chaotic:
+                more = "it does not come again, and two runs of it part: it is chaotic"
             return (
                 f"{where} it is NOT STEADY after {figures(motion.time[-1])} s: size or mean change by "
                 f"{percent(end.change)} % in its last part; {more}; {whirl}."
@@ -243,6 +270,12 @@ class Motion(Delivered):
             unit = "s" if not turns else "turn" if round(turns, 3) == 1 else "turns"
             again = f"comes again every {turns or end.period:.5g} {unit}"
         return f"{where} the motion is steady to {percent(max(end.change, 1e-4))} % and {again}; {whirl}."
+
+    def _furthest(self) -> tuple[int, float, float, float]:
+        """Node, time, speed and distance where it is furthest from the line of bearings."""
+        motion, size = self.motion, abs(self.motion.z)
+        k, i = divmod(int(size.argmax()), len(motion.nodes))
+        return motion.nodes[i], float(motion.time[k]), float(motion.speed[k]), float(size[k, i])
 
     def _nodes(self) -> tuple[Column, ...]:
         """A row for each node: where it was furthest from the line of bearings, and what the end is."""
@@ -273,22 +306,26 @@ class Motion(Delivered):
         )
         return found if reduced is None else (*found, reduced.note)
 
-    def figure(self, view: View = "motion") -> Figure:
-        """Orbits, time and spectrum, Bode or polar picture of a run-up, loci in the clearance circles."""
-        from rotorid.motion.motion_pictures import FIGURES
+    def figure(self) -> Figure:
+        """What was asked for: time and spectrum, orbits, or the Bode picture of a run-up."""
+        from rotorid.motion.plots import FIGURES
 
-        one_of(view, "view", get_args(View))
-        return FIGURES[view](self.motion)
+        return FIGURES[self.view](self.motion)
 
 
 @command
 def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Motion:
-    """Follow the motion of a rotor or a small model in time.
+    """Motion in time at a constant speed, through a run-up or a run-down.
+
+    Example: rotorid motion sample_data/motion/rotor.toml --speed 4000rpm --time 2s --plot motion.png
+
+    Example: rotorid motion sample_data/motion/rotor.toml --run-up 1000:9000rpm --time 10 --plot bode.png
+    --view bode
 
     Parameters
     ----------
-    model
-        A rotor, a rotor table, a rotor file, or a small model or its file.
+    model : MODEL
+        Rotor file (.toml, .csv, .xlsx) or small model (.toml).
     options
         Speed and time, and what differs from the defaults.
 
@@ -299,16 +336,15 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     """
     import numpy as np
 
-    from rotorid.motion.reduced_system import reduced_system
     from rotorid.motion.run import LOOSEST, run
-    from rotorid.motion.start import begin
-    from rotorid.motion.steady_end import steady_end
+    from rotorid.motion.steady import begin, steady_end
+    from rotorid.motion.system import reduced_system
 
+    one_of(options.view, "--view", get_args(View))
     ends, time = _course(options)
     direction = degrees(options.gravity_direction, "--gravity-direction")
     source = moving(model, options.unbalance, options.bow, direction)
-    low, high = min(ends), max(ends)
-    system = source.system(low, high if high > low else low * (1 + 1e-6) + 1e-9)
+    system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
     reduced, tolerance = None, options.tolerance
@@ -334,9 +370,10 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     return Motion(
         motion=found,
         reduced=reduced,
-        end=steady_end(found),
+        end=steady_end(found, rough),
         error=error,
         warnings=(*unsettled, *_warnings(found, error, bool(shift))),
+        view=options.view,
         provenance=provenance(source.files, options),
     )
 
@@ -372,13 +409,11 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
 
 
 def _acceleration(given: str | float) -> float:
-    """Read "300rpm/s", rad/s²."""
-    if not isinstance(given, str):
-        value = given
-    elif given.strip().endswith("/s"):
-        value = one_speed(given.strip().removesuffix("/s"), "--acceleration")
-    else:
+    """Read "300rpm/s", or a number in rad/s², as --run-up without a unit is in rad/s."""
+    text = re.sub(r"/s(²|\^?2)$", "/s/s", str(given).strip())
+    if math.isnan(number(text)) and not re.search("(rpm|Hz|rad[/_]s)/s$", text):
         raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
+    value = one_speed(text.removesuffix("/s") if math.isnan(number(text)) else text, "--acceleration")
     if not value > 0:
         raise ValueError(
             f"--acceleration {given!r} must be above 0; the speeds tell whether it goes up or down"

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import capital, counted, figures
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Delivered, command, log_rotor, phase, provenance
+from rotorid.commands.moving import moving
+from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Speeds, degrees, rising_speeds
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from fem import Rotor, Stability
     from rotorid.motion.equilibrium import Equilibrium
+    from rotorid.reduction import SmallModel
 
 _ROWS = 14
 """Of the table that is printed with the answer."""
@@ -42,6 +43,8 @@ class BearingsOptions:
 
     speeds: Speeds
     gravity_direction: float = -90.0
+    outputs: ClassVar[tuple[str, ...]] = (".csv", ".xlsx", ".toml")
+    to: ClassVar[tuple[str, ...]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,7 +64,7 @@ class BearingEquilibria(Delivered):
     """
 
     found: Sequence[Equilibrium]
-    linear: Rotor
+    linear: Rotor | SmallModel
     stability: Stability | None
     warnings: tuple[str, ...]
 
@@ -129,12 +132,13 @@ class BearingEquilibria(Delivered):
         )
 
     def figure(self) -> Figure:
-        """Loci and stability map."""
-        from rotorid.motion.bearing_pictures import bearings_figure
+        """Paths of the journals in their clearance circles."""
+        from rotorid.base.plot_style import on_figure
+        from rotorid.motion.plots import draw_journals
 
-        return bearings_figure(self.found, self.labels)
+        return on_figure(lambda ax: draw_journals(self.found, self.labels, ax), height=4.6)
 
-    def files(self, path: Path) -> Mapping[Path, bytes]:
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
         """The linear rotor as a rotor file, .toml, with its tables; or the table, .csv or .xlsx.
 
         Raises
@@ -142,24 +146,35 @@ class BearingEquilibria(Delivered):
         ValueError
             For a rotor file of one speed, which would hold at all.
         """
-        from rotorid.tables.reader.table_writing import table_bytes
+        from fem import Rotor
+        from rotorid.tables.models.small_model_file import small_model_files
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
         if path.suffix.lower() != ".toml":
-            return {path: table_bytes(path, self.to_frame())}
+            return super().table_file(path)
         if len(self.found) < 2:
             raise ValueError(f"{path}: a table over speed needs two speeds at least (--speeds)")
-        return rotor_file_bytes(path, self.linear)
+        if isinstance(self.linear, Rotor):
+            return rotor_file_bytes(path, self.linear)
+        return small_model_files(path, self.linear)
 
 
 @command
-def bearings(rotor: Rotor | Path | str, options: BearingsOptions) -> BearingEquilibria:
-    """Find where the rotor rests in its journal bearings at each speed, and what is linear about it.
+def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -> BearingEquilibria:
+    """Static equilibrium in journal bearings over speed, linear coefficients, stability.
+
+    --output FILE.toml writes the rotor with bearing tables over speed, which critical, campbell, response
+    and reduce read.
+
+    Example: rotorid bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm
+
+    Example: rotorid bearings sample_data/motion/rotor.toml --speeds 600:9000:100rpm --output linear.toml
+    --plot bearings.png
 
     Parameters
     ----------
-    rotor
-        A rotor or a rotor file, with journal bearings, squeeze films or seals.
+    rotor : MODEL
+        Rotor file (.toml) or small model (.toml), with journal bearings, squeeze films or seals.
     options
         The speeds, and what differs from the defaults.
 
@@ -168,30 +183,26 @@ def bearings(rotor: Rotor | Path | str, options: BearingsOptions) -> BearingEqui
     ValueError
         For a rotor or an option that cannot be, and where there is no equilibrium.
     """
-    import numpy as np
-
     from fem import SqueezeFilm
     from rotorid.motion.equilibrium import equilibria, named
     from rotorid.motion.linear_coefficients import linear_rotor, threshold
-    from rotorid.motion.rotor_system import rotor_system
 
     speeds = rising_speeds(options.speeds)
-    direction = degrees(options.gravity_direction, "--gravity-direction")
-    model, files = rotor_source(rotor)
-    if not any(np.isfinite(force.wall) for force in model.forces):
+    what = moving(rotor, direction=degrees(options.gravity_direction, "--gravity-direction"))
+    system = what.system(speeds[0], speeds[-1])
+    if not (system.walls < float("inf")).any():
         raise ValueError("the rotor has no [[journal_bearing]], [[squeeze_film]] or [[annular_seal]]")
-    highest = speeds[-1] if len(speeds) > 1 else speeds[0] * (1 + 1e-6) + 1e-9
-    system = rotor_system(model, speeds[0], highest, direction=direction)
     with phase(f"equilibrium at {counted(len(speeds), 'speed')}"):
-        found = equilibria(system, speeds)
+        resting = equilibria(system, speeds)
     with phase("stability"):
-        stability = threshold(model, system, found) if len(found) > 1 else None
-    log_rotor(model, speeds=len(speeds))
+        stability = threshold(what.model, system, resting) if len(resting) > 1 else None
     small = "stiffness and damping are those at its centre, they hold for small orbits about it"
+    films = [f"{named(f)}: {small}" for f in system.forces if isinstance(f, SqueezeFilm)]
+    touched = dict.fromkeys(named(stop) for at in resting for stop in at.touched)
     return BearingEquilibria(
-        found=found,
-        linear=linear_rotor(model, found),
+        found=resting,
+        linear=linear_rotor(what.model, resting),
         stability=stability,
-        warnings=tuple(f"{named(f)}: {small}" for f in model.forces if isinstance(f, SqueezeFilm)),
-        provenance=provenance(files, options),
+        warnings=(*(f"the shaft rests on {stop}" for stop in touched), *films),
+        provenance=provenance(what.files, options),
     )
