@@ -259,7 +259,7 @@ class Motion(Delivered):
                 "": "with more --time still so, it beats",
             }[end.trend]
             if end.chaotic:
-                more = "it does not come again, and two runs of it part: it is chaotic"
+                more = "it does not come again, and its spectrum is no few lines: it is chaotic"
             return (
                 f"{where} it is NOT STEADY after {figures(motion.time[-1])} s: size or mean change by "
                 f"{percent(end.change)} % in its last part; {more}; {whirl}."
@@ -370,7 +370,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     return Motion(
         motion=found,
         reduced=reduced,
-        end=steady_end(found, rough),
+        end=steady_end(found),
         error=error,
         warnings=(*unsettled, *_warnings(found, error, bool(shift))),
         view=options.view,

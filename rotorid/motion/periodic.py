@@ -768,7 +768,9 @@ def _beside_criticals(system: MotionSystem, grid: FloatArray) -> FloatArray:
     steps, modes = np.nonzero((away[:-1] * away[1:] <= 0) & np.isfinite(away[:-1] - away[1:]))
     share = away[steps, modes] / (away[steps, modes] - away[steps + 1, modes])
     at = rests[0][steps] + share * np.diff(rests[0])[steps]
-    beside = at + np.abs(values[steps, modes].real) * np.linspace(-3, 3, 13)[:, None]
+    damping = np.abs(values[steps, modes].real)
+    damped = damping > 1e-9 * at  # of the others no amplitude is known there
+    beside = at[damped] + damping[damped] * np.linspace(-3, 3, 13)[:, None]
     return np.asarray(beside[(beside > grid[0]) & (beside < grid[-1])])
 
 
@@ -895,6 +897,9 @@ class _Search:
         for branch in self.branches:
             if branch.ended.startswith("stopped"):
                 remarks.append(f"the {branch.kind} branch {branch.ended} at {rpm_text(branch.speeds[-1])}")
+            undamped = any(abs(point.largest - 1) < _UNITY - 1 for point in branch.points)
+            if branch.straight and self.system.forced and undamped:
+                remarks.append("nothing damps a mode: at its critical speed the motion has no bound")
             worst = 0.0 if branch.straight else max(point.orbit.roughness for point in branch.points)
             if worst > _COARSE:
                 remarks.append(

@@ -171,6 +171,15 @@ def test_what_has_no_equilibrium_is_refused_with_node_and_reason(forces, speed, 
         equilibrium(mass_on(forces, 500.0), speed)
 
 
+def test_a_shaft_rests_on_a_stop():
+    """k z + k_s (z − gap) = W, without friction; and it is told which stop."""
+    ring = Stop(1, "ring", 2e-4, 1e8)
+    resting = equilibrium(mass_on([CubicSpring(1, "", 1e6), ring], 500.0), 50.0)
+    np.testing.assert_allclose(resting.q, [0.0, -(500.0 + 1e8 * 2e-4) / 1.01e8], rtol=1e-9, atol=1e-15)
+    assert resting.touched == (ring,)
+    assert equilibrium(mass_on([CubicSpring(1, "", 1e7), ring], 500.0), 50.0).touched == ()
+
+
 def test_one_journal_bearing_alone_holds_no_rotor():
     shaft = fem.Rotor(length=[0.2] * 4, outer_diameter=0.05, forces=[JournalBearing(3, "", **BEARING)])
     with pytest.raises(ValueError, match="give it stiffness or journal bearings at two nodes"):

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fem
-from fem import CubicSpring, JournalBearing, MuszynskaSeal
+from fem import CubicSpring, JournalBearing, MuszynskaSeal, Stop
 from rotorid.motion.run import MotionRun, run
 from rotorid.motion.steady import begin, steady_end, synchronous_part
 from rotorid.motion.system import system
@@ -197,6 +197,29 @@ def test_the_end_is_not_called_steady_while_it_changes():
     assert end.trend == "decays"
     assert not end.periodic
     assert end.change > 0.01
+
+
+@pytest.mark.parametrize(
+    ("speed", "load", "chaotic"), [(1.1, 1.2, True), (0.9, 0.5, True), (1.6, 0.0, False), (2.4, 0.0, False)]
+)
+def test_a_chaotic_rub_is_not_called_steady(speed, load, chaotic):
+    """A disc in a stop with friction; the others beat, which is steady, and do not come again either."""
+    ring = Stop(1, "", gap=1.0, stiffness=20.0, damping=0.1, friction=0.1)
+    made = one_mass(1.0, 0.1, 1.0, forces=[ring], unbalance={1: 0.4}, weight={"y1": -load})
+    q, v, _ = begin(made, speed)
+    end = steady_end(run(made, (speed, speed), 150 * 2 * np.pi / speed, (q, v)))
+    assert np.isnan(end.period)
+    assert end.chaotic is chaotic
+    assert end.steady is not chaotic
+    assert not end.periodic
+
+
+@pytest.mark.parametrize(("damping", "trend"), [(0.01, "decays"), (-0.01, "grows")])
+def test_what_dies_down_and_what_grows_are_told_apart(damping, trend):
+    made = one_mass(1.0, damping, 1.0)
+    end = steady_end(run(made, (2.0, 2.0), 100.0, (np.array([1e-3, 0.0]), np.zeros(2))))
+    assert not end.steady
+    assert end.trend == trend
 
 
 def told(z, turns=100.0, speed=100.0, rate=64):
