@@ -429,7 +429,7 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
     if given is not None:
         return tuple(dict.fromkeys([*(source.node(node) for node in nodes(given, "--sensors")), *walled]))
     stations = list(getattr(source.model, "stations", {}))
-    supports = [support.node for support in source.model.supports]
+    supports = [support.node for support in source.model.supports if support.node in system.nodes]
     chosen = (
         {*map(source.node, stations), *walled, *supports, *_loaded(system)}
         if stations or system.size > _SMALL

@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import Answer, together
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    import fem
     from rotorid.reduction import (
         Methods,
         Placement,
@@ -151,52 +151,64 @@ class ReducedRotor(Parts):
         model = small_model(rotor, nodes, self.result.masses.solution, modal_damping=self.damping)
         return dataclasses.replace(self, small=model)
 
-    def model_bytes(self, name: str = "") -> bytes:
-        """The small model as a file for `fit` and `identify`, or that for motion; `name`: of the rotor.
+    def model_files(self, path: Path, name: str = "") -> dict[Path, bytes]:
+        """The small model as a file, with tables of supports over speed; `name`: of the rotor.
 
         For `fit` dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
+        Without a rotor it is a file of equations.
+
+        Raises
+        ------
+        ValueError
+            For masses that are not positive, and forces where no mass stands.
         """
         from rotorid.tables.models.model_writing import ode_model_bytes
-        from rotorid.tables.models.small_model_file import small_model_bytes
+        from rotorid.tables.models.small_model_file import linear_equations, small_model_files
 
         made = (
             f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
             f"{counted(self.result.modes, 'mode')})"
         )
         if self.keeps_supports and self.small is not None:
-            return small_model_bytes(self.small, [f"{made}, its supports kept, SI"])
+            return small_model_files(path, self.small, [f"{made}, its supports kept, SI"])
         if (self.result.masses.solution <= 0).any():
             raise ValueError(
                 "a model with a mass that is not positive cannot be written: use other nodes or modes"
             )
-        motion = self._motion()
+        small, motion = self.small, self.result.equations_of_motion
+        if small is not None:
+            motion = linear_equations(small, self.speed, self.both_planes)
         masses = [f"{axis}{node}" for axis in "xy" for node in self.result.nodes]
-        masses = [name for name in masses if name in motion.coordinates]
+        masses = [x for x in masses if x in motion.coordinates]
         critical = {
-            x: 2 * math.sqrt(motion.M[i, i] * motion.K[i, i]) for x in masses for i in [motion.index(x)]
+            f"d_{x}": 2 * math.sqrt(motion.M[i, i] * motion.K[i, i])
+            for x in masses
+            for i in [motion.index(x)]
         }
+        estimate = {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()}
         inputs = [f"f_x{node}" for node in self.forces]
-        if lost := [name for name in inputs if name.removeprefix("f_") not in masses]:
+        if lost := [x for x in inputs if x.removeprefix("f_") not in masses]:
             raise ValueError(
                 f"--force: no mass of the model stands at {lost[0].removeprefix('f_x')}; masses stand at "
                 f"{', '.join(map(str, self.result.nodes))}"
             )
-        which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
-        said = [
-            f"{made}, {which} at {motion.speed:.6g} rad/s, SI",
-            "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
+        if small is None:
+            dampers = {x.removeprefix("d_"): value for x, value in estimate.items()}
+            content = ode_model_bytes(motion, dampers, comments=[f"{made}, the plane x, SI"], inputs=inputs)
+            return {path: content}
+        equations: dict[str, Any] = {
+            "speed_rad_s": self.speed,
+            "both_planes": self.both_planes,
+            "inputs": inputs,
+            "estimate": estimate,
+            "bounds": {x: [0.0, math.inf] for x in estimate},
+        }
+        comments = [
+            f"{made}, SI",
+            "For fit, identify and simulate: what is known of the start stands in [equations.initial], where "
+            "v_x7 is the velocity of x7; forces of time in [equations.force]; measured ones: --force NODES.",
         ]
-        if motion.M.any(axis=0).all() and not inputs:
-            said.append("Put forces of time into [force].")
-        elif not inputs:
-            said.append("Measured forces: write the file with --force NODES.")
-        return ode_model_bytes(
-            motion,
-            {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
-            comments=said,
-            inputs=inputs,
-            outputs=None if set(masses) == set(motion.coordinates) else masses,
-        )
+        return small_model_files(path, small, comments, {k: v for k, v in equations.items() if v})
 
     def state_space_bytes(self, ending: str = ".json") -> bytes:
         """A, B, C, D in both planes at the speed, as a file that ends in .json, .npz or .mat."""
@@ -220,19 +232,3 @@ class ReducedRotor(Parts):
         # numpy before 2.1 would store allow_pickle= as an array
         np.savez(stream, **arrays)  # type: ignore[arg-type]
         return stream.getvalue()
-
-    def _motion(self) -> fem.Motion:
-        """One plane where nothing couples them; without massless unknowns where no damping acts on them."""
-        import numpy as np
-
-        if self.small is None:
-            return self.result.equations_of_motion
-        motion = self.small.motion(self.speed)
-        y = np.array(["y" in name for name in motion.coordinates])
-        across = np.ix_(~y, y)
-        coupled = bool(motion.C[across].any() or motion.K[across].any())
-        plane = "both" if self.both_planes or coupled else "x"
-        try:
-            return self.small.motion(self.speed, plane, condensed=True)
-        except ValueError:  # damped supports stay, as states of first order
-            return self.small.motion(self.speed, plane)

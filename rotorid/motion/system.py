@@ -240,7 +240,7 @@ def rotor_system(
     pull[np.abs(pull) < 1e-15 * gravity] = 0.0  # straight down is straight down
     at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
     bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
-    return system(
+    made = system(
         linear,
         np.array([lowest, *sorted(inside), end]),
         forces=rotor.forces,
@@ -255,6 +255,33 @@ def rotor_system(
             for i, force in zip(at, bent, strict=True)
             for axis, turned in (("x", 1), ("y", -1j))
         },
+    )
+    return without_followers(made) if isinstance(rotor, SmallModel) else made
+
+
+def without_followers(system: MotionSystem) -> MotionSystem:
+    """Without the unknowns that have no mass, damping or force of their own: they follow the others at rest.
+
+    They stay where their stiffness depends on speed.
+    """
+    still = ~(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2)))
+    still[system.law_tables[2]] = False
+    rest, others = np.flatnonzero(still), np.flatnonzero(~still)
+    if not rest.size or np.ptp(system.K[:, rest], axis=0).any():
+        return system
+    T = np.zeros((system.size, others.size))
+    T[others, np.arange(others.size)] = 1.0
+    T[rest] = -np.linalg.solve(system.K[0][np.ix_(rest, rest)], system.K[0][np.ix_(rest, others)])
+    return _in_basis(system, T, tuple(system.coordinates[i] for i in others))
+
+
+def _in_basis(system: MotionSystem, T: FloatArray, coordinates: tuple[str, ...]) -> MotionSystem:
+    """The system with the unknowns q = T r, r named anew."""
+    return replace(
+        system,
+        coordinates=coordinates,
+        **{name: T.T @ getattr(system, name) @ T for name in "MCK"},
+        **{name: T.T @ getattr(system, name) for name in ("weight", "unbalance", "bow")},
     )
 
 
@@ -363,14 +390,8 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
     if modes is None:  # in pairs of both planes; more of them are never worse
         pairs = bisect_left(range((others.size + 1) // 2), True, key=lambda n: error(2 * n) <= ENOUGH)
         modes = min(2 * pairs, others.size)
-    T = T[:, : n + modes]
-    few = replace(
-        system,
-        coordinates=(*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes))),
-        **{name: T.T @ getattr(system, name) @ T for name in "MCK"},
-        **{name: T.T @ getattr(system, name) for name in ("weight", "unbalance", "bow")},
-    )
-    return ReducedSystem(few, modes, error(modes))
+    names = (*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes)))
+    return ReducedSystem(_in_basis(system, T[:, : n + modes], names), modes, error(modes))
 
 
 @compiled_part

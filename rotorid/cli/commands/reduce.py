@@ -44,8 +44,8 @@ def reduce(
         typer.Option(
             "--model",
             metavar="FILE.toml",
-            help="Write the small model for `rotorid fit` and `identify`, a damper to be estimated at each "
-            "mass; with --keep-supports for `rotorid motion` and `periodic`.",
+            help="Write the small model for `rotorid motion`, `periodic`, `bearings`, and for `fit`, "
+            "`identify` and `simulate`, a damper to be estimated at each mass.",
         ),
     ] = None,
     state_space: Annotated[
@@ -92,7 +92,11 @@ def reduce(
         work_of,
         draw=lambda reduced: reduced.figure(view),
         more=(
-            (model, (".toml",), lambda reduced: reduced.model_bytes("" if rotor is None else rotor.name)),
+            (
+                model,
+                (".toml",),
+                lambda reduced: reduced.model_files(model or Path(), "" if rotor is None else rotor.name),
+            ),
             (
                 state_space,
                 STATE_SPACES,

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import tomllib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fem import GRAVITY, KINDS
+from fem import GRAVITY, KINDS, Motion
 from fem.forces import FORCES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.reduction import SmallModel
+from rotorid.tables.models.model_writing import ode_model_bytes
 from rotorid.tables.reader import units
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Key, Kind, take
@@ -62,6 +65,14 @@ def _apart(section: Section) -> Section:
     return section
 
 
+def _table(section: Section, key: str) -> dict[str, Any] | None:
+    value = section.take(key)
+    if isinstance(value, dict):
+        return value
+    section.complain(key, "a table, [equations]", value=False)
+    return None
+
+
 _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 1}
 _LIST, _MATRIX = Kind(_list, _ROW), Kind(_matrix, {"type": "array", "items": _ROW, "minItems": 1})
 _WHOLE = {"type": "integer", "minimum": 1}
@@ -98,6 +109,13 @@ SMALL_MODEL = (
     *(Key(kind.name, each(KEYS_OF_FORCE[kind.name], _apart), kind.about, default=()) for kind in FORCES),
     Key("unbalance", each(UNBALANCE, _apart), "unbalance at a node; several are added", default=()),
     Key("bow", each(BOW, _apart), "bow of the shaft, at three nodes or more", default=()),
+    Key(
+        "equations",
+        Kind(_table, {"type": "object"}),
+        "for `fit`, `identify` and `simulate`: `speed_rad_s`, `both_planes`, and keys of an equation file, "
+        "such as `inputs` and `[equations.estimate]`, where `d_x7` is a damper at x7",
+        default={},
+    ),
 )
 _ATTRIBUTES = {item.name: key.name for item, key in zip(fields(SmallModel), ARRAYS, strict=False)}
 
@@ -107,6 +125,57 @@ def is_small_model(path: Path) -> bool:
     if path.suffix.lower() != ".toml":
         return False
     return not {"masses_kg", "shaft_stiffness_N_per_m"}.isdisjoint(read_toml(path, Problems()) or ())
+
+
+def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Motion:
+    """At a speed, rad/s; of one plane where nothing couples both and they are not asked for."""
+    motion = model.motion(speed)
+    y = np.array(["y" in name for name in motion.coordinates])
+    across = np.ix_(~y, y)
+    plane = "both" if both_planes or motion.C[across].any() or motion.K[across].any() else "x"
+    with suppress(ValueError):  # damped supports stay, as states of first order
+        return model.motion(speed, plane, condensed=True)
+    return model.motion(speed, plane)
+
+
+def equation_data(path: Path, problems: Problems) -> dict[str, Any] | None:
+    """What stands in an equation file; of a small model its linear equations and `[equations]`.
+
+    None with a problem.
+    """
+    data = read_toml(path, problems)
+    if data is None or not is_small_model(path):
+        return data
+    model, more = read_small_model(path), {**data.get("equations", {})}
+    if model.forces:
+        problems.add(str(path), None, None, None, "linear forces alone; `rotorid motion` follows the others")
+        return None
+    speed, both = more.pop("speed_rad_s", 0.0), more.pop("both_planes", False)
+    try:
+        motion = linear_equations(model, speed, both)
+        inputs = more.get("inputs", [])
+        dampers = {f"d_{name}": name for name in motion.coordinates}
+        estimate = more.get("estimate", {})
+        made = ode_model_bytes(
+            motion,
+            {name: estimate[key] for key, name in dampers.items() if key in estimate},
+            inputs=[name for name in inputs if name.removeprefix("f_") in motion.coordinates],
+            outputs=[
+                f"{axis}{node}"
+                for axis in "xy"
+                for node in model.massive
+                if f"{axis}{node}" in motion.coordinates
+            ],
+        )
+    except (ValueError, TypeError) as error:
+        problems.add(str(path), None, "equations", None, str(error))
+        return None
+    equations = tomllib.loads(made.decode())
+    del equations["schema_version"]
+    for key, value in more.items():
+        there = equations.get(key)
+        equations[key] = {**there, **value} if isinstance(there, dict) and isinstance(value, dict) else value
+    return equations
 
 
 def read_small_model(path: str | Path) -> SmallModel:
@@ -189,8 +258,13 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
     return files[path]
 
 
-def small_model_files(path: Path, model: SmallModel, comments: Sequence[str] = ()) -> dict[Path, bytes]:
-    """All files of a small model, its own last: tables of supports over speed stand beside it."""
+def small_model_files(
+    path: Path, model: SmallModel, comments: Sequence[str] = (), equations: Mapping[str, Any] | None = None
+) -> dict[Path, bytes]:
+    """All files of a small model, its own last: tables of supports over speed stand beside it.
+
+    `equations` is the table of that name.
+    """
     import tomli_w
 
     lines = [*(f"# {comment}" for comment in comments), f"schema_version = {SCHEMA_VERSION}"]
@@ -215,4 +289,6 @@ def small_model_files(path: Path, model: SmallModel, comments: Sequence[str] = (
         ]
     for name, sections in tables.items():
         lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
+    if equations:
+        lines.append(f"\n{tomli_w.dumps({'equations': equations}).strip()}")
     return {**files, path: ("\n".join(lines) + "\n").encode("utf-8")}

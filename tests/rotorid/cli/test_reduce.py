@@ -216,6 +216,37 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
     assert model.damping.any()
 
 
+@pytest.mark.parametrize("kept", [(), ("--keep-supports",)])
+def test_bearings_over_speed_stand_beside_a_small_model_that_moves(cli, tmp_path, kept):
+    """The compressor's tables go with it, whether or not its masses are found on rigid supports."""
+    path = tmp_path / "small.toml"
+    assert cli("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--model", path, *kept).code == 0
+    assert {each.suffix for each in tmp_path.iterdir()} == {".toml", ".csv"}
+    model = read_small_model(path)
+    assert all(support.speeds for support in model.supports if support.kind == "bearing")
+    found = cli(
+        "motion", path, "--speed", "3000rpm", "--time", "0.2s", "--displaced", "14=5um", "--json"
+    ).json
+    assert found["positions_m"]["14"]
+    assert cli("bearings", path, "--speeds", "3000rpm").code == 2  # no film
+
+
+def test_a_small_model_is_fitted_and_simulated(cli, tmp_path):
+    """The same file as `motion` reads: a damper at each mass is estimated."""
+    path = tmp_path / "small.toml"
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--model", path).code == 0
+    model = read_ode_model(path)
+    assert [*model.parameters] == ["d_x7", "d_x12", "d_x18"]
+    assert cli("motion", path, "--speed", "3000rpm", "--time", "0.1s", "--displaced", "12=5um").code == 0
+    given = ("--with", "d_x7=0,d_x12=1500,d_x18=0", "--times", "0:0.1:0.01", "--json")
+    assert cli("simulate", path, *given).code == 0
+    start = "[equations.initial]\nx12 = 1e-4\n"
+    path.write_text(path.read_text(encoding="utf-8") + start, encoding="utf-8")
+    moved = cli("simulate", path, *given, "--output", tmp_path / "s.csv")
+    assert moved.code == 0, moved.err
+    assert "0.0001" in (tmp_path / "s.csv").read_text()
+
+
 @each_of(
     ("arguments", "message"),
     [
@@ -231,10 +262,6 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
         ),
         ((ROTOR, "--nodes", "7", "--keep-supports", "--state-space", "m.npz"), "leave out --keep-supports"),
         (("--compliance", ROTOR, "--measured", ROTOR, "--keep-supports"), "--keep-supports needs a rotor"),
-        (
-            (COMPRESSOR, "--nodes", "8,13", "--keep-supports", "--model", "m.toml"),
-            "the bearing at node 4 depend on speed: leave it out, and write [[bearing]] with node and table",
-        ),
     ],
 )
 def test_kept_supports_are_refused(cli, tmp_path, monkeypatch, arguments, message):
