@@ -41,8 +41,6 @@ class PeriodicOptions:
     sensors : LIST
         Nodes or stations with angles from x in degrees, 2:45,22:45; default: where forces that are not linear
         act, in x.
-    subsynchronous : K from 2
-        Also motions that repeat after K revolutions.
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     unbalance : FILE
@@ -60,7 +58,6 @@ class PeriodicOptions:
 
     speeds: Band
     sensors: str | Sequence[Sensor] | None = None
-    subsynchronous: int | None = None
     limit_cycle: bool = False
     unbalance: Path | str | Mapping[int, complex] | None = None
     bow: Path | str | Mapping[int, complex] | None = None
@@ -68,7 +65,7 @@ class PeriodicOptions:
     gravity_direction: float = -90.0
     max_seconds: float | None = None
     panels: ClassVar[Mapping[str, str]] = {
-        "Motion": "subsynchronous limit_cycle",
+        "Motion": "limit_cycle",
         "Method": "modes max_seconds",
     }
     to: ClassVar[tuple[str, ...]] = USUAL
@@ -249,8 +246,6 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     from rotorid.motion.system import reduced_system
 
     low, high = _range(options.speeds)
-    if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 8:
-        raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 8")
     if options.max_seconds is not None and not options.max_seconds > 0:
         raise ValueError("--max-seconds takes a number above 0")
     direction = degrees(options.gravity_direction, "--gravity-direction")
@@ -270,7 +265,6 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
             system,
             low,
             high,
-            subsynchronous=options.subsynchronous,
             limit_cycle=options.limit_cycle,
             max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
         )

@@ -135,6 +135,42 @@ def at_rest(system: MotionSystem, speed: float) -> FloatArray:
     return np.array(equilibrium(system, speed).q)
 
 
+def eigenvalues_at_rest(
+    system: MotionSystem, q: FloatArray, speed: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Eigenvalues, rad/s, (2n,), infinite without mass, and shapes, (n, 2n), of motion about rest in q."""
+    from scipy.linalg import eig
+
+    C, K = system.about(q, speed)
+    zero, eye = np.zeros_like(C), np.eye(q.size)
+    if np.linalg.cond(system.M) < 1e12:
+        lower = -np.linalg.solve(system.M, np.hstack([K, C]))
+        values, vectors = np.linalg.eig(np.vstack([np.hstack([zero, eye]), lower]))
+    else:
+        right = np.block([[eye, zero], [zero, system.M]])
+        values, vectors = eig(np.block([[zero, eye], [-K, -C]]), right)
+    return values.astype(complex), vectors[: q.size].astype(complex)
+
+
+def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
+    """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,).
+
+    Its size is what is free: one of the shafts comes to its wall, or deflects twice as much as at rest.
+    """
+    values, shapes = eigenvalues_at_rest(system, q, speed)
+    finite = np.isfinite(values)
+    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
+    k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
+    shape = shapes[:, k] * np.exp(-0.5j * np.angle(np.sum(shapes[:, k] ** 2)))
+    places = np.array([system.index(node) for node in system.nodes])
+    moved, at = np.linalg.norm(shape[places], axis=1), np.linalg.norm(q[places], axis=1)
+    free = np.full(len(places), max(float(at.max()), 1e-6))
+    for force in system.forces:
+        if np.isfinite(force.wall):
+            free[system.nodes.index(force.node)] = force.wall - at[system.nodes.index(force.node)]
+    return float(values[k].imag), np.asarray(shape * min(free / np.maximum(moved, 1e-300)))
+
+
 def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
     """Each force at rest and its derivatives as `fem.forces.laws.law` writes them, shape (f, 2, 6)."""
     out = np.zeros((len(system.forces), 2, 6))

@@ -27,14 +27,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 
 from fem import InternalDamping
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.compiled import compiled
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import ROUNDING, listing, percent
-from rotorid.motion.equilibrium import at_rest, equilibrium
+from rotorid.motion.equilibrium import at_rest, eigenvalues_at_rest, equilibrium, whirl_at_rest
 from rotorid.motion.run import run
 from rotorid.motion.steady import steady_end, steady_linear
 from rotorid.motion.system import MotionSystem, add_forces
@@ -137,16 +136,6 @@ class Orbit:
     def extent(self) -> FloatArray:
         """Largest and smallest deflections, shape (2n,)."""
         return np.concatenate([self.deflections.max(axis=(0, 1)), self.deflections.min(axis=(0, 1))])
-
-    def repeats(self, turns: int) -> bool:
-        """Whether a motion of so many revolutions is one of fewer."""
-        ends, N = self.ends[:-1], len(self.velocities)
-        away = [
-            np.abs((ends - np.roll(ends, N // turns * k, axis=0)) / self.scale[: self.start.size]).max()
-            for k in range(1, turns)
-            if turns % k == 0
-        ]
-        return min(away, default=1.0) < _SAME
 
     def resampled(self, count: int) -> Orbit:
         """The same in so many steps."""
@@ -281,11 +270,11 @@ class Periodic:
 
     def solve(self, guess: Orbit, rows: FloatArray, values: FloatArray) -> tuple[Linearised, int]:
         """The same with steps in time that are short enough, and longer again where they may be."""
-        steps, turns = len(guess.velocities), max(self.turns, 1)
-        if guess.roughness < _ROUGH / 100 and steps >= 2 * LEAST_STEPS * turns:
+        steps = len(guess.velocities)
+        if guess.roughness < _ROUGH / 100 and steps >= 2 * LEAST_STEPS:
             guess = guess.resampled(steps // 2)
         at, iterations = self.newton(guess, rows, values)
-        while at.orbit.roughness > _ROUGH and 2 * len(at.orbit.velocities) <= MOST_STEPS * turns:
+        while at.orbit.roughness > _ROUGH and 2 * len(at.orbit.velocities) <= MOST_STEPS:
             at, _ = self.newton(at.orbit.resampled(2 * len(at.orbit.velocities)), rows, values)
         return at, iterations
 
@@ -419,9 +408,9 @@ class Branch:
     Attributes
     ----------
     kind
-        "synchronous", "period 2" and so on, "limit cycle", or "rest".
+        "synchronous", "limit cycle", or "rest".
     turns
-        Revolutions in a period, 0 for a period of its own.
+        Revolutions in a period, 1, or 0 for a period of its own.
     points, bifurcations
         Along the branch.
     ended
@@ -570,11 +559,9 @@ class _Walk:
         return new, onwards, iterations, length
 
     def joins(self, orbit: Orbit, first: FloatArray) -> bool:
-        """Whether a motion is that of fewer revolutions, or rest; `first` is the size of the first motion."""
-        if self.problem.turns:
-            return orbit.repeats(self.problem.turns)
+        """Whether a limit cycle has come to rest; `first` is the size of the first one."""
         moved = np.ptp(orbit.ends, axis=0)
-        return bool((moved < 0.1 * first[: moved.size]).all())
+        return not self.problem.turns and bool((moved < 0.1 * first[: moved.size]).all())
 
     def point(self, at: Linearised) -> Point:
         """What is kept of a solution."""
@@ -675,40 +662,6 @@ def _forces_along(  # noqa: PLR0913  what is compiled takes no objects
         add_forces(codes, values, places, Q[i], V[i], speed, F[i], F_q[i], F_v[i], F_speed[i])
 
 
-def eigenvalues_at_rest(
-    system: MotionSystem, q: FloatArray, speed: float
-) -> tuple[ComplexArray, ComplexArray]:
-    """Eigenvalues, rad/s, (2n,), infinite without mass, and shapes, (n, 2n), of motion about rest in q."""
-    C, K = system.about(q, speed)
-    zero, eye = np.zeros_like(C), np.eye(q.size)
-    if np.linalg.cond(system.M) < 1e12:
-        lower = -np.linalg.solve(system.M, np.hstack([K, C]))
-        values, vectors = np.linalg.eig(np.vstack([np.hstack([zero, eye]), lower]))
-    else:
-        right = np.block([[eye, zero], [zero, system.M]])
-        values, vectors = scipy.linalg.eig(np.block([[zero, eye], [-K, -C]]), right)
-    return values.astype(complex), vectors[: q.size].astype(complex)
-
-
-def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
-    """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,).
-
-    Its size is what is free: one of the shafts comes to its wall, or deflects twice as much as at rest.
-    """
-    values, shapes = eigenvalues_at_rest(system, q, speed)
-    finite = np.isfinite(values)
-    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
-    k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
-    shape = shapes[:, k] * np.exp(-0.5j * np.angle(np.sum(shapes[:, k] ** 2)))
-    places = np.array([system.index(node) for node in system.nodes])
-    moved, at = np.linalg.norm(shape[places], axis=1), np.linalg.norm(q[places], axis=1)
-    free = np.full(len(places), max(float(at.max()), 1e-6))
-    for force in system.forces:
-        if np.isfinite(force.wall):
-            free[system.nodes.index(force.node)] = force.wall - at[system.nodes.index(force.node)]
-    return float(values[k].imag), np.asarray(shape * min(free / np.maximum(moved, 1e-300)))
-
-
 def _turning(speed: float, period: float, rest: FloatArray, response: ComplexArray) -> Orbit:
     """The motion rest + Re(response e^{2πit/T})."""
     turned = np.exp(2j * np.pi * (np.arange(LEAST_STEPS)[:, None] + POINTS) / LEAST_STEPS)[..., None]
@@ -719,59 +672,49 @@ def _turning(speed: float, period: float, rest: FloatArray, response: ComplexArr
 def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
     """The branch of a rotor at rest, or of one whose forces are linear; None where nothing holds it."""
 
-    def point(rest: FloatArray, response: ComplexArray, speed: float) -> Point:
-        period = 2 * np.pi / speed
-        values = eigenvalues_at_rest(system, rest, speed)[0]
-        values = np.where(np.isfinite(values), values, -np.inf)
-        multipliers = np.exp(period * values.real) * np.exp(1j * period * values.imag)
-        multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
-        return Point(_turning(speed, period, rest, response), multipliers)
+    def points(speeds: FloatArray) -> list[tuple[Point, ComplexArray]]:
+        """Motions, and their eigenvalues, those that grow most first."""
+        every = []
+        for speed, rest, response in zip(*steady_linear(system, speeds), strict=True):
+            values = eigenvalues_at_rest(system, rest, speed)[0]
+            values = values[np.isfinite(values)]
+            values = values[np.argsort(-values.real, kind="stable")]
+            period = 2 * np.pi / speed
+            every.append((Point(_turning(speed, period, rest, response), np.exp(period * values)), values))
+        return every
 
-    def points(speeds: FloatArray) -> list[Point]:
-        known = zip(*steady_linear(system, speeds), strict=True)
-        return [point(rest, response, float(speed)) for speed, rest, response in known]
-
-    grid = np.unique([low, high, *system.knots[(system.knots > low) & (system.knots < high)]])
-    grid = np.union1d(grid, np.linspace(low, high, _GRID))
-    if system.forced:
-        grid = np.union1d(grid, _beside_criticals(system, grid))
-    every = points(grid)
+    knots = system.knots[(system.knots > low) & (system.knots < high)]
+    every = points(np.union1d(np.linspace(low, high, _GRID), knots))
+    if system.forced and len(every) > 1:  # at and beside speeds that are a frequency of free motion
+        at = np.array([one.orbit.speed for one, _ in every])
+        values = np.array([each[np.argsort(each.imag)] for _, each in every])
+        away = values.imag - at[:, None]
+        steps, modes = np.nonzero(away[:-1] * away[1:] <= 0)
+        share = away[steps, modes] / (away[steps, modes] - away[steps + 1, modes])
+        critical, damping = at[steps] + share * np.diff(at)[steps], np.abs(values[steps, modes].real)
+        damped = damping > 1e-9 * critical  # of the others no amplitude is known there
+        beside = (critical + damping * np.linspace(-3, 3, 13)[:, None])[:, damped]
+        every += points(np.unique(beside[(beside > low) & (beside < high)]))
+        every.sort(key=lambda one: one[0].orbit.speed)
     if not every:
         return None
     passed = []
-    for after, (a, b) in enumerate(itertools.pairwise(every), start=1):
+    for after, ((a, _), (b, _)) in enumerate(itertools.pairwise(every), start=1):
         k, many = sorted((a.outside, b.outside))
         while k < many:
 
             def test(speed: float, k: int = k) -> float:
-                return float(np.log(np.abs(points(np.array([speed]))[0].multipliers[k]) / _UNITY))
+                return float(np.log(np.abs(points(np.array([speed]))[0][0].multipliers[k]) / _UNITY))
 
-            (there,) = points(np.array([_root(test, a.orbit.speed, b.orbit.speed)]))
-            rest, speed = there.orbit.deflections.mean(axis=(0, 1)), there.orbit.speed
-            values = eigenvalues_at_rest(system, rest, speed)[0]
-            value = values[np.argsort(-np.where(np.isfinite(values), values.real, -np.inf))[k]]
-            whirls = abs(value.imag) > 1e-6 * speed
+            ((there, values),) = points(np.array([_root(test, a.orbit.speed, b.orbit.speed)]))
+            whirls = abs(values[k].imag) > 1e-6 * there.orbit.speed
             kind = BRANCH if not whirls else TORUS if system.forced else HOPF
-            passed.append(Bifurcation(kind, there, after, abs(value.imag) if whirls else np.nan))
+            passed.append(Bifurcation(kind, there, after, abs(values[k].imag) if whirls else np.nan))
             k += 2 if whirls else 1
-    ended = "end of the range of speeds" if every[-1].orbit.speed == grid[-1] else "stopped: it rests no more"
+    last = every[-1][0].orbit.speed
+    ended = "end of the range of speeds" if last == high else "stopped: it rests no more"
     kind = "synchronous" if system.forced else "rest"
-    return Branch(kind, 1, tuple(every), tuple(passed), ended, straight=True)
-
-
-def _beside_criticals(system: MotionSystem, grid: FloatArray) -> FloatArray:
-    """Speeds at and beside those at which a frequency of free motion is the speed."""
-    rests = steady_linear(system, grid)[:2]
-    whirl = [eigenvalues_at_rest(system, rest, speed)[0] for speed, rest in zip(*rests, strict=True)]
-    values = np.array([each[np.argsort(np.nan_to_num(each.imag))] for each in whirl])
-    away = values.imag - rests[0][:, None]
-    steps, modes = np.nonzero((away[:-1] * away[1:] <= 0) & np.isfinite(away[:-1] - away[1:]))
-    share = away[steps, modes] / (away[steps, modes] - away[steps + 1, modes])
-    at = rests[0][steps] + share * np.diff(rests[0])[steps]
-    damping = np.abs(values[steps, modes].real)
-    damped = damping > 1e-9 * at  # of the others no amplitude is known there
-    beside = at[damped] + damping[damped] * np.linspace(-3, 3, 13)[:, None]
-    return np.asarray(beside[(beside > grid[0]) & (beside < grid[-1])])
+    return Branch(kind, 1, tuple(one for one, _ in every), tuple(passed), ended, straight=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -805,7 +748,6 @@ def periodic_motion(
     low: float,
     high: float,
     *,
-    subsynchronous: int | None = None,
     limit_cycle: bool = False,
     max_seconds: float = np.inf,
 ) -> PeriodicMotion:
@@ -817,8 +759,6 @@ def periodic_motion(
         What moves; without unbalance and bow its synchronous motion is rest.
     low, high
         rad/s; the same for one speed.
-    subsynchronous
-        Also motions of so many revolutions that motion in time comes to at a speed of the range.
     limit_cycle
         Self-excited motions from the Hopf points of the rotor at rest.
     max_seconds
@@ -835,14 +775,15 @@ def periodic_motion(
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
-    search = _Search(system, low, high, 0 if limit_cycle else subsynchronous, time.monotonic() + max_seconds)
+    search = _Search(system, low, high, limit_cycle, time.monotonic() + max_seconds)
     linear = all(isinstance(force, InternalDamping) for force in system.forces)
     if linear or not system.forced:
         search.branches.extend(filter(None, [straight(system, low, high)]))
     else:
         search.synchronous()
     if not linear:
-        search.cycles()
+        if limit_cycle:
+            search.cycles()
         search.complete()
     if search.late and not search.branches:
         raise ValueError(f"no periodic motion was found in {max_seconds:.6g} s: raise --max-seconds")
@@ -864,7 +805,7 @@ class _Search:
     system: MotionSystem
     low: float
     high: float
-    turns: int | None
+    limit_cycle: bool
     until: float
     branches: list[Branch] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -891,9 +832,8 @@ class _Search:
     def doubts(self) -> list[str]:
         """What was asked for and not found, and what may be wrong with the branches."""
         remarks = []
-        if self.turns is not None and not any(b.turns == self.turns for b in self.branches):
-            none = "no limit cycle found: no Hopf point, and motion in time comes to none"
-            remarks.append(f"no motion of {self.turns} revolutions was found" if self.turns else none)
+        if self.limit_cycle and all(branch.turns for branch in self.branches):
+            remarks.append("no limit cycle found: no Hopf point, and motion in time comes to none")
         for branch in self.branches:
             if branch.ended.startswith("stopped"):
                 remarks.append(f"the {branch.kind} branch {branch.ended} at {rpm_text(branch.speeds[-1])}")
@@ -910,7 +850,7 @@ class _Search:
 
     def follow(self, turns: int, guess: Orbit, rows: FloatArray, values: FloatArray) -> bool:
         """Whether a branch begins there; it is kept."""
-        kind = {0: "limit cycle", 1: "synchronous"}.get(turns, f"period {turns}")
+        kind = "synchronous" if turns else "limit cycle"
         try:
             walk = _Walk(Periodic(self.system, turns, self.until), self.low, self.high, kind)
             self.branches.append(walk.follow(guess, rows, values))
@@ -942,8 +882,6 @@ class _Search:
 
     def cycles(self) -> None:
         """Limit cycles that begin at the Hopf points of rest."""
-        if self.turns != 0:
-            return
         problem = Periodic(self.system, 0, self.until)
         for hopf in [b for branch in self.branches for b in branch.bifurcations if b.kind == HOPF]:
             orbit, n = hopf.point.orbit, self.system.size
@@ -985,9 +923,9 @@ class _Search:
         turns = round(end.period * speed / (2 * np.pi)) if self.system.forced else 0
         if self.known(turns, end):
             return ""
-        if turns not in (1, self.turns):
-            if turns:
-                return f"comes again after {turns} revolutions only (--subsynchronous {turns})"
+        if turns > 1:
+            return f"comes again after {turns} revolutions only"
+        if not turns and not self.limit_cycle:
             return "comes to a whirl with a period of its own (--limit-cycle)"
         problem = Periodic(self.system, turns, self.until)
         begun = len(self.branches)
@@ -1088,8 +1026,6 @@ def repeating(
         at, _ = problem.newton(guess, *problem.at_speed(guess))
     except np.linalg.LinAlgError:
         return None
-    if turns > 1 and at.orbit.repeats(turns):
-        return repeating(system, speed, 2 * np.pi / speed, first, velocities[-1])
     away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
     return at if away.max() < 0.3 else None
 

@@ -264,7 +264,7 @@ def without_followers(system: MotionSystem) -> MotionSystem:
 
     They stay where their stiffness depends on speed.
     """
-    still = ~(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2)))
+    still = np.asarray(~(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2))))
     still[system.law_tables[2]] = False
     rest, others = np.flatnonzero(still), np.flatnonzero(~still)
     if not rest.size or np.ptp(system.K[:, rest], axis=0).any():

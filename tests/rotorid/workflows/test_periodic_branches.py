@@ -64,7 +64,6 @@ def test_the_answer_and_the_picture(cli, tmp_path):
     [
         (("--speeds", "0:3000rpm"), "speeds above 0"),
         (("--speeds", "3000:2000rpm"), "is not a range"),
-        ((*RANGE, "--subsynchronous", "99"), "from 2 to 8"),
         ((*RANGE, "--sensors", "99"), "node 99 does not exist"),
     ],
 )
