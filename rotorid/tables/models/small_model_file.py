@@ -173,8 +173,8 @@ def equation_data(path: Path, problems: Problems) -> dict[str, Any] | None:
     equations = tomllib.loads(made.decode())
     del equations["schema_version"]
     for key, value in more.items():
-        there = equations.get(key)
-        equations[key] = {**there, **value} if isinstance(there, dict) and isinstance(value, dict) else value
+        added = isinstance(value, dict) and key != "outputs"
+        equations[key] = {**equations.get(key, {}), **value} if added else value
     return equations
 
 

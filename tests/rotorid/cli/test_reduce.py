@@ -247,6 +247,42 @@ def test_a_small_model_is_fitted_and_simulated(cli, tmp_path):
     assert "0.0001" in (tmp_path / "s.csv").read_text()
 
 
+def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equations_gives(cli, tmp_path):
+    """The sample's matrices are those of this reduction; there the mass in the middle is estimated, too."""
+    path, sample = tmp_path / "small.toml", sample_data() / "fit" / "run_down"
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--model", path).code == 0
+    text = path.read_text(encoding="utf-8").replace(
+        "[equations.estimate]", "[equations.estimate]\nblow = 0.04"
+    )
+    more = """
+    [equations.initial]
+    v_x12 = "blow"
+    [equations.outputs]
+    drive_end = "1e6*x7"
+    middle = "1e6*x12"
+    free_end = "1e6*x18"
+    """
+    path.write_text(text + more, encoding="utf-8")
+    found = cli("fit", path, sample / "record.csv", "--json")
+    assert found.code == 0, found.err
+    equations = (sample / "model.toml").read_text(encoding="utf-8")
+    mass = reduce_rotor(read_rotor(ROTOR), (7, 12, 18), 2).masses.solution[1]
+    equations = equations.replace("m_x12 = 180.0\n", "").replace("m_x12 = [1, inf]\n", "")
+    other = tmp_path / "equations.toml"
+    other.write_text(equations.replace('"m_x12"', repr(float(mass))), encoding="utf-8")
+    expected = cli("fit", other, sample / "record.csv", "--json").json["parameters"]
+    assert {*found.json["parameters"]} == {*expected}
+    for name, one in expected.items():
+        assert found.json["parameters"][name]["value"] == pytest.approx(one["value"], rel=1e-4), name
+
+
+def test_what_is_not_linear_is_not_fitted(cli):
+    small, record = MOTION / "small.toml", sample_data() / "fit" / "run_down" / "record.csv"
+    refused = cli("fit", small, record)
+    assert refused.code == 2
+    assert "`rotorid motion` follows the others" in refused.err
+
+
 @each_of(
     ("arguments", "message"),
     [
