@@ -867,12 +867,10 @@ class _Search:
         problem = Periodic(self.system, 1, self.until)
         for speed, sign in dict.fromkeys(((self.low, 1.0), (self.high, -1.0))):
             _, rests, responses = steady_linear(self.system, [speed])
-            rest, response = (
-                (*rests, np.zeros(self.system.size))[0],
-                (*responses, np.zeros(rests.shape[1]))[0],
-            )
+            still = np.zeros((1, self.system.size))
+            rest, response = (np.vstack((part, still))[0] for part in (rests, responses))
             try:
-                guess = _turning(speed, 2 * np.pi / speed, rest, np.asarray(response, complex))
+                guess = _turning(speed, 2 * np.pi / speed, rest, response)
                 orbit = problem.solve(guess, *problem.at_speed(guess))[0].orbit
             except np.linalg.LinAlgError as met:
                 self.warnings.append(f"at {rpm_text(speed)} no periodic motion is found from rest: {met}")

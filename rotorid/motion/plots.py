@@ -221,20 +221,14 @@ def draw_bifurcations(readings: Readings, ax: Axes | None = None) -> Axes:
     branches = readings.motion.branches
     colors = dict(zip(dict.fromkeys(b.kind for b in branches), COLORS, strict=False))
     for branch, along, at in zip(branches, readings.along, readings.at, strict=True):
-        after = [b.after for b in branch.bifurcations]  # they stand between two points, and end a line
-        speeds = np.insert(branch.speeds, after, [b.point.orbit.speed for b in branch.bifurcations]) * RPM
-        sizes = 1e6 * np.insert(along[:, 0], after, at[:, 0])
-        edges = np.insert(np.zeros(len(branch.points), bool), after, True)
-        stable = np.insert(branch.stable, after, False)
-        for steady, style in ((True, "-"), (False, "--")):
-            there = ~edges & (stable == steady)
-            near = np.append(there[1:], False) | np.append(False, there[:-1])
-            label = f"{branch.kind}, {'stable' if steady else 'unstable'}"
-            if there.any():
-                shown = np.where(there | (edges & near), sizes, np.nan)
-                marker = "" if len(sizes) > 1 else "o"
-                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "marker": marker}
-                ax.plot(speeds, shown, style, clip_on=False, label=_once(ax, label), **drawn)
+        speeds, sizes, unstable = branch.speeds * RPM, 1e6 * along[:, 0], ~branch.stable
+        near = np.append(unstable[1:], False) | np.append(False, unstable[:-1])  # up to the next stable ones
+        for part, word, style in ((~unstable, "stable", "-"), (unstable | near, "unstable", "--")):
+            if part.any():
+                label = _once(ax, f"{branch.kind}, {word}")
+                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "label": label}
+                drawn["marker"] = "" if len(sizes) > 1 else "o"
+                ax.plot(speeds, np.where(part, sizes, np.nan), style, clip_on=False, **drawn)
         for bifurcation, size in zip(branch.bifurcations, at[:, 0], strict=True):
             marker = MARKERS[KINDS.index(bifurcation.kind)]
             drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": _once(ax, bifurcation.kind)}
