@@ -369,13 +369,14 @@ def test_motions_that_no_branch_shows_are_said():
     assert "(--limit-cycle), at 23.8732 and 28.6479 rpm" in told  # 2.5 and 3 rad/s; below 2 it rests
 
 
+@pytest.mark.parametrize("cubic", [[], [CubicSpring(1, "", 0.0, 1.0)]])
 @pytest.mark.parametrize("external", [20.0, 8.0])
-def test_the_whirl_that_begins_is_told_by_its_shape(external):
+def test_the_whirl_that_begins_is_told_by_its_shape(external, cubic):
     """c_i ω / (c_i + c_e): the natural frequency by the speed, which the multiplier does not tell."""
     internal, stiffness, mass = 40.0, 1e5, 5.0
     natural = np.sqrt(stiffness / mass)
     damping = [InternalDamping(1, "", damping=internal)]
-    problem = disc(mass, damping, damping=external, stiffness=(stiffness,) * 2, unbalance=1e-4)
+    problem = disc(mass, [*damping, *cubic], damping=external, stiffness=(stiffness,) * 2, unbalance=1e-4)
     found = periodic_motion(problem, 1.05 * natural, 1.1 * natural * (1 + external / internal))
     (lost,) = found.branches[0].bifurcations
     assert lost.kind == TORUS
