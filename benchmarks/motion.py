@@ -19,9 +19,8 @@ import numpy as np
 import fem
 from benchmarks.rotors import ROSS, Bearing, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, once
-from rotorid.motion.reduced_system import reduced_system
-from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.run import run as move
+from rotorid.motion.system import reduced_system, rotor_system
 
 BEARING = Bearing(damping=2e4, vertical=0.6)
 PLANE, SENSORS, MODES = 12, (8, 18), 12

@@ -22,12 +22,12 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from rotorid.reduction.guyan_irs_serep import reduce_by
 from scipy.linalg import eigh
 
 import fem
 from benchmarks.rotors import ROSS, SIZES, Bearing, ross, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, relative_difference
-from rotorid.reduction.guyan_irs_serep import reduce_by
 from rotorid.reduction.placement import rank_nodes
 
 MASSES, MODES = 3, 2

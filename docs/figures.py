@@ -217,26 +217,6 @@ GALLERY = (
         " all three, with masses that are no longer diagonal.",
     ),
     Picture(
-        "masses-trade-off",
-        "reduction",
-        f"{THREE} --trade-off",
-        "The third frequency comes nearer than 8 % only where the first two or the shapes get worse.",
-    ),
-    Picture(
-        "errors",
-        "reduction",
-        f"{THREE} --errors compliance=1,shapes=1",
-        "Errors of 1 % of the compliances and shapes leave the masses uncertain by 4 to 7 %, and the "
-        "third frequency by 14 %.",
-    ),
-    Picture(
-        "what-if",
-        "reduction",
-        f"{THREE} --what-if alpha12=1.3",
-        "If the compliance between the first and the second mass were 1.3 times as large, the third "
-        "frequency would be 13 % higher and no mass would change by more than 2 %.",
-    ),
-    Picture(
         "reduced-response",
         "reduction",
         f"{THREE} --response auto",

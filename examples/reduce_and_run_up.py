@@ -10,15 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.motion.equilibrium import equilibrium
+from rotorid.motion.equilibrium import at_rest, equilibrium
 from rotorid.motion.periodic import periodic_motion
-from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.run import run
-from rotorid.motion.start import at_rest
-from rotorid.motion.steady_end import steady_end
+from rotorid.motion.steady import steady_end
+from rotorid.motion.system import rotor_system
 from rotorid.tables import read_rotor
-from rotorid.workflows import ReduceOptions, reduce
-from rotorid.workflows.motion.bearings import BearingsOptions, bearings
+from rotorid.workflows import BearingsOptions, ReduceOptions, bearings, reduce
 
 ROTOR = Path(__file__).parents[1] / "sample_data" / "motion" / "rotor.toml"
 RPM = np.pi / 30
@@ -29,7 +27,7 @@ def main() -> dict[str, float]:
     """Print the way from the shaft to the motion; return its key numbers."""
     # Masses by formula (50) on rigid supports; the journal bearings stay.
     found = reduce(ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True))
-    small = found.motion_model
+    small = found.small
     assert small is not None
     print(small.summary(), end="\n\n")
 
@@ -45,9 +43,7 @@ def main() -> dict[str, float]:
     print("stable up to {:.1f} rpm; the rotor up to {:.1f} rpm".format(*thresholds), end="\n\n")
 
     # Half a percent of external damping moves the threshold far up. There a limit cycle begins.
-    damped = reduce(
-        ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)
-    ).motion_model
+    damped = reduce(ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)).small
     assert damped is not None
     system, speed = rotor_system(damped, 500 * RPM, 13000 * RPM), 9000 * RPM
     rest, cycle, *_ = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches

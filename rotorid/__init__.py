@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rotorid.reduction import rank_nodes as rank_nodes
     from rotorid.reduction import reduce as reduce
     from rotorid.reduction import reduce_measured as reduce_measured
-    from rotorid.reduction import small_rotor as small_rotor
+    from rotorid.reduction import small_model as small_model
     from rotorid.regression import least_squares as least_squares
     from rotorid.regression import stack as stack
     from rotorid.regression import stretch as stretch
@@ -78,7 +78,7 @@ _HOME = {
     "reduce_measured": "reduction",
     "rank_nodes": "reduction",
     "compare_methods": "reduction",
-    "small_rotor": "reduction",
+    "small_model": "reduction",
     "InputErrors": "reduction",
     "Reduction": "reduction",
     "equivalent_masses": "reduction",

@@ -64,20 +64,14 @@ def _balancing() -> Pictures:
 
 
 def _reduction() -> Pictures:
-    from rotorid.reduction import placement_plot, plots
-    from rotorid.reduction.dynamics import comparison_plots, response_comparison, stability_comparison
-    from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff
-    from rotorid.reduction.guyan_irs_serep_result import Methods
-    from rotorid.reduction.placement_result import Placement
-    from rotorid.reduction.result import Reduction
+    from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost, plots
 
     return {
         Reduction: plots.plot_reduction,
         Methods: plots.plot_methods,
-        TradeOff: plots.plot_trade_off,
-        Placement: placement_plot.plot_placement,
-        response_comparison.ResponseCost: comparison_plots.plot_running,
-        stability_comparison.StabilityCost: comparison_plots.plot_stability,
+        Placement: plots.plot_placement,
+        ResponseCost: plots.plot_running,
+        StabilityCost: plots.plot_stability,
     }
 
 

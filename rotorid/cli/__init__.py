@@ -10,14 +10,11 @@ from rotorid.base.answer import COLUMNS
 from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
-    bearings,
     calibrate,
     demo,
     fit,
     identify,
     modes,
-    motion,
-    periodic,
     reduce,
     runup,
     schema,
@@ -28,9 +25,12 @@ from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
 from rotorid.cli.worksheet import worksheet
 from rotorid.commands import (
+    bearings,
     campbell,
     critical,
     influence,
+    motion,
+    periodic,
     response,
     split,
     tolerance,
@@ -69,9 +69,9 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     },
     "Reduce rotors, let them move": {
         "reduce": reduce.reduce,
-        "bearings": bearings.bearings,
-        "motion": motion.motion,
-        "periodic": periodic.periodic,
+        "bearings": typer_command(bearings),
+        "motion": typer_command(motion),
+        "periodic": typer_command(periodic),
     },
     "Identify coefficients": {
         "identify": identify.identify,

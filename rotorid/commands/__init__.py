@@ -4,10 +4,13 @@
 """
 
 from rotorid.commands.balance import Balance, BalanceOptions, balance
+from rotorid.commands.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
 from rotorid.commands.influence import InfluenceOptions, influence
+from rotorid.commands.motion import Motion, MotionOptions, motion
 from rotorid.commands.outcome import Outcome
+from rotorid.commands.periodic import PeriodicMotions, PeriodicOptions, periodic
 from rotorid.commands.response import ResponseOptions, response
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
@@ -17,10 +20,16 @@ from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 __all__ = [
     "Balance",
     "BalanceOptions",
+    "BearingEquilibria",
+    "BearingsOptions",
     "CampbellOptions",
     "CriticalOptions",
     "InfluenceOptions",
+    "Motion",
+    "MotionOptions",
     "Outcome",
+    "PeriodicMotions",
+    "PeriodicOptions",
     "ResponseOptions",
     "SplitOptions",
     "ToleranceOptions",
@@ -28,9 +37,12 @@ __all__ = [
     "TrialWeights",
     "UnbalanceOptions",
     "balance",
+    "bearings",
     "campbell",
     "critical",
     "influence",
+    "motion",
+    "periodic",
     "response",
     "split",
     "tolerance",

@@ -100,6 +100,7 @@ class Destination:
         work: Callable[[], _R],
         *,
         draw: Callable[[_R], Figure] | None = None,
+        endings: Sequence[str] = TABLES,
         more: Sequence[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = (),
     ) -> _R:
         """Do the work of a command, print what it result, and write its files, all of them or none.
@@ -112,6 +113,8 @@ class Destination:
             Gives the result.
         draw
             Makes the picture; default: the result's main one.
+        endings
+            Of the name of the table.
         more
             Further files, how their names may end, and what makes them; or makes several, by their paths.
 
@@ -129,7 +132,7 @@ class Destination:
         plot, output = self.plot, self.output
         files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = [
             (plot, PICTURES, lambda r: figure_bytes(draw(r) if draw else r.figure(), plot or Path())),
-            (output, TABLES, lambda r: r.table_file(output or Path())),
+            (output, endings, lambda r: r.table_file(output or Path())),
             *more,
             (self.report, (".html",), lambda r: r.sheet()),
         ]
@@ -275,7 +278,11 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
 
     def deliver(options: Any, to: Destination, **values: Any) -> None:  # noqa: ANN401 - of that kind
         what = work.__name__.replace("_", " ")
-        to.deliver(what, lambda: work(*(values[name] for name in given), options))
+        to.deliver(
+            what,
+            lambda: work(*(values[name] for name in given), options),
+            endings=getattr(kind, "outputs", TABLES),
+        )
 
     hints: dict[str, Any] = {}
     parameters = []

@@ -129,7 +129,7 @@ class Balance(Parts):
         """The weights, or what goes into each hole."""
         return self.result.to_frame() if self.mounted is None else self.mounted.to_frame()
 
-    def table_file(self, path: Path) -> bytes:
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
         """The weights; for an .xlsx the job with its results, which `read_job` reads the job back from."""
         if path.suffix.lower() != ".xlsx":
             return super().table_file(path)

@@ -55,8 +55,8 @@ class Delivered(Answered):
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
 
-    def table_file(self, path: Path) -> bytes:
-        """What `--output` writes to a file of this name."""
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
+        """What `--output` writes to a file of this name, or several files by their paths."""
         from rotorid.tables.reader.table_writing import table_bytes
 
         return table_bytes(path, self.to_frame())

@@ -18,14 +18,8 @@ from rotorid.base.checks import number
 from rotorid.base.rpm import speed_text
 from rotorid.motion.system import MotionSystem
 
-_ROUNDS = 100
 _SMALLEST_STEP = 1e-9
 """Of Newton's way, and of the load in its continuation."""
-_CONVERGED = 1e-8
-"""Last step by the film's thickness: the error is its square."""
-_SINGULAR = 1e13
-_LOST = 1e-6
-"""Share of the load that may be left over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +47,7 @@ class Equilibrium:
     @property
     def position(self) -> ComplexArray:
         """Of the shaft from the centre of each bearing, x + iy, m, shape (b,)."""
-        return np.array([complex(*self.q[[*self.system.index(one.node)]]) for one in self.bearings])
+        return self.system.at_forces(self.q)[np.isfinite(self.system.walls)]
 
     @property
     def eccentricity(self) -> FloatArray:
@@ -75,13 +69,19 @@ class Equilibrium:
                 S[k] = drag / W * (one.diameter / 2 / one.clearance) ** 2
         return S
 
+    @property
+    def touched(self) -> tuple[Stop, ...]:
+        """Stops on which the shaft rests."""
+        places = zip(self.system.forces, np.abs(self.system.at_forces(self.q)), strict=True)
+        return tuple(force for force, r in places if isinstance(force, Stop) and r > force.gap)
+
 
 def equilibria(system: MotionSystem, speeds: Sequence[float]) -> tuple[Equilibrium, ...]:
     """The equilibrium at each of some speeds, rad/s; errors as of `equilibrium`."""
-    found: list[Equilibrium] = []
+    resting: list[Equilibrium] = []
     for speed in speeds:
-        found.append(equilibrium(system, speed, found[-1].q if found else None))
-    return tuple(found)
+        resting.append(equilibrium(system, speed, resting[-1].q if resting else None))
+    return tuple(resting)
 
 
 def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = None) -> Equilibrium:
@@ -100,29 +100,75 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
     ------
     ValueError
         With node and speed: a speed of 0 or outside the equations' range, a rotor that nothing holds, a shaft
-        that comes to a wall or rubs on a stop.
+        that comes to a wall.
     """
     speed = number(speed, "speed")
-    journal = next((force for force in system.forces if isinstance(force, JournalBearing)), None)
-    if journal is not None and speed == 0:
-        raise ValueError(f"speed 0: {named(journal)} carries nothing at rest; give speeds above 0")
+    check_journals(system, speed, "give speeds above 0")
     resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
     K = system.linear(speed)[1]
     J = _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1]
     if start is None:
         _check_held(system, J, speed)
     q = _condensed(resting, K, speed, start)
-    _check_walls(system, q, speed)
-    if not np.abs(_left_over(resting, K, q, speed, 1.0)[0]).max() <= _LOST * np.abs(system.weight).sum():
+    for force, drop in zip(system.forces, np.abs(system.at_forces(q)), strict=True):
+        if drop >= force.wall:  # which the forces at rest do not know
+            raise ValueError(
+                f"at {speed_text(speed)} the shaft touches {named(force)} under its weight: it drops by "
+                f"{1e3 * drop:.4g} mm there, the clearance is {1e3 * force.wall:.4g} mm"
+            )
+    if not np.abs(_left_over(resting, K, q, speed, 1.0)[0]).max() <= 1e-6 * np.abs(system.weight).sum():
         _check_held(system, J, speed)
         raise ValueError(
             f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
         )
-    walled = [k for k, force in enumerate(system.forces) if np.isfinite(force.wall)]
+    walled = np.flatnonzero(np.isfinite(system.walls))
     load = -each_force(resting, q, speed)[walled, :, 0]
     q.setflags(write=False)
-    bearings = tuple(system.forces[k] for k in walled)
-    return Equilibrium(system, speed, q, bearings, load[:, 0] + 1j * load[:, 1])
+    return Equilibrium(system, speed, q, tuple(system.forces[k] for k in walled), load @ np.array([1, 1j]))
+
+
+def at_rest(system: MotionSystem, speed: float) -> FloatArray:
+    """Where the rotor rests while it turns, shape (n,); errors as of `equilibrium`."""
+    here = np.zeros(system.size)
+    if not system.weight.any() and not system.acting(here, here, speed)[0].any():
+        return here  # also of a rotor that nothing holds
+    return np.array(equilibrium(system, speed).q)
+
+
+def eigenvalues_at_rest(
+    system: MotionSystem, q: FloatArray, speed: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Eigenvalues, rad/s, (2n,), infinite without mass, and shapes, (n, 2n), of motion about rest in q."""
+    from scipy.linalg import eig
+
+    C, K = system.about(q, speed)
+    zero, eye = np.zeros_like(C), np.eye(q.size)
+    if np.linalg.cond(system.M) < 1e12:
+        lower = -np.linalg.solve(system.M, np.hstack([K, C]))
+        values, vectors = np.linalg.eig(np.vstack([np.hstack([zero, eye]), lower]))
+    else:
+        right = np.block([[eye, zero], [zero, system.M]])
+        values, vectors = eig(np.block([[zero, eye], [-K, -C]]), right)
+    return values.astype(complex), vectors[: q.size].astype(complex)
+
+
+def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
+    """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,).
+
+    Its size is what is free: one of the shafts comes to its wall, or deflects twice as much as at rest.
+    """
+    values, shapes = eigenvalues_at_rest(system, q, speed)
+    finite = np.isfinite(values)
+    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
+    k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
+    shape = shapes[:, k] * np.exp(-0.5j * np.angle(np.sum(shapes[:, k] ** 2)))
+    places = np.array([system.index(node) for node in system.nodes])
+    moved, at = np.linalg.norm(shape[places], axis=1), np.linalg.norm(q[places], axis=1)
+    free = np.full(len(places), max(float(at.max()), 1e-6))
+    for force in system.forces:
+        if np.isfinite(force.wall):
+            free[system.nodes.index(force.node)] = force.wall - at[system.nodes.index(force.node)]
+    return float(values[k].imag), np.asarray(shape * min(free / np.maximum(moved, 1e-300)))
 
 
 def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
@@ -131,6 +177,19 @@ def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
     for k, (code, values, (x, y)) in enumerate(zip(*system.law_tables, strict=True)):
         law(code, values, q[x], q[y], 0.0, 0.0, speed, out[k])
     return out
+
+
+def check_journals(system: MotionSystem, lowest: float, what: str) -> None:
+    """Refuse a rotor at rest in journal bearings."""
+    for force in system.forces:
+        if isinstance(force, JournalBearing) and not lowest > 0:
+            raise ValueError(f"speed 0: {named(force)} carries nothing at rest; {what}")
+
+
+def named(force: NodeForce) -> str:
+    """For messages: "the squeeze film 'left' at node 3"."""
+    name = f" {force.name!r}" if force.name else ""
+    return f"the {kind_of(force).replace('_', ' ')}{name} at node {force.node}"
 
 
 def _left_over(
@@ -164,15 +223,15 @@ def _condensed(system: MotionSystem, K: FloatArray, speed: float, start: FloatAr
 def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
     """The equilibrium: from the start or the centres at once, else with a load that grows."""
     q, share, step = np.zeros(system.size), 0.0, 1.0
-    if start is not None and (found := _newton(system, K, start, speed, 1.0)) is not None:
-        return found
+    if start is not None and (near := _newton(system, K, start, speed, 1.0)) is not None:
+        return near
     while share < 1.0:
         further = min(share + step, 1.0)
-        found = _newton(system, K, q, speed, further)
-        if found is not None:
-            q, share, step = found, further, 2 * step
+        solution = _newton(system, K, q, speed, further)
+        if solution is not None:
+            q, share, step = solution, further, 2 * step
         elif step < _SMALLEST_STEP:
-            e = np.abs(_places(system, q)) / _walls(system)
+            e = np.abs(system.at_forces(q)) / system.walls
             k = int(np.argmax(e))
             raise ValueError(
                 f"at {speed_text(speed)} no equilibrium is found: under {100 * share:.3g} % of the weight "
@@ -186,16 +245,16 @@ def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray
 def _newton(
     system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float
 ) -> FloatArray | None:
-    """Newton's method, or None where it does not come to an end."""
+    """Newton's method until the last step is 1e-8 of the film: the error is its square; None without end."""
     r, J = _left_over(system, K, q, speed, share)
-    for _ in range(_ROUNDS):
+    for _ in range(100):
         try:
             d = np.asarray(np.linalg.solve(J, r), dtype=float)
         except np.linalg.LinAlgError:
             return None
-        z, dz = _places(system, q), _places(system, d)
-        gap = min((_walls(system) - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
-        if np.abs(dz).max(initial=0.0) <= _CONVERGED * gap:
+        z, dz = system.at_forces(q), system.at_forces(d)
+        gap = min((system.walls - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
+        if np.abs(dz).max(initial=0.0) <= 1e-8 * gap:
             return np.asarray(q + d)
         t, size = 1.0, np.linalg.norm(r)
         while True:
@@ -209,16 +268,6 @@ def _newton(
     return None
 
 
-def _places(system: MotionSystem, q: FloatArray) -> ComplexArray:
-    """Where the shaft is at each force, x + iy, m, shape (f,)."""
-    x, y = system.law_tables[2].T
-    return np.asarray(q[x] + 1j * q[y])
-
-
-def _walls(system: MotionSystem) -> FloatArray:
-    return np.array([force.wall for force in system.forces])
-
-
 def _at_rest(force: NodeForce) -> NodeForce:
     """What acts while nothing moves: of a squeeze film its centring spring."""
     if not isinstance(force, SqueezeFilm):
@@ -228,7 +277,7 @@ def _at_rest(force: NodeForce) -> NodeForce:
 
 def _check_held(system: MotionSystem, J: FloatArray, speed: float) -> None:
     largest = np.abs(J).max(axis=1, keepdims=True)
-    if largest.all() and np.linalg.cond(J / largest) < _SINGULAR:
+    if largest.all() and np.linalg.cond(J / largest) < 1e13:
         return
     falls = [f for f in system.forces if isinstance(f, SqueezeFilm) and not f.centring_stiffness]
     why = [f"{named(f)} has no centring spring, at rest its shaft falls to the wall" for f in falls]
@@ -236,20 +285,3 @@ def _check_held(system: MotionSystem, J: FloatArray, speed: float) -> None:
         f"at {speed_text(speed)} nothing holds the rotor, its position is not determined: "
         + ("; ".join(why) or "give it stiffness or journal bearings at two nodes")
     )
-
-
-def _check_walls(system: MotionSystem, q: FloatArray, speed: float) -> None:
-    """Refuse a shaft beyond a wall that the forces at rest do not know, or on a stop."""
-    for force, drop in zip(system.forces, np.abs(_places(system, q)), strict=True):
-        limit = force.gap if isinstance(force, Stop) else force.wall
-        if drop > limit or drop == force.wall:
-            raise ValueError(
-                f"at {speed_text(speed)} the shaft touches {named(force)} under its weight: it drops by "
-                f"{1e3 * drop:.4g} mm there, the clearance is {1e3 * limit:.4g} mm"
-            )
-
-
-def named(force: NodeForce) -> str:
-    """For messages: "the squeeze film 'left' at node 3"."""
-    name = f" {force.name!r}" if force.name else ""
-    return f"the {kind_of(force).replace('_', ' ')}{name} at node {force.node}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -14,16 +15,16 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import speed_text
 from rotorid.motion.equilibrium import Equilibrium, each_force, equilibria
 from rotorid.motion.system import MotionSystem
+from rotorid.reduction import SmallModel
 
-_STEP = 0.05
-"""Between speeds at which coefficients are known, by the speed."""
-_MANY = 200
-"""Of the speeds asked for, between which stability is looked for."""
+_AnyRotor = TypeVar("_AnyRotor", bound=fem.Rotor | SmallModel)
+_STEP, _MANY = 0.05, 200
+"""Between speeds at which coefficients are known, by the speed; those asked for that count at most."""
 _AROUND = ((1e-2, 40), (1e-4, 1))
 """How far from the threshold, by its speed, the equilibria beside it are, time after time; steps between."""
 
 
-def coefficients(found: Sequence[Equilibrium]) -> tuple[FloatArray, FloatArray]:
+def coefficients(resting: Sequence[Equilibrium]) -> tuple[FloatArray, FloatArray]:
     """Stiffness N/m and damping N·s/m of each force at equilibria of a system, shape (S, f, 2, 2) each.
 
     The force on the shaft is −K (x, y) − C (x', y') for small motion about the equilibrium. At rest outside
@@ -31,64 +32,72 @@ def coefficients(found: Sequence[Equilibrium]) -> tuple[FloatArray, FloatArray]:
     orbits about it.
     """
     made = []
-    for at in found:
+    for at in resting:
         out = each_force(at.system, at.q, at.speed)
-        centred = each_force(at.system, np.zeros(at.system.size), at.speed)
         squeezed = [isinstance(force, SqueezeFilm) for force in at.system.forces]
-        out[squeezed] = centred[squeezed]
+        out[squeezed] = each_force(at.system, np.zeros(at.system.size), at.speed)[squeezed]
         made.append(-out)
     both = np.array(made)
     return both[..., 1:3], both[..., 3:5]
 
 
-def linear_rotor(rotor: fem.Rotor, found: Sequence[Equilibrium]) -> fem.Rotor:
+def linear_rotor(rotor: _AnyRotor, resting: Sequence[Equilibrium]) -> _AnyRotor:
     """The rotor with linear supports in place of its forces, with tables over the speeds of the equilibria.
 
-    Stops, which the shaft does not touch, are left out. Supports have no mass: the fluid of a seal is a disc,
-    which does what its inertia does, and adds to the weight of this rotor.
+    Stops that the shaft does not touch are left out. Supports have no mass: the fluid of a seal is a disc, of
+    a small model a mass, which does what its inertia does, and adds to the weight of this rotor.
 
     Parameters
     ----------
     rotor
         With the forces of the system that the equilibria are of.
-    found
+    resting
         At ascending speeds; of one alone the coefficients are constant.
     """
-    speeds = tuple(one.speed for one in found) if len(found) > 1 else ()
-    K, C = coefficients(found)
-    supports, fluids = [], []
+    speeds = tuple(one.speed for one in resting) if len(resting) > 1 else ()
+    K, C = coefficients(resting)
+    supports, fluids = [*rotor.supports], list[fem.Disc]()
     for k, force in enumerate(rotor.forces):
         name = force.name or kind_of(force).replace("_", " ")
-        both = [each[:, k] if speeds else each[0, k] for each in (K, C)]
-        kind = "seal" if min(each.diagonal(axis1=-2, axis2=-1).min() for each in both) < 0 else "bearing"
-        if not isinstance(force, Stop):
-            stiffness, damping = (each.tolist() for each in both)
-            supports.append(fem.Support(force.node, stiffness, damping, name, speeds=speeds, kind=kind))
+        stiffness, damping = (each[:, k] if speeds else each[0, k] for each in (K, C))
+        least = min(each.diagonal(axis1=-2, axis2=-1).min() for each in (stiffness, damping))
+        kind = "seal" if least < 0 else "bearing"
+        if not isinstance(force, Stop) or stiffness.any():
+            matrices = stiffness.tolist(), damping.tolist()
+            supports.append(fem.Support(force.node, *matrices, name, speeds=speeds, kind=kind))
         if force.mass:
             fluids.append(fem.Disc(force.node, force.mass, name=f"fluid of {name}"))
-    return replace(rotor.linear, supports=(*rotor.supports, *supports), discs=(*rotor.discs, *fluids))
+    made: fem.Rotor | SmallModel
+    if isinstance(rotor, fem.Rotor):
+        made = replace(rotor.linear, supports=tuple(supports), discs=(*rotor.discs, *fluids))
+    else:
+        masses = rotor.masses.copy()
+        for fluid in fluids:
+            masses[rotor.nodes.index(fluid.node)] += fluid.mass
+        made = replace(rotor, supports=tuple(supports), masses=masses, forces=())
+    return cast("_AnyRotor", made)
 
 
-def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibrium]) -> fem.Stability:
+def threshold(
+    rotor: fem.Rotor | SmallModel, system: MotionSystem, resting: Sequence[Equilibrium]
+) -> fem.Stability:
     """Where the linear rotor loses stability, between the speeds of two equilibria or more.
 
     Coefficients are linear between the speeds where they are known: at those of the equilibria, at further
     ones wherever these are far apart, and in the end close beside the threshold.
     """
-    lowest, highest = found[0].speed, found[-1].speed
+    lowest, highest = resting[0].speed, resting[-1].speed
     start = max(lowest, 1e-3 * highest)
     more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1].tolist()
-    known = {one.speed: one for one in (*found[:: 1 + len(found) // _MANY], found[-1])}
+    known = {one.speed: one for one in (*resting[:: 1 + len(resting) // _MANY], resting[-1])}
     known |= {one.speed: one for one in equilibria(system, sorted({*more, *system.knots[1:-1].tolist()}))}
-    every = [known[speed] for speed in sorted(known)]
-    linear = linear_rotor(rotor, every)
-    stable = fem.stability_threshold(linear, highest, lowest=lowest)
-    first = fem.judge(linear, np.array(sorted(known)))[0][:1]
-    guesses = [one.first for one in first if one.begins] + [stable.threshold or highest]
+    linear = linear_rotor(rotor, [known[speed] for speed in sorted(known)])
+    stable = _search(linear, lowest, highest)
+    ranges = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(known)))[0][:1]
+    guesses = [one.first for one in ranges if one.begins] + [stable.threshold or highest]
     for share, steps in _AROUND:
         a, b = (float(np.clip(min(guesses) * (1 + s), lowest, highest)) for s in (-share, share))
-        beside = linear_rotor(rotor, equilibria(system, (a, b)))
-        near = fem.stability_threshold(beside, b, lowest=a, steps=steps)
+        near = _search(linear_rotor(rotor, equilibria(system, (a, b))), a, b, steps)
         if near.threshold is None:
             break
         stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
@@ -96,7 +105,16 @@ def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibriu
     again = tuple(
         f"about {speed_text(one.last)} it is stable again; `rotorid campbell` of the file that --output "
         "writes shows all such ranges"
-        for one in first
+        for one in ranges
         if one.ends
     )
     return replace(stable, warnings=again)
+
+
+def _search(rotor: fem.Rotor | SmallModel, lowest: float, highest: float, steps: int = 40) -> fem.Stability:
+    """The first threshold of a linear rotor, of any kind."""
+    if not isinstance(rotor, SmallModel):
+        return fem.stability_threshold(rotor, highest, lowest=lowest, steps=steps)
+    inside = {s for support in rotor.supports for s in support.speeds if lowest < s < highest}
+    speeds = {*inside, *fem.range_of_speeds(lowest, highest, steps).tolist()}
+    return fem.threshold_of(rotor.whirl(np.array(sorted(speeds))))

@@ -9,12 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from fem import JournalBearing, NodeForce
+from fem import NodeForce
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import rpm_text
 from rotorid.base.text import counted
-from rotorid.motion.equilibrium import named
+from rotorid.motion.equilibrium import check_journals, named
 from rotorid.motion.rosenbrock import DONE, TOUCHES, Equations, Turning, advance, evaluate
 from rotorid.motion.system import MotionSystem
 
@@ -149,7 +149,7 @@ def run(
         raise ValueError(f"tolerance must be from 1e-13 to {LOOSEST:g}, not {tolerance:g}")
     for speed in (first, last):
         system.linear(speed)  # refuses what lies outside the knots
-    _check_journals(system, first, last)
+    check_journals(system, min(first, last), "begin and end above it")
     reference = max(first, last) or 2 * np.pi / time
     if rate is None:
         rate = A_TURN * reference / (2 * np.pi) if max(first, last) else 10_000 / time
@@ -167,24 +167,37 @@ def run(
     z = np.empty((count + 1, len(names)), dtype=complex)
     q, v = (np.array(part, dtype=float) for part in start)
     v = consistent(system, q, v, (angle, first, (last - first) / time))
-    z[0] = q[places[:, 0]] + 1j * q[places[:, 1]]
+    z[0] = q[places] @ [1, 1j]
     groups = np.array([name[0] not in "xy" for name in system.coordinates], dtype=np.intp)
     origin = q.copy()
     largest = np.array([_SMALLEST * np.abs(q[groups == group]).max() for group in groups])
-    walls = np.array([force.wall for force in system.forces])
     h, least = 1e-3 * min(time, 2 * np.pi / reference), 1e-10 * min(time, 2 * np.pi / reference)
     done, steps, vain, stopped = 1, 0, 0, ""
     for (begin, end), equations, turning in _pieces(system, (first, last), time, angle, count):
         at = times[done:][times[done:] <= end]
         out = np.empty((at.size, system.size))
         how, force, now, h, good, bad, written = advance(
-            *(equations, turning, walls, (0.0, end - begin), (max(h, least), least), tolerance, groups),
+            *(
+                equations,
+                turning,
+                system.walls,
+                (0.0, end - begin),
+                (max(h, least), least),
+                tolerance,
+                groups,
+            ),
             *(origin, q, v, largest, np.minimum(at, end) - begin, out),
         )
-        z[done : done + written] = out[:written, places[:, 0]] + 1j * out[:written, places[:, 1]]
+        z[done : done + written] = out[:written, places] @ [1, 1j]
         done, steps, vain = done + written, steps + good, vain + bad
         if how != DONE:
-            stopped = _why(system, how, force, begin + now, first + (last - first) * (begin + now) / time)
+            when = f"after {begin + now:.6g} s, at {rpm_text(first + (last - first) * (begin + now) / time)}"
+            stopped = f"no step is short enough {when}: the forces change faster than any motion could follow"
+            if how == TOUCHES:
+                stopped = (
+                    f"the shaft touches the wall of {named(system.forces[force])} {when}: under a thousandth "
+                    "of its clearance is left"
+                )
             last = first + (last - first) * times[done - 1] / time
             break
     return MotionRun(
@@ -216,7 +229,7 @@ def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turn
     free = shape[:, size <= _MASSLESS] / unit[:, None]
     if not free.size:
         return v
-    n, equations = system.size, _equations(system, turning[1], turning[1], 0.0)
+    n, equations = system.size, _equations(system, turning[1], turning[1])
     state = np.zeros((4 + 2 * n, n))
     for _ in range(20):
         state[0], state[1] = q, v
@@ -235,14 +248,6 @@ def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turn
     return v
 
 
-def _check_journals(system: MotionSystem, first: float, last: float) -> None:
-    for force in system.forces:
-        if isinstance(force, JournalBearing) and not min(first, last) > 0:
-            raise ValueError(
-                f"speed 0: the film of {named(force)} carries nothing at rest; begin and end above it"
-            )
-
-
 def _pieces(
     system: MotionSystem, speeds: tuple[float, float], time: float, angle: float, count: int
 ) -> Iterator[tuple[tuple[float, float], Equations, Turning]]:
@@ -256,25 +261,16 @@ def _pieces(
     for begin, end in itertools.pairwise(ends):
         speed = first + alpha * begin
         turned = (angle + (first + speed) / 2 * begin) % (2 * np.pi)
-        yield (begin, end), _equations(system, speed, first + alpha * end, alpha), (turned, speed, alpha)
+        yield (begin, end), _equations(system, speed, first + alpha * end), (turned, speed, alpha)
 
 
-def _equations(system: MotionSystem, first: float, last: float, alpha: float) -> Equations:
+def _equations(system: MotionSystem, first: float, last: float) -> Equations:
     """As `advance` takes them, for speeds between two neighbouring knots."""
-    low, high = system.knots[0], system.knots[-1]
-    linear = [system.linear(min(max(speed, low), high) if alpha else speed) for speed in (first, last)]
-    over = last - first if alpha else 1.0
-    (C, K), (C_end, K_end) = linear
+    middle = (first + last) / 2
+    C, K, C_speed, K_speed = system.around(middle)
+    back = first - middle
     return (
         *system.law_tables,
-        *(system.M, C, K, (C_end - C) / over, (K_end - K) / over),
+        *(system.M, C + back * C_speed, K + back * K_speed, C_speed, K_speed),
         *(system.weight, system.unbalance, system.bow),
     )
-
-
-def _why(system: MotionSystem, how: int, force: int, time: float, speed: float) -> str:
-    when = f"after {time:.6g} s, at {rpm_text(speed)}"
-    if how == TOUCHES:
-        where = named(system.forces[force])
-        return f"the shaft touches the wall of {where} {when}: under a thousandth of its clearance is left"
-    return f"no step is short enough {when}: the forces change faster than any motion could follow"

@@ -5,21 +5,34 @@
 with the weight w, the laws F of `fem.forces`, the unbalance u = m e in x and −i m e in y at its node (a mass
 centre at e e^{iφ} acts with −m e (e^{iφ})'' there), and b, what a bent shaft needs to be straight: the
 shaft's stiffness times the bow. A bow is at rest in the turning shaft: internal damping does not feel it.
+
+`reduced_system` has fewer unknowns (Craig and Bampton): the deflections of some nodes stay, the others follow
+as they do at rest, and with those nodes held still the others have natural modes, of which the lowest stay.
+Static deflections of the kept nodes are exact. Source: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968)
+1313.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 import fem
-from fem import NodeForce
+from fem import GRAVITY, NodeForce
 from fem.forces import law, tables
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.base.checks import number
 from rotorid.base.compiled import compiled_part
+from rotorid.base.text import counted, percent
+from rotorid.reduction import SmallModel
+
+ENOUGH = 3e-4
+"""Error of the natural frequencies at which a reduced system needs no more modes."""
+_RIGID = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +69,11 @@ class MotionSystem:
         """How many unknowns there are, n."""
         return len(self.coordinates)
 
+    @property
+    def forced(self) -> bool:
+        """Whether unbalance or bow drive it."""
+        return bool(self.unbalance.any() or self.bow.any())
+
     def index(self, node: int) -> tuple[int, int]:
         """Where x and y of a node stand, from 0; ValueError for a node that has no deflection here."""
         try:
@@ -76,6 +94,16 @@ class MotionSystem:
         places = np.array([self.index(force.node) for force in self.forces], dtype=np.intp).reshape(-1, 2)
         return *tables(self.forces), places
 
+    @cached_property
+    def walls(self) -> FloatArray:
+        """Clearances of the forces, m, infinite without a wall, shape (f,)."""
+        return np.array([force.wall for force in self.forces])
+
+    def at_forces(self, q: FloatArray) -> ComplexArray:
+        """Deflections x + iy at the forces, m, shape (…, f), of unknowns (…, n)."""
+        x, y = self.law_tables[2].T
+        return np.asarray(q[..., x] + 1j * q[..., y])
+
     def linear(self, speed: float) -> tuple[FloatArray, FloatArray]:
         """C and K at a speed, rad/s, shape (n, n) each; ValueError outside the knots."""
         if not self.knots[0] <= speed <= self.knots[-1]:
@@ -83,10 +111,14 @@ class MotionSystem:
                 f"these equations hold from {self.knots[0]:.6g} to {self.knots[-1]:.6g} rad/s, not at "
                 f"{speed:.6g} rad/s"
             )
+        return self.around(speed)[:2]
+
+    def around(self, speed: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """C and K at a speed and their derivatives by it, (n, n) each; beyond the knots as at their ends."""
         i = max(0, min(int(np.searchsorted(self.knots, speed, "right")) - 1, len(self.knots) - 2))
-        s = (speed - self.knots[i]) / (self.knots[i + 1] - self.knots[i])
-        C, K = ((1 - s) * matrix[i] + s * matrix[i + 1] for matrix in (self.C, self.K))
-        return np.asarray(C), np.asarray(K)
+        over, past = self.knots[i + 1] - self.knots[i], speed - self.knots[i]
+        C_speed, K_speed = ((each[i + 1] - each[i]) / over for each in (self.C, self.K))
+        return self.C[i] + past * C_speed, self.K[i] + past * K_speed, C_speed, K_speed
 
     def acting(self, q: FloatArray, v: FloatArray, speed: float) -> tuple[FloatArray, ...]:
         """Forces that are not linear, F (n,), and their derivatives by q and v, (n, n), and Ω, (n,)."""
@@ -94,6 +126,12 @@ class MotionSystem:
         out = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
         add_forces(*self.law_tables, q, v, speed, *out)
         return out
+
+    def about(self, q: FloatArray, speed: float) -> tuple[FloatArray, FloatArray]:
+        """C and K of small motion about rest in q, shape (n, n) each."""
+        C, K = self.linear(speed)
+        _, F_q, F_v, _ = self.acting(q, np.zeros(self.size), speed)
+        return C - F_v, K - F_q
 
 
 def system(
@@ -135,14 +173,225 @@ def system(
         for i in made.index(force.node):
             made.M[i, i] += force.mass
     for node, value in (unbalance or {}).items():
-        x, y = made.index(node)
-        made.unbalance[x] += value
-        made.unbalance[y] -= 1j * value
-    for name, value in (weight or {}).items():
-        made.weight[motions[0].index(name)] += value
-    for name, value in (bow or {}).items():
-        made.bow[motions[0].index(name)] += value
+        made.unbalance[[*made.index(node)]] += value, -1j * value
+    for vector, values in ((made.weight, weight), (made.bow, bow)):
+        for name, force_there in (values or {}).items():
+            vector[motions[0].index(name)] += force_there
     return made
+
+
+def rotor_system(
+    rotor: fem.Rotor | SmallModel,
+    lowest: float,
+    highest: float,
+    *,
+    unbalance: Mapping[int, complex] | None = None,
+    bow: Mapping[int, complex] | None = None,
+    gravity: float = GRAVITY,
+    direction: float = -90.0,
+) -> MotionSystem:
+    """Put together what moves of a rotor at speeds from `lowest` to `highest`.
+
+    Parameters
+    ----------
+    rotor
+        With the forces at its nodes; or a small model.
+    lowest, highest
+        rad/s; the same for one speed alone.
+    unbalance
+        m e e^{iβ} by node, kg·m, β with the rotation; a small model has its own if there is none here.
+    bow
+        How far the shaft at rest deviates from a straight line by node, m, complex, at three nodes or more;
+        between them it runs as a shaft does that is bent there. A small model has its own, too.
+    gravity, direction
+        m/s², and where it points, degrees from x with the rotation; −y by default.
+
+    Raises
+    ------
+    ValueError
+        Speeds that are no range or outside a bearing table; nodes that do not exist; a bow at fewer than
+        three nodes.
+    """
+    lowest, highest = number(lowest, "lowest speed"), number(highest, "highest speed")
+    if lowest > highest:
+        raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
+    inside = {s for support in rotor.supports for s in support.speeds if lowest < s < highest}
+    end = highest if highest > lowest else lowest * (1 + 1e-6) + 1e-9
+    if isinstance(rotor, SmallModel):
+        names = tuple(f"x{node}" for node in rotor.nodes)
+        stiffness, load = rotor.stiffness, rotor.weight / GRAVITY
+        unbalance = rotor.unbalance if unbalance is None else unbalance
+        bow = rotor.bow if bow is None else bow
+    else:
+        undamped = np.zeros_like(rotor.material_damping)
+        shaft = replace(rotor.linear, supports=(), material_damping=undamped)
+        plane = fem.equations_of_motion(shaft, plane="x")
+        names, stiffness = plane.coordinates, plane.K
+        load = plane.M @ np.array([name[0] == "x" for name in names], dtype=float)
+
+    def linear(speed: float) -> fem.Motion:
+        speed = min(speed, highest)
+        if isinstance(rotor, SmallModel):
+            return rotor.motion(speed)
+        return fem.equations_of_motion(rotor.linear, speed=speed)
+
+    angle = np.radians(number(direction, "direction", signed=True))
+    pull = number(gravity, "gravity") * np.array([np.cos(angle), np.sin(angle)])
+    pull[np.abs(pull) < 1e-15 * gravity] = 0.0  # straight down is straight down
+    at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
+    bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
+    made = system(
+        linear,
+        np.array([lowest, *sorted(inside), end]),
+        forces=rotor.forces,
+        weight={
+            name.replace("x", axis, 1): part * mass
+            for axis, part in zip("xy", pull, strict=True)
+            for name, mass in zip(names, load, strict=True)
+        },
+        unbalance=unbalance,
+        bow={
+            names[i].replace("x", axis, 1): turned * force
+            for i, force in zip(at, bent, strict=True)
+            for axis, turned in (("x", 1), ("y", -1j))
+        },
+    )
+    return without_followers(made) if isinstance(rotor, SmallModel) else made
+
+
+def without_followers(system: MotionSystem) -> MotionSystem:
+    """Without the unknowns that have no mass, damping or force of their own: they follow the others at rest.
+
+    They stay where their stiffness depends on speed.
+    """
+    still = np.asarray(~(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2))))
+    still[system.law_tables[2]] = False
+    rest, others = np.flatnonzero(still), np.flatnonzero(~still)
+    if not rest.size or np.ptp(system.K[:, rest], axis=0).any():
+        return system
+    T = np.zeros((system.size, others.size))
+    T[others, np.arange(others.size)] = 1.0
+    T[rest] = -np.linalg.solve(system.K[0][np.ix_(rest, rest)], system.K[0][np.ix_(rest, others)])
+    return _in_basis(system, T, tuple(system.coordinates[i] for i in others))
+
+
+def _in_basis(system: MotionSystem, T: FloatArray, coordinates: tuple[str, ...]) -> MotionSystem:
+    """The system with the unknowns q = T r, r named anew."""
+    return replace(
+        system,
+        coordinates=coordinates,
+        **{name: T.T @ getattr(system, name) @ T for name in "MCK"},
+        **{name: T.T @ getattr(system, name) for name in ("weight", "unbalance", "bow")},
+    )
+
+
+def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> ComplexArray:
+    """Forces that bend the straight shaft as it is bent at rest, N: (K_bb − K_bo K_oo⁻¹ K_ob) times the bow.
+
+    Parameters
+    ----------
+    stiffness
+        Of the free shaft in one plane, N/m, shape (n, n).
+    at
+        Unknowns where the bow is known, b of them; the others follow without a force.
+    bow
+        m, shape (b,).
+
+    Raises
+    ------
+    ValueError
+        If one or two are given: any two points lie on a straight line.
+    """
+    if 0 < len(at) < 3:
+        raise ValueError("a bow needs three nodes or more: through two of them a straight shaft passes")
+    others = np.setdiff1d(np.arange(len(stiffness)), at)
+    across = stiffness[np.ix_(others, at)]
+    held = np.linalg.solve(stiffness[np.ix_(others, others)], across) if len(at) else across
+    return np.asarray((stiffness[np.ix_(at, at)] - across.T @ held) @ bow)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedSystem:
+    """The system with fewer unknowns, how many modes it has in both planes, and what that costs.
+
+    Attributes
+    ----------
+    system
+        Its unknowns are `x7`, `y7` … of the kept nodes, feet of pedestals, and `mode_1` …
+    modes
+        How many modes stay.
+    error
+        Largest relative error of the natural frequencies without damping, those below twice the highest speed
+        or at least the first two that bend the shaft, at the lowest speed; bearings with films left out.
+        Infinite where fewer unknowns move.
+    """
+
+    system: MotionSystem
+    modes: int
+    error: float
+
+    @property
+    def note(self) -> str:
+        """How many unknowns move, and what that costs."""
+        size, modes = counted(self.system.size, "unknown"), counted(self.modes, "mode")
+        high = f"natural frequencies without films are high by {percent(self.error)} % at most"
+        if self.error == np.inf:
+            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        return f"of the rotor {size} move, {modes} among them; {high}"
+
+
+def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> ReducedSystem:
+    """Keep some nodes, those of forces and so many modes between them.
+
+    Parameters
+    ----------
+    system
+        All unknowns.
+    nodes
+        To be kept, besides those of forces.
+    modes
+        In both planes together; None: as many as bring the error down to `ENOUGH`.
+
+    Raises
+    ------
+    ValueError
+        For nodes that do not move, and more modes than there are.
+    """
+    from scipy.linalg import eigh
+
+    kept_nodes = sorted({*nodes, *(force.node for force in system.forces)})
+    feet = [i for i, name in enumerate(system.coordinates) if name.startswith("foot")]
+    kept = np.array([*(i for node in kept_nodes for i in system.index(node)), *feet], dtype=np.intp)
+    others = np.setdiff1d(np.arange(system.size), kept)
+    if modes is not None and not 0 <= modes <= others.size:
+        raise ValueError(f"modes: from 0 to {others.size} between the kept nodes, not {modes}")
+    K, M, n = (system.K[0] + system.K[0].T) / 2, system.M, len(kept)
+    inner = np.ix_(others, others)
+    T = np.zeros((system.size, system.size))
+    T[kept, np.arange(n)] = 1.0
+    T[others, :n] = -np.linalg.solve(K[inner], K[np.ix_(others, kept)])
+    T[others, n:] = eigh(K[inner], M[inner])[1]
+    K, M = T.T @ K @ T, T.T @ M @ T
+
+    def frequencies(size: int) -> FloatArray:
+        squares = eigh(K[:size, :size], M[:size, :size], eigvals_only=True)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    full = frequencies(system.size)
+    bends = int((full <= _RIGID * full[-1]).sum())
+    end = max(int((full <= 2 * system.knots[-1]).sum()), min(bends + 2, full.size))
+
+    def error(modes: int) -> float:
+        few = frequencies(n + modes)
+        if end > few.size:
+            return np.inf
+        return float(np.max(few[bends:end] / full[bends:end] - 1.0, initial=0.0))
+
+    if modes is None:  # in pairs of both planes; more of them are never worse
+        pairs = bisect_left(range((others.size + 1) // 2), True, key=lambda n: error(2 * n) <= ENOUGH)
+        modes = min(2 * pairs, others.size)
+    names = (*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes)))
+    return ReducedSystem(_in_basis(system, T[:, : n + modes], names), modes, error(modes))
 
 
 @compiled_part

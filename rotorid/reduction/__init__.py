@@ -1,32 +1,31 @@
 """A rotor as a few masses: equivalent masses by regression, and how well the small model behaves."""
 
-from rotorid.reduction.dynamics.instability_threshold import stability_threshold
-from rotorid.reduction.dynamics.response_comparison import ResponseCost, compare_response
-from rotorid.reduction.dynamics.small_rotor import SmallRotor, small_rotor
-from rotorid.reduction.dynamics.stability_comparison import StabilityCost, compare_stability
-from rotorid.reduction.equivalent.changed_inputs import Shift
-from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design, equivalent_masses
-from rotorid.reduction.equivalent.frequency_matching import matching_masses
-from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff, trade_off
-from rotorid.reduction.equivalent.mass_sensitivity import InputErrors
-from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty, mass_uncertainty
-from rotorid.reduction.equivalent.small_model_modes import mac, natural_frequencies
-from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
-    Separated,
-    separate,
-    separated_compliance,
+from rotorid.reduction.comparison import (
+    ResponseCost,
+    StabilityCost,
+    compare_response,
+    compare_stability,
+    stability_threshold,
 )
-from rotorid.reduction.guyan_irs_serep import compare_methods, reduce_by
-from rotorid.reduction.guyan_irs_serep_result import Method, Methods
-from rotorid.reduction.placement import book_nodes, rank_nodes
-from rotorid.reduction.placement_result import Placement
-from rotorid.reduction.reduce_rotor import reduce, reduce_measured
-from rotorid.reduction.result import Choices, Reduction
+from rotorid.reduction.condensation import Method, Methods, compare_methods, reduce_by
+from rotorid.reduction.input_errors import InputErrors, MassErrors, Shift
+from rotorid.reduction.keep_supports import check_free, held_nodes, held_rigidly, keep_supports
+from rotorid.reduction.masses import (
+    Separated,
+    design,
+    equivalent_masses,
+    mac,
+    natural_frequencies,
+    separate,
+)
+from rotorid.reduction.placement import Placement, book_nodes, rank_nodes
+from rotorid.reduction.reduce import Choices, Reduction, reduce, reduce_measured
+from rotorid.reduction.small_model import SmallModel, small_model
 
 __all__ = [
     "Choices",
     "InputErrors",
-    "MassUncertainty",
+    "MassErrors",
     "Method",
     "Methods",
     "Placement",
@@ -34,26 +33,25 @@ __all__ = [
     "ResponseCost",
     "Separated",
     "Shift",
-    "SmallRotor",
+    "SmallModel",
     "StabilityCost",
-    "TradeOff",
     "book_nodes",
+    "check_free",
     "compare_methods",
     "compare_response",
     "compare_stability",
     "design",
     "equivalent_masses",
+    "held_nodes",
+    "held_rigidly",
+    "keep_supports",
     "mac",
-    "mass_uncertainty",
-    "matching_masses",
     "natural_frequencies",
     "rank_nodes",
     "reduce",
     "reduce_by",
     "reduce_measured",
     "separate",
-    "separated_compliance",
-    "small_rotor",
+    "small_model",
     "stability_threshold",
-    "trade_off",
 ]

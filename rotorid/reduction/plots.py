@@ -25,15 +25,15 @@ from rotorid.base.plot_style import (
     plain,
 )
 from rotorid.base.rpm import RPM
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rotorid.reduction.equivalent.changed_inputs import Shift
-    from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff
-    from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty
-    from rotorid.reduction.guyan_irs_serep_result import Methods
-    from rotorid.reduction.result import Reduction
+    from rotorid.reduction.comparison import ResponseCost, StabilityCost
+    from rotorid.reduction.condensation import Methods
+    from rotorid.reduction.placement import Placement
+    from rotorid.reduction.reduce import Reduction
 
 
 MOST_MODES = 6
@@ -47,6 +47,7 @@ ALIKE = 0.9
 HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
 """Bars that differ without colour."""
 DARK, LINE = "#2f3640", "#6b7480"
+DASHED = (0, (4, 2))
 
 
 def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
@@ -168,25 +169,9 @@ def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[
     Two axes, for the errors and for the shapes; of many modes the first six are drawn.
     """
     names = [row.name for row in methods.rows]
-    errors, mac = ([getattr(row, what) for row in methods.rows] for what in ("relative_error", "mac"))
-    return _compared(methods, names, np.array(errors), np.array(mac), axes)
-
-
-def plot_trade_off(choices: TradeOff, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
-    """Draw what other masses at the same nodes lose, as `plot_methods` draws methods."""
-    return _compared(choices, choices.names, choices.relative_error, choices.mac, axes)
-
-
-def _compared(
-    rows: Methods | TradeOff,
-    names: Sequence[str],
-    errors: FloatArray,
-    mac: FloatArray,
-    axes: Sequence[Axes] | None,
-) -> tuple[Axes, Axes]:
-    """Bars of frequency errors and of 1 − MAC, shapes (rows, n) each, both on linear scales with their 0."""
+    errors, mac = (np.array([getattr(row, of) for row in methods.rows]) for of in ("relative_error", "mac"))
     above, below = new_pair(6.0, (1, 1)) if axes is None else axes
-    n = min(len(rows.nodes), MOST_MODES)
+    n = min(len(methods.nodes), MOST_MODES)
     errors, losses = 100 * errors[:, :n], np.maximum(1 - mac[:, :n], 0.0)
     _bars(above, errors, names, [[_percent(e) for e in row] for row in errors])
     _bars(below, losses, names, [["none" if np.isnan(x) else f"{1 - x:.4f}" for x in row] for row in losses])
@@ -196,10 +181,10 @@ def _compared(
         below.axhline(1 - ALIKE, color=DARK, linewidth=1.0, linestyle="--", zorder=3)
         at: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "color": DARK, "bbox": BOX}
         note(below, f"MAC {ALIKE:g}: above, another shape", (0.0, 1 - ALIKE), (4, 4), **at)
-    ticks = [f"mode {k + 1}\n{rows.rotor_frequencies[k] * RPM:.0f} rpm" for k in range(n)]
+    ticks = [f"mode {k + 1}\n{methods.rotor_frequencies[k] * RPM:.0f} rpm" for k in range(n)]
     below.set_xticks(range(n), ticks)
-    where = ", ".join(map(str, rows.nodes))
-    some = "" if n == len(rows.nodes) else f", first {n} of {len(rows.nodes)} modes"
+    where = ", ".join(map(str, methods.nodes))
+    some = "" if n == len(methods.nodes) else f", first {n} of {len(methods.nodes)} modes"
     title = f"reduced to nodes {where}{some}"
     legend_above(above, 4 if max(map(len, names)) < 25 else 2, title=title, title_fontsize="medium")
     return above, below
@@ -234,72 +219,222 @@ def _percent(error: float) -> str:
     return text.replace("-", "−")
 
 
-def plot_changes(reduction: Reduction, shift: Shift | None, ax: Axes | None = None) -> Axes:
-    """Draw what errors and changes of the inputs do to each mass and frequency, all on one scale in percent.
+def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
+    """Draw all choices of places: largest frequency error over 1 − smallest MAC, both logarithmic.
 
-    Parameters
-    ----------
-    reduction
-        Masses and frequencies, with what stated errors do to them, if errors were stated.
-    shift
-        What given changes do; None: were none asked for.
-    ax
-        Where; default new axes.
+    Choices that give no physical model are left out. A colour bar for the condition number is added.
     """
-    axes = new_axes((WIDTH, 4.6)) if ax is None else ax
-    n = len(reduction.nodes)
-    values = _both(reduction.masses.solution, reduction.frequencies)
-    percent = 100 / np.abs(np.where(values == 0, np.nan, values))
-    places = -np.arange(2.0 * n) - np.repeat([0.0, 0.5], n)
-    names = [f"node {node}" if isinstance(node, int) else node for node in reduction.nodes]
-    names += [f"mode {k + 1}" for k in range(n)]
-    rows = [f"{name}:  {_short(value)}" for name, value in zip(names, values, strict=True)]
-    if reduction.uncertainty is not None:
-        std = _draw_errors(reduction.uncertainty, percent, places, axes)
-        rows = [f"{row} ± {_short(spread, 2)}" for row, spread in zip(rows, std, strict=True)]
-    if shift is not None:
-        exact = _draw_shift(shift, percent, places, axes)
-        rows = [f"{row} → {_short(value)}" for row, value in zip(rows, values + exact, strict=True)]
-    units = ["kg"] * n + ["rpm"] * n
-    axes.set_yticks(places, [f"{row} {unit}" for row, unit in zip(rows, units, strict=True)])
-    axes.axvline(0.0, color=DARK, linewidth=0.9, zorder=1)
-    axes.set(xlabel="deviation from the value on the left, %")
+    from matplotlib.colors import LogNorm
+
+    from rotorid.base.plot_style import TEXT, WIDTH, new_axes, plain, plain_numbers
+
+    axes = new_axes((WIDTH, 5.6)) if ax is None else ax
     plain(axes)
-    axes.grid(visible=False, axis="y")
-    legend_above(axes, 1)
+    axes.set(xscale="log", yscale="log")
+    ranked = np.isfinite(placement.error) & np.isfinite(placement.mac) & (placement.masses > 0).all(axis=1)
+    axes.set(
+        xlabel=f"loss of the worst shape, 1 − MAC (at least {SAME_SHAPE:g}, log)",
+        ylabel=f"largest frequency error\nof {counted(placement.check, 'mode')}, % (log)",
+    )
+    n, all_of_them = placement.nodes.shape[1], placement.considered
+    left_out = all_of_them - int(np.count_nonzero(ranked))
+    title = f"{all_of_them} choices of {counted(n, 'node')}" + (
+        f", {left_out} without physical model" if left_out else ""
+    )
+    if not ranked.any():
+        axes.set_title(title, fontsize="medium")
+        axes.text(
+            0.5, 0.5, "no choice gives a physical model", transform=axes.transAxes, ha="center", color=LINE
+        )
+        return axes
+    x = np.maximum(1 - placement.mac, SAME_SHAPE)
+    y = np.maximum(100 * placement.error, SMALLEST_ERROR)
+    condition = np.where(np.isfinite(placement.condition), placement.condition, np.nan)
+    low, high = max(float(np.nanmin(condition[ranked])), 1.0), float(np.nanmax(condition[ranked]))
+    unlike = high > 1.05 * low
+    order = np.flatnonzero(ranked)[::-1]  # the best on top
+    points = axes.scatter(
+        x[order],
+        y[order],
+        s=16 if order.size > 300 else 34,
+        c=condition[order],
+        cmap="viridis_r",
+        norm=LogNorm(low, high if unlike else 2 * low),
+        alpha=0.85,
+        linewidths=0,
+        zorder=2,
+    )
+    if unlike:
+        bar = axes.figure.colorbar(points, ax=axes, label="condition number of the regression", pad=0.02)
+        plain_numbers(bar.ax)
+    plain_numbers(axes)
+    front = np.asarray(placement.pareto, dtype=int)
+    axes.step(
+        x[front], y[front], where="pre", color=COLORS[1], linewidth=1.4, zorder=3,
+        label="trade-off: no other choice is better in both",
+    )  # fmt: skip
+    axes.plot(x[front], y[front], "o", color=COLORS[1], markersize=5, markerfacecolor="none", zorder=3.5)
+    _named(placement, x, y, axes)
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1, frameon=False, fontsize=TEXT, markerscale=0.8,
+        title=title, title_fontproperties={"size": "medium"},
+    )  # fmt: skip
     return axes
 
 
-def _draw_errors(known: MassUncertainty, percent: FloatArray, places: FloatArray, axes: Axes) -> FloatArray:
-    """Intervals of one standard deviation, by first order and, where that is poor, drawn; the first."""
-    std = _both(known.masses_std, known.frequencies_std)
-    line: dict[str, Any] = {"linestyle": "", "markersize": 6, "capsize": 4}
-    words = "± one standard deviation, first order"
-    axes.errorbar(0 * places, places, xerr=std * percent, color=DARK, marker="o", label=words, **line)
-    if known.drawn is not None:
-        half = _both(*known.drawn) * percent
-        line |= {"color": BLUE, "marker": "s", "label": "68 % of inputs drawn, recomputed"}
-        axes.errorbar(np.where(np.isfinite(half), 0.0, np.nan), places - 0.25, xerr=half, **line)
-    return std
+def _named(placement: Placement, x: FloatArray, y: FloatArray, axes: Axes) -> None:
+    """Mark the choices that have a name; one with several names is marked once."""
+    names = (
+        ("best by frequency", placement.best_by_frequency, "s", COLORS[0]),
+        ("best by MAC", placement.best_by_mac, "^", COLORS[3]),
+        ("compromise", placement.compromise, "D", COLORS[4]),
+        ("the book's rule", placement.book, "*", COLORS[5]),
+    )
+    marked: dict[int, tuple[list[str], str, str]] = {}
+    for name, row, marker, color in names:
+        if row is not None and np.isfinite(placement.error[row]) and (placement.masses[row] > 0).all():
+            marked.setdefault(int(row), ([], marker, color))[0].append(name)
+    for row, (words, marker, color) in marked.items():
+        nodes = ", ".join(map(str, placement.nodes[row]))
+        word = "node" if len(placement.nodes[row]) == 1 else "nodes"
+        masses = ", ".join(f"{m:.0f}" for m in placement.masses[row])
+        axes.plot(
+            x[row],
+            y[row],
+            marker,
+            color=color,
+            markersize=17 if marker == "*" else 10,
+            markeredgecolor="black",
+            markeredgewidth=1.2,
+            linestyle="none",
+            zorder=6,
+            label=f"{' and '.join(words)}: {word} {nodes} ({masses} kg), "
+            f"{100 * placement.error[row]:.3g} %, MAC {placement.mac[row]:.4f}",
+        )
 
 
-def _draw_shift(shift: Shift, percent: FloatArray, places: FloatArray, axes: Axes) -> FloatArray:
-    """Values after a change, recomputed and by first order; the change recomputed."""
-    exact = _both(shift.exact_masses, shift.exact_frequencies)
-    line: dict[str, Any] = {"linestyle": "", "markersize": 9, "zorder": 4}
-    axes.plot(exact * percent, places, "D", color=VERMILION, label="after the change", **line)
-    first, words = _both(shift.masses, shift.frequencies), "after it, predicted by first order"
-    axes.plot(first * percent, places, "o", color="black", fillstyle="none", label=words, **line)
-    return exact
+def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axes:
+    """Draw the unbalance response of full rotor and small model over speed, and below it their difference.
+
+    Of the response the largest influence coefficient at each speed; its axes are returned.
+    """
+    from rotorid.base.plot_style import ABOVE_SCALE, legend_above, new_pair, plain, rad_s_above
+
+    each = (running.full, running.small, running.small - running.full)
+    full, small, difference = (np.abs(values).max(axis=(1, 2)) for values in each)
+    above, below = new_pair(5.6) if ax is None else ax
+    moving = running.speeds > 0
+    speeds = running.speeds[moving] * RPM
+    above.plot(speeds, full[moving], color=BLUE, linewidth=2.4, label="full rotor")
+    above.plot(
+        speeds,
+        small[moving],
+        color=VERMILION,
+        linestyle=DASHED,
+        linewidth=1.7,
+        label=f"{len(running.nodes)}-mass model",
+    )
+    sizes = np.concatenate((full[moving], small[moving]))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    if sizes.size:
+        above.set_yscale("log")
+        above.set_ylim(max(sizes.min() / 2, sizes.max() * 1e-6), sizes.max() * 2)
+    # 1 m per kg·m is 1 µm per g·mm.
+    above.set(ylabel="largest of all influence\ncoefficients, µm per g·mm (log)")
+    for panel in (above, below):
+        plain(panel)
+        panel.margins(x=0.01)
+        _bands(running, panel)
+    rad_s_above(above)
+    legend_above(above, borderaxespad=ABOVE_SCALE)
+    above.tick_params(labelbottom=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        percent = 100 * difference / full
+    below.plot(speeds, percent[moving], color=DARK, linewidth=1.6)
+    # On a scale of what counts: where the small model is left out, the difference may leave the picture.
+    shown = percent[moving & ~running.excluded & np.isfinite(percent)]
+    below.set_ylim(0.0, 1.25 * max(1.0, float(shown.max(initial=0.0))))
+    below.set(xlabel="speed, rpm", ylabel="difference, % of the\nrotor's largest entry")
+    return above
 
 
-def _both(masses: FloatArray, frequencies: FloatArray) -> FloatArray:
-    """Masses, kg, and frequencies, rpm, one after the other."""
-    return np.concatenate((masses, frequencies * RPM))
+def _bands(running: ResponseCost, ax: Axes) -> None:
+    """Shade what is left out around critical speeds, and mark these."""
+    low, high = float(running.speeds[0]), float(running.speeds[-1])
+    bands: list[tuple[float, float]] = []
+    for start, end in sorted(running.left_out):
+        if bands and start <= bands[-1][1]:  # one shade where bands overlap
+            bands[-1] = bands[-1][0], max(end, bands[-1][1])
+        else:
+            bands.append((start, end))
+    inside = [(max(a, low), min(b, high)) for a, b in bands if b > low and a < high]
+    for k, (a, b) in enumerate(inside):
+        words = None if k else f"left out, ±{100 * running.bands:.3g} % of a critical speed"
+        ax.axvspan(a * RPM, b * RPM, color="#000000", alpha=0.1, linewidth=0, label=words)
+    for critical in running.criticals.tolist():
+        if low <= critical <= high:
+            ax.axvline(critical * RPM, color=LINE, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
 
 
-def _short(value: float, digits: int = 4) -> str:
-    """So many digits, or all before the point; none of what does not vibrate."""
-    if np.isnan(value):
-        return "none"
-    return f"{value:.{digits}g}" if abs(value) < 10**digits - 0.5 else f"{value:.0f}"
+def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
+    """Draw the smallest logarithmic decrement of both models over speed; below 0 a motion grows."""
+    from rotorid.base.plot_style import ABOVE_SCALE, WIDTH, legend_above, new_axes, plain, rad_s_above
+
+    axes = new_axes((WIDTH, 4.2)) if ax is None else ax
+    plain(axes)
+    models = (
+        ("full rotor", cost.full_decrement, cost.full.threshold, BLUE, "-", 2.4),
+        (f"{len(cost.nodes)}-mass model", cost.small_decrement, cost.small.threshold, VERMILION, DASHED, 1.7),
+    )
+    known = np.concatenate([decrement[np.isfinite(decrement)] for _, decrement, *_ in models])
+    if known.size == 0:
+        axes.text(0.5, 0.5, "nothing oscillates", transform=axes.transAxes, ha="center", color=LINE)
+    for name, decrement, threshold, color, style, width in models:
+        text = f"{name}, unstable from {threshold * RPM:.0f} rpm" if threshold is not None else name
+        axes.plot(
+            cost.speeds * RPM,
+            np.where(np.isfinite(decrement), decrement, np.nan),
+            color=color,
+            linestyle=style,
+            linewidth=width,
+            marker="o" if cost.speeds.size < 12 else None,
+            label=text,
+        )
+        if threshold is not None:
+            axes.axvline(threshold * RPM, color=color, linewidth=1.0, linestyle=(0, (2, 2)), zorder=1)
+            mark: dict[str, Any] = {"color": color, "markeredgecolor": "white", "markersize": 9, "zorder": 6}
+            axes.plot([threshold * RPM], [0.0], "o" if style == "-" else "s", **mark)
+    low, high = _limits(known)
+    axes.set_ylim(low, high)
+    for name, decrement, _, color, *_ in models:
+        gone = np.isneginf(decrement)
+        if gone.any():
+            axes.plot(
+                cost.speeds[gone] * RPM,
+                np.full(np.count_nonzero(gone), low),
+                "v",
+                color=color,
+                markersize=5,
+                clip_on=False,
+                label=f"{name} runs away without oscillating",
+            )
+    axes.axhspan(low, 0.0, color=VERMILION, alpha=0.07, linewidth=0, zorder=0)
+    axes.axhline(0.0, color=DARK, linewidth=0.9)
+    note(axes, "below 0: a motion grows", (0.0, 0.0), (6, 6), xycoords="axes fraction", color=DARK)
+    axes.set(xlabel="speed, rpm", ylabel="smallest logarithmic decrement")
+    axes.margins(x=0.01)
+    rad_s_above(axes)
+    legend_above(axes, 2, borderaxespad=ABOVE_SCALE)
+    return axes
+
+
+def _limits(known: FloatArray) -> tuple[float, float]:
+    """Limits of the axis: 0 is in sight with room below; far above the usual size nothing is of interest."""
+    if known.size == 0:
+        return -1.0, 1.0
+    far = 20 * float(np.median(np.abs(known)))
+    bottom, top = min(0.0, float(known.min())), max(0.0, float(known.max()))
+    if far > 0:
+        bottom, top = max(bottom, -far), min(top, far)
+    span = max(top - bottom, 1e-9)
+    return bottom - 0.14 * span, top + 0.08 * span

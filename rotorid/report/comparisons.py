@@ -33,23 +33,6 @@ STABILITY = (
 """Rows on the stability of a model: words, key of the document, significant digits."""
 
 
-def trade_off_part(document: Document) -> Part:
-    """Other masses at the same nodes: frequencies against shapes."""
-    from markupsafe import Markup
-
-    key = "trade_off.alternatives"
-    names = [
-        Markup("{}: {} kg").format(found["model"], document.listed(f"{key}.{r}.masses_kg.*", decimals=2))
-        for r, found in enumerate(document["trade_off"]["alternatives"])
-    ]
-    note = (
-        "Masses that have all frequencies of the rotor (matching sets) can still move unlike it: choose by "
-        "the error and the MAC."
-    )
-    columns = _by_mode(document, key, "masses from", names)
-    return Part("Other masses at these nodes", tables=(Grid("", columns, note),))
-
-
 def methods_part(document: Document, methods: Methods) -> Part:
     """All methods of reduction at the same nodes."""
     found = document["methods"]["methods"]
@@ -150,12 +133,11 @@ def response_part(document: Document, response: ResponseCost) -> Part:
         said.append(
             Markup(
                 "The small model is within {} % of the largest influence coefficient at the same speed "
-                "(median {} %), within {} % of the largest of all speeds. Worst at {} rpm: reading at {}, "
+                "(median {} %). Worst at {} rpm: reading at {}, "
                 "unbalance at {}."
             ).format(
                 document.show("response.largest", 3, scale=100.0),
                 document.show("response.median", 3, scale=100.0),
-                document.show("response.largest_to_highest", 3, scale=100.0),
                 document.show("response.where.speed_rad_s", decimals=1, scale=RPM),
                 found["where"]["sensor"],
                 found["where"]["plane"],

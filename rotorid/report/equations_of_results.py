@@ -14,8 +14,7 @@ from rotorid.harmonic import Experiments, HarmonicModel, Identification
 from rotorid.harmonic.equation_error import linear_fit, told_as_one
 from rotorid.harmonic.parameter_combinations import CONSTANT, expression
 from rotorid.harmonic.polynomial import ONE, Monomial
-from rotorid.reduction import Reduction
-from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design
+from rotorid.reduction import Reduction, design
 from rotorid.regression.linear import stretch
 from rotorid.report.equations import BEHIND, Equations, Expression, Row
 from rotorid.timedomain import OdeModel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.rpm import RPM
@@ -12,9 +12,8 @@ from rotorid.report.comparisons import (
     placement_part,
     response_part,
     stability_part,
-    trade_off_part,
 )
-from rotorid.report.document import NOTHING, Cells, Document
+from rotorid.report.document import Cells, Document
 from rotorid.report.number_tables import Grid, Part, below, every_warning, numbered, words
 from rotorid.report.page import render_report
 from rotorid.report.rotor_description import rotor_sheet
@@ -46,7 +45,6 @@ def reduce_report(
         _masses(document, result),
         *_uncertain(document),
         *_what_if(document),
-        *_if("trade_off", document, trade_off_part),
         *_if("methods", document, methods_part, results["methods"]),
         *_if("response", document, response_part, results["response"]),
         *_if("stability", document, stability_part, results["stability"]),
@@ -130,37 +128,18 @@ def _condition(document: Document) -> str:
 
 def _uncertain(document: Document) -> list[Part]:
     """What errors of the inputs do to masses and frequencies."""
-    found = document.get("uncertainty")
-    if found is None:
+    if document.get("uncertainty") is None:
         return []
-    columns = []
-    for kind, unit, square, digits in (
-        ("masses", "kg", "kg2", 3),
-        ("natural_frequencies", "rad_s", "rad2_s2", 4),
-    ):
-        stem = f"uncertainty.{kind}"
-        part = [
+    columns = [
+        (
             words("quantity", _names(document)[kind]),
-            document.column("value", f"{stem}_{unit}.*", decimals=digits),
-            document.column("±", f"{stem}_std_{unit}.*", 3),
-        ]
-        if found["drawn"] is not None:
-            part.append(document.column("± of drawn inputs", f"uncertainty.drawn.{kind}_std_{unit}.*", 3))
-        shares = {name: each[f"{kind}_{square}"] for name, each in found["contributions"].items()}
-        part.append(words("from", (_largest_shares(shares, i) for i in range(len(part[0].cells)))))
-        columns.append(part)
-    note = "±: one standard deviation; from: the inputs that make up most of the variance."
-    return [Part("What errors of the inputs do", tables=(Grid("Uncertainty", below(*columns), note),))]
-
-
-def _largest_shares(contributions: Mapping[str, Sequence[float | None]], i: int) -> str:
-    """The inputs that make up most of the variance of quantity i, in words."""
-    shares = {name: values[i] or 0.0 for name, values in contributions.items()}
-    whole = sum(shares.values())
-    if whole <= 0:
-        return NOTHING
-    largest = sorted(shares, key=lambda name: -shares[name])[:3]
-    return ", ".join(f"{name} {100 * shares[name] / whole:.0f} %" for name in largest)
+            document.column("value", f"{kind}_{unit}.*", decimals=digits),
+            document.column("±", f"uncertainty.{kind}_std_{unit}.*", 3),
+        )
+        for kind, unit, digits in (("masses", "kg", 3), ("natural_frequencies", "rad_s", 4))
+    ]
+    table = Grid("Uncertainty", below(*columns), "±: one standard deviation, of redrawn inputs.")
+    return [Part("What errors of the inputs do", tables=(table,))]
 
 
 def _what_if(document: Document) -> list[Part]:
@@ -169,8 +148,7 @@ def _what_if(document: Document) -> list[Part]:
     masses, frequencies = (
         (
             words("quantity", _names(document)[kind]),
-            document.column("change", f"what_if.exact.{key}.*", 4, sign=True),
-            document.column("predicted to first order", f"what_if.first_order.{key}.*", 4, sign=True),
+            document.column("change", f"what_if.{key}.*", 4, sign=True),
         )
         for kind, key in (("masses", "masses_kg"), ("natural_frequencies", "frequencies_rad_s"))
     )
@@ -188,16 +166,13 @@ def _names(document: Document) -> dict[str, list[str]]:
 def _small(document: Document) -> Part:
     """What the small model keeps, in words."""
     small = document["small_model"]
-    said = [
+    words_of = [
         "Both planes: masses on a massless shaft, with the rotor's bearings, seals and gyroscopic effect."
     ]
-    if small["support_nodes"]:
-        nodes = listing(map(str, small["support_nodes"]), "and")
-        said.append(f"Places without mass that carry supports: nodes {nodes}.")
-    if small["modal_damping"]:
-        ratios = listing((f"{100 * ratio:g} %" for ratio in small["modal_damping"]), "and")
-        said.append(f"Modal damping of the first modes: {ratios} of critical.")
-    return Part("The small model to go on with", tuple(said))
+    bare = [node for node, mass in zip(small["nodes"], small["masses_kg"], strict=True) if not mass]
+    if bare:
+        words_of.append(f"Places without mass that carry supports: nodes {listing(map(str, bare), 'and')}.")
+    return Part("The small model to go on with", tuple(words_of))
 
 
 def _compliance(document: Document) -> Part:

@@ -92,7 +92,7 @@ def running_picture(response: ResponseCost) -> Drawing:
     """Response of both models, and their difference."""
 
     def draw(figure: Figure) -> None:
-        from rotorid.reduction.dynamics.comparison_plots import plot_running
+        from rotorid.reduction.plots import plot_running
 
         above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
         plot_running(response, [above, below])

@@ -6,9 +6,15 @@ Nothing here prints; the command line, reports, the demo, a notebook and a works
 from rotorid.commands import (
     Balance,
     BalanceOptions,
+    BearingEquilibria,
+    BearingsOptions,
     CampbellOptions,
     CriticalOptions,
     InfluenceOptions,
+    Motion,
+    MotionOptions,
+    PeriodicMotions,
+    PeriodicOptions,
     ResponseOptions,
     SplitOptions,
     ToleranceOptions,
@@ -16,9 +22,12 @@ from rotorid.commands import (
     TrialWeights,
     UnbalanceOptions,
     balance,
+    bearings,
     campbell,
     critical,
     influence,
+    motion,
+    periodic,
     response,
     split,
     tolerance,
@@ -27,16 +36,13 @@ from rotorid.commands import (
 )
 from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.outcome import Delivered
+from rotorid.commands.reduce import ReduceOptions, reduce
+from rotorid.commands.reduce_result import ReducedRotor
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
-from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
-from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
-from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
-from rotorid.workflows.reduce import ReduceOptions, reduce
-from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts

@@ -9,11 +9,11 @@ import typer
 
 from rotorid.commands.app import OUTPUT, STATE_SPACES, Destination, command
 from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
-from rotorid.workflows.reduce import ReduceOptions, View
-from rotorid.workflows.reduce import reduce as work
+from rotorid.commands.reduce import ReduceOptions, View
+from rotorid.commands.reduce import reduce as work
 
 if TYPE_CHECKING:
-    from rotorid.workflows.reduce_result import ReducedRotor
+    from rotorid.commands.reduce_result import ReducedRotor
 
 
 @command(
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     least={"masses": 1, "modes": 1},
     panels={
         "Input": "nodes modes speed measured compliance seals",
-        "Method": "rank place masses candidates methods trade_off",
+        "Method": "rank place masses candidates methods",
         "Errors": "errors what_if",
         "Small model": "response stability model state_space damping force both_planes keep_supports",
         OUTPUT: "view",
@@ -44,8 +44,8 @@ def reduce(
         typer.Option(
             "--model",
             metavar="FILE.toml",
-            help="Write the small model for `rotorid fit` and `identify`, a damper to be estimated at each "
-            "mass; with --keep-supports for `rotorid motion` and `periodic`.",
+            help="Write the small model for `rotorid motion`, `periodic`, `bearings`, and for `fit`, "
+            "`identify` and `simulate`, a damper to be estimated at each mass.",
         ),
     ] = None,
     state_space: Annotated[
@@ -83,20 +83,24 @@ def reduce(
     if options.keep_supports and state_space:
         raise ValueError("--state-space writes the rotor on its supports: leave out --keep-supports")
 
-    def found() -> ReducedRotor:
+    def work_of() -> ReducedRotor:
         masses = work(rotor, options)
         return masses.with_small() if rotor is not None and (model or state_space) else masses
 
     to.deliver(
         "reduction",
-        found,
-        draw=lambda found: found.figure(view),
+        work_of,
+        draw=lambda reduced: reduced.figure(view),
         more=(
-            (model, (".toml",), lambda found: found.model_bytes("" if rotor is None else rotor.name)),
+            (
+                model,
+                (".toml",),
+                lambda reduced: reduced.model_files(model or Path(), "" if rotor is None else rotor.name),
+            ),
             (
                 state_space,
                 STATE_SPACES,
-                lambda found: found.state_space_bytes((state_space or Path()).suffix.lower()),
+                lambda reduced: reduced.state_space_bytes((state_space or Path()).suffix.lower()),
             ),
         ),
     )

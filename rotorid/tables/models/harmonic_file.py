@@ -25,9 +25,10 @@ from rotorid.tables.models.shared_keys import (
     unlike,
     unlike_a_name,
 )
+from rotorid.tables.models.small_model_file import equation_data
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Key, Kind, take
-from rotorid.tables.reader.toml_file import Section, read_toml
+from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
@@ -110,7 +111,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     """
     path = Path(path)
     problems = Problems()
-    section = Section(str(path), problems.need(read_toml(path, problems)), problems)
+    section = Section(str(path), problems.need(equation_data(path, problems)), problems)
     section.limit_names()
     problems.stop()
     if "equations" not in section and any(key in section for key in _IN_TIME):

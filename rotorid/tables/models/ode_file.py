@@ -25,9 +25,10 @@ from rotorid.tables.models.shared_keys import (
     unlike,
     unlike_a_name,
 )
+from rotorid.tables.models.small_model_file import equation_data
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
-from rotorid.tables.reader.toml_file import Section, read_toml
+from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.value_kinds import FLAG, number, table
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def read_ode_model(path: str | Path) -> OdeModel:
     """
     path = Path(path)
     problems = Problems()
-    section = Section(str(path), problems.need(read_toml(path, problems)), problems)
+    section = Section(str(path), problems.need(equation_data(path, problems)), problems)
     section.limit_names()
     problems.stop()
     form = read_time_form(section, problems)

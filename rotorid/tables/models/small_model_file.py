@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import tomllib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fem import GRAVITY, KINDS
+from fem import GRAVITY, KINDS, Motion
 from fem.forces import FORCES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
+from rotorid.tables.models.model_writing import ode_model_bytes
 from rotorid.tables.reader import units
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Key, Kind, take
@@ -24,7 +27,7 @@ from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.reader.value_kinds import TURN, each, number, plain_number
 from rotorid.tables.rotor.bearing import KEYS_OF, NODE, read_support
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, force_tables, read_force
-from rotorid.tables.rotor.rotor_writing import support_table
+from rotorid.tables.rotor.rotor_writing import bearing_table_bytes, support_table
 
 _HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
@@ -60,6 +63,14 @@ def _nodes(section: Section, key: str) -> tuple[int, ...] | None:
 
 def _apart(section: Section) -> Section:
     return section
+
+
+def _table(section: Section, key: str) -> dict[str, Any] | None:
+    value = section.take(key)
+    if isinstance(value, dict):
+        return value
+    section.complain(key, "a table, [equations]", value=False)
+    return None
 
 
 _ROW = {"type": "array", "items": {"type": "number"}, "minItems": 1}
@@ -98,6 +109,13 @@ SMALL_MODEL = (
     *(Key(kind.name, each(KEYS_OF_FORCE[kind.name], _apart), kind.about, default=()) for kind in FORCES),
     Key("unbalance", each(UNBALANCE, _apart), "unbalance at a node; several are added", default=()),
     Key("bow", each(BOW, _apart), "bow of the shaft, at three nodes or more", default=()),
+    Key(
+        "equations",
+        Kind(_table, {"type": "object"}),
+        "for `fit`, `identify` and `simulate`: `speed_rad_s`, `both_planes`, and keys of an equation file, "
+        "such as `inputs` and `[equations.estimate]`, where `d_x7` is a damper at x7",
+        default={},
+    ),
 )
 _ATTRIBUTES = {item.name: key.name for item, key in zip(fields(SmallModel), ARRAYS, strict=False)}
 
@@ -107,6 +125,57 @@ def is_small_model(path: Path) -> bool:
     if path.suffix.lower() != ".toml":
         return False
     return not {"masses_kg", "shaft_stiffness_N_per_m"}.isdisjoint(read_toml(path, Problems()) or ())
+
+
+def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Motion:
+    """At a speed, rad/s; of one plane where nothing couples both and they are not asked for."""
+    motion = model.motion(speed)
+    y = np.array(["y" in name for name in motion.coordinates])
+    across = np.ix_(~y, y)
+    plane = "both" if both_planes or motion.C[across].any() or motion.K[across].any() else "x"
+    with suppress(ValueError):  # damped supports stay, as states of first order
+        return model.motion(speed, plane, condensed=True)
+    return model.motion(speed, plane)
+
+
+def equation_data(path: Path, problems: Problems) -> dict[str, Any] | None:
+    """What stands in an equation file; of a small model its linear equations and `[equations]`.
+
+    None with a problem.
+    """
+    data = read_toml(path, problems)
+    if data is None or not is_small_model(path):
+        return data
+    model, more = read_small_model(path), {**data.get("equations", {})}
+    if model.forces:
+        problems.add(str(path), None, None, None, "linear forces alone; `rotorid motion` follows the others")
+        return None
+    speed, both = more.pop("speed_rad_s", 0.0), more.pop("both_planes", False)
+    try:
+        motion = linear_equations(model, speed, both)
+        inputs = more.get("inputs", [])
+        dampers = {f"d_{name}": name for name in motion.coordinates}
+        estimate = more.get("estimate", {})
+        made = ode_model_bytes(
+            motion,
+            {name: estimate[key] for key, name in dampers.items() if key in estimate},
+            inputs=[name for name in inputs if name.removeprefix("f_") in motion.coordinates],
+            outputs=[
+                f"{axis}{node}"
+                for axis in "xy"
+                for node in model.massive
+                if f"{axis}{node}" in motion.coordinates
+            ],
+        )
+    except (ValueError, TypeError) as error:
+        problems.add(str(path), None, "equations", None, str(error))
+        return None
+    equations = tomllib.loads(made.decode())
+    del equations["schema_version"]
+    for key, value in more.items():
+        added = isinstance(value, dict) and key != "outputs"
+        equations[key] = {**equations.get(key, {}), **value} if added else value
+    return equations
 
 
 def read_small_model(path: str | Path) -> SmallModel:
@@ -180,7 +249,21 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
     Raises
     ------
     ValueError
-        For a support whose coefficients depend on speed: they stand in tables of their own.
+        For a support whose coefficients depend on speed: they stand in a file of their own.
+    """
+    path = Path("small.toml")
+    files = small_model_files(path, model, comments)
+    if len(files) > 1:
+        raise ValueError("coefficients of a support depend on speed: they stand in a file of their own")
+    return files[path]
+
+
+def small_model_files(
+    path: Path, model: SmallModel, comments: Sequence[str] = (), equations: Mapping[str, Any] | None = None
+) -> dict[Path, bytes]:
+    """All files of a small model, its own last: tables of supports over speed stand beside it.
+
+    `equations` is the table of that name.
     """
     import tomli_w
 
@@ -192,13 +275,12 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
         elif array.any() or name == "stiffness":
             lines += [f"{key} = [", *(f"  {row}," for row in array.tolist()), "]"]
     tables: dict[str, list[dict[str, Any]]] = {}
-    for support in model.supports:
-        if support.speeds:
-            raise ValueError(
-                f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it "
-                f"out, and write [[{support.kind}]] with node and table, its file, into the small model"
-            )
-        tables.setdefault("bearing", []).append(support_table(support, None, mixed=True))
+    files: dict[Path, bytes] = {}
+    for count, support in enumerate(model.supports, start=1):
+        beside = path.with_name(f"{path.stem}_{support.kind}_{count}.csv") if support.speeds else None
+        if beside is not None:
+            files[beside] = bearing_table_bytes(support)
+        tables.setdefault("bearing", []).append(support_table(support, beside, mixed=True))
     tables |= force_tables(model.forces)
     for name, size in (("unbalance", "unbalance_kg_m"), ("bow", "bow_m")):
         tables[name] = [
@@ -207,4 +289,6 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
         ]
     for name, sections in tables.items():
         lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
-    return ("\n".join(lines) + "\n").encode("utf-8")
+    if equations:
+        lines.append(f"\n{tomli_w.dumps({'equations': equations}).strip()}")
+    return {**files, path: ("\n".join(lines) + "\n").encode("utf-8")}

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem import Rotor
 from rotorid.base.complex_numbers import polar
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, read_table
 from rotorid.tables.reader.problems import Problems

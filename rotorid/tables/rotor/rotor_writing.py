@@ -124,7 +124,7 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     for number, support in enumerate(rotor.supports, start=1):
         table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv") if support.speeds else None
         if table is not None:
-            files[table] = _bearing_table(support)
+            files[table] = bearing_table_bytes(support)
         section = "bearing" if mixed else support.kind
         document.setdefault(section, []).append(support_table(support, table, mixed=mixed))
     for name in rotor.stations:
@@ -228,7 +228,8 @@ def support_table(support: Support, table: Path | None, *, mixed: bool) -> dict[
     return section
 
 
-def _bearing_table(support: Support) -> bytes:
+def bearing_table_bytes(support: Support) -> bytes:
+    """The table of a support whose coefficients depend on speed."""
     # An isotropic entry among others is a matrix too.
     full = {q for q in SCALARS if any(isinstance(value, tuple) for value in getattr(support, q))}
     rows = []

@@ -10,7 +10,7 @@ from fem import Rotor
 from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems

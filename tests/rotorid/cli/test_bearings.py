@@ -124,3 +124,39 @@ def test_the_linear_rotor_does_not_overwrite_its_own_shaft(cli, tmp_path):
     outcome = cli("bearings", tmp_path / "rotor.toml", *SPEEDS, "--output", tmp_path / "linear.toml")
     assert outcome.code == 2
     assert "linear_shaft.csv: this is an input of the command" in outcome.err
+
+
+RIGID = """
+nodes = [1, 2]
+masses_kg = [20, 20]
+shaft_stiffness_N_per_m = [[0, 0], [0, 0]]
+[[journal_bearing]]
+node = 1
+length_mm = 30
+diameter_mm = 100
+clearance_um = 100
+viscosity_mPa_s = 20
+[[journal_bearing]]
+node = 2
+length_mm = 30
+diameter_mm = 100
+clearance_um = 100
+viscosity_mPa_s = 20
+"""
+
+
+def test_a_rigid_rotor_in_two_films_is_a_small_model(cli, tmp_path):
+    """Each half of it is the short bearing of Routh and Hurwitz: M = m c Ω² / W = 7.18997 at ε = 0.2."""
+    (tmp_path / "rigid.toml").write_text(RIGID)
+    output = tmp_path / "linear.toml"
+    found = cli(
+        "bearings", tmp_path / "rigid.toml", "--speeds", "100:1200:20", "--json", "--output", output
+    ).json
+    lost = found["stability"]["threshold_rad_s"]
+    at = pd.DataFrame(found["bearings"]).query("node == 1")
+    e = np.interp(lost, at["speed_rad_s"], at["eccentricity"])
+    mass = 1e-4 * lost**2 / 9.80665
+    assert mass == pytest.approx(np.interp(e, [0.1, 0.2, 0.5], [7.51461, 7.18997, 6.46040]), rel=0.01)
+    assert found["stability"]["whirl_ratio"] == pytest.approx(0.51, abs=0.01)
+    orbit = cli("motion", output, "--speed", "300", "--time", "0.3", "--displaced", "1=1um", "--json").json
+    assert orbit["steady"] is False

@@ -9,7 +9,7 @@ import pytest
 
 import fem
 from fem import JournalBearing, MuszynskaSeal
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
 from rotorid.workflows import MotionOptions, motion
@@ -64,6 +64,31 @@ def test_the_table_agrees_with_the_document(cli, unbalance, tmp_path):
         np.testing.assert_allclose(table[f"{axis}_22_um"], 1e6 * z, rtol=1e-12)
 
 
+def test_the_document_has_what_the_first_sentence_says(cli, unbalance):
+    given = ("motion", ROTOR, "--run-up", "3000:2000rpm", "--time", "0.3", "--unbalance", unbalance)
+    furthest = cli(*given, "--json").json["furthest"]
+    first = " ".join(cli(*given).out.split())
+    assert f"at node {furthest['node']}, {1e6 * furthest['distance_m']:.1f}" in first
+    assert f"{furthest['speed_rad_s'] * 30 / np.pi:.6g} rpm" in first
+    end = cli("motion", ROTOR, *SHORT, "--displaced", "12=20um", "--json").json
+    assert {"steady", "trend", "change", "at_rest", "chaotic", "whirl_frequency_rad_s"} <= {*end}
+
+
+@pytest.mark.parametrize("acceleration", ["10", "10rad/s/s", "10rad/s²", "10rad/s2"])
+def test_an_acceleration_in_rad_s_as_a_run_up(cli, acceleration):
+    found = cli("motion", ROTOR, "--run-up", "300:303", "--acceleration", acceleration, "--json").json
+    assert found["time_s"][-1] == pytest.approx(0.3)
+
+
+def test_a_motion_that_grows_is_not_asked_for_more_time_to_settle(cli):
+    """The shaft of this rotor whips above 6407 rpm."""
+    given = ("motion", ROTOR, "--displaced", "12=1um", "--time", "2", "--rate", "2000")
+    assert "it grows, to a limit cycle or to a wall" in " ".join(
+        cli(*given, "--speed", "6600rpm").out.split()
+    )
+    assert "it dies down" in " ".join(cli(*given, "--speed", "4000rpm").out.split())
+
+
 def test_more_modes_change_little(unbalance):
     options = {"speed": "4000rpm", "time": 0.1, "unbalance": unbalance, "sensors": "12", "rate": 2000.0}
     few, many, all_of_them = (motion(ROTOR, MotionOptions(**options, modes=modes)) for modes in (4, 12, 24))
@@ -93,6 +118,7 @@ def test_a_start_in_steady_motion_has_no_transient(unbalance):
         (("--time", "1"), "one of --speed and --run-up is needed"),
         (("--run-up", "4000rpm", "--time", "1"), "use FIRST:LAST"),
         (("--run-up", "1000:2000rpm", "--acceleration", "3rpm"), "300rpm/s"),
+        (("--run-up", "1000:2000rpm", "--acceleration", "3rad/s"), "300rpm/s"),
         (("--run-up", "1000:2000rpm", "--time", "1", "--acceleration", "3rpm/s"), "one of --time and --acc"),
         (("--run-up", "1000:2000rpm", "--acceleration", "0rpm/s"), "must be above 0"),
         ((*SHORT, "--acceleration", "3rpm/s"), "belongs to --run-up"),

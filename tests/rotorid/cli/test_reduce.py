@@ -9,7 +9,7 @@ from cases import each_of
 from scipy.io import loadmat
 
 import fem
-from rotorid import read_ode_model, read_rotor
+from rotorid import read_ode_model, read_rotor, small_model
 from rotorid import reduce as reduce_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import read_small_model
@@ -81,9 +81,6 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
         ("methods", "--methods"),
         ("response", "--response"),
         ("stability", "--stability"),
-        ("trade-off", "--trade-off"),
-        ("errors", "--errors"),
-        ("what-if", "--what-if"),
     ],
 )
 def test_a_view_needs_what_it_draws(cli, tmp_path, view, ask):
@@ -140,7 +137,8 @@ def test_the_mass_of_a_pedestal_counts_once():
     feet, springs = (reduce_rotor(rotor, (7, 12, 18), 2) for rotor in (on_feet, on_springs))
     np.testing.assert_allclose(feet.masses.values, springs.masses.values, rtol=1e-12)
     assert "masses of the pedestals are left out" in feet.warnings[0]
-    own = np.unique(np.round(np.abs(feet.small().eigenvalues(0.0)), 6))
+    small = small_model(on_feet, (7, 12, 18), feet.masses.solution)
+    own = np.unique(np.round(np.abs(small.state_space().eigenvalues), 6))
     whole = fem.critical_speeds(on_feet, 2).frequencies
     np.testing.assert_allclose(own[:2], whole, rtol=0.005)
     with pytest.raises(ValueError, match="hold the masses of the pedestals"):
@@ -206,8 +204,8 @@ def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeyp
 
 def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
     document = cli("reduce", MOTION / "rotor.toml", "--place", "book", "--keep-supports", "--json").json
-    assert document["motion_model"]["nodes"] == sorted([2, 22, *document["nodes"]])
-    assert sum(document["motion_model"]["weight_N"]) == pytest.approx(9.80665 * 558.5346506833)
+    assert document["small_model"]["nodes"] == sorted([2, 22, *document["nodes"]])
+    assert sum(document["small_model"]["weight_N"]) == pytest.approx(9.80665 * 558.5346506833)
     ranked = cli("reduce", MOTION / "rotor.toml", "--rank", "--masses", 2, "--keep-supports", "--json").json
     assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
     path = tmp_path / "small.toml"
@@ -216,6 +214,73 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
     model = read_small_model(path)
     assert model.supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
     assert model.damping.any()
+
+
+@pytest.mark.parametrize("kept", [(), ("--keep-supports",)])
+def test_bearings_over_speed_stand_beside_a_small_model_that_moves(cli, tmp_path, kept):
+    """The compressor's tables go with it, whether or not its masses are found on rigid supports."""
+    path = tmp_path / "small.toml"
+    assert cli("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--model", path, *kept).code == 0
+    assert {each.suffix for each in tmp_path.iterdir()} == {".toml", ".csv"}
+    model = read_small_model(path)
+    assert all(support.speeds for support in model.supports if support.kind == "bearing")
+    found = cli(
+        "motion", path, "--speed", "3000rpm", "--time", "0.2s", "--displaced", "14=5um", "--json"
+    ).json
+    assert found["positions_m"]["14"]
+    assert cli("bearings", path, "--speeds", "3000rpm").code == 2  # no film
+
+
+def test_a_small_model_is_fitted_and_simulated(cli, tmp_path):
+    """The same file as `motion` reads: a damper at each mass is estimated."""
+    path = tmp_path / "small.toml"
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--model", path).code == 0
+    model = read_ode_model(path)
+    assert [*model.parameters] == ["d_x7", "d_x12", "d_x18"]
+    assert cli("motion", path, "--speed", "3000rpm", "--time", "0.1s", "--displaced", "12=5um").code == 0
+    given = ("--with", "d_x7=0,d_x12=1500,d_x18=0", "--times", "0:0.1:0.01", "--json")
+    assert cli("simulate", path, *given).code == 0
+    start = "[equations.initial]\nx12 = 1e-4\n"
+    path.write_text(path.read_text(encoding="utf-8") + start, encoding="utf-8")
+    moved = cli("simulate", path, *given, "--output", tmp_path / "s.csv")
+    assert moved.code == 0, moved.err
+    assert "0.0001" in (tmp_path / "s.csv").read_text()
+
+
+def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equations_gives(cli, tmp_path):
+    """The sample's matrices are those of this reduction; there the mass in the middle is estimated, too."""
+    path, sample = tmp_path / "small.toml", sample_data() / "fit" / "run_down"
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--model", path).code == 0
+    text = path.read_text(encoding="utf-8").replace(
+        "[equations.estimate]", "[equations.estimate]\nblow = 0.04"
+    )
+    more = """
+    [equations.initial]
+    v_x12 = "blow"
+    [equations.outputs]
+    drive_end = "1e6*x7"
+    middle = "1e6*x12"
+    free_end = "1e6*x18"
+    """
+    path.write_text(text + more, encoding="utf-8")
+    found = cli("fit", path, sample / "record.csv", "--json")
+    assert found.code == 0, found.err
+    equations = (sample / "model.toml").read_text(encoding="utf-8")
+    mass = reduce_rotor(read_rotor(ROTOR), (7, 12, 18), 2).masses.solution[1]
+    equations = equations.replace("m_x12 = 180.0\n", "").replace("m_x12 = [1, inf]\n", "")
+    other = tmp_path / "equations.toml"
+    other.write_text(equations.replace('"m_x12"', repr(float(mass))), encoding="utf-8")
+    expected = cli("fit", other, sample / "record.csv", "--json").json["parameters"]
+    assert {*found.json["parameters"]} == {*expected}
+    for name, one in expected.items():
+        assert found.json["parameters"][name]["value"] == pytest.approx(one["value"], rel=1e-4), name
+
+
+def test_what_is_not_linear_is_not_fitted(cli):
+    small, record = MOTION / "small.toml", sample_data() / "fit" / "run_down" / "record.csv"
+    refused = cli("fit", small, record)
+    assert refused.code == 2
+    assert "`rotorid motion` follows the others" in refused.err
 
 
 @each_of(
@@ -233,10 +298,6 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
         ),
         ((ROTOR, "--nodes", "7", "--keep-supports", "--state-space", "m.npz"), "leave out --keep-supports"),
         (("--compliance", ROTOR, "--measured", ROTOR, "--keep-supports"), "--keep-supports needs a rotor"),
-        (
-            (COMPRESSOR, "--nodes", "8,13", "--keep-supports", "--model", "m.toml"),
-            "the bearing at node 4 depend on speed: leave it out, and write [[bearing]] with node and table",
-        ),
     ],
 )
 def test_kept_supports_are_refused(cli, tmp_path, monkeypatch, arguments, message):

@@ -10,8 +10,7 @@ from scipy.optimize import root
 import fem
 from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
 from rotorid.motion.equilibrium import equilibria, equilibrium
-from rotorid.motion.rotor_system import rotor_system
-from rotorid.motion.system import system
+from rotorid.motion.system import rotor_system, system
 
 RPM = np.pi / 30
 BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
@@ -161,7 +160,6 @@ def test_a_sag_on_other_forces_is_that_of_their_formulas():
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=1e6)], 50.0, "the squeeze film at node 1 under "
          "its weight: it drops by 0.5 mm there, the clearance is 0.1 mm"),
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=5e6)], 50.0, "drops by 0.1 mm there, the clear"),
-        ([CubicSpring(1, "", 1e6), Stop(1, "ring", 2e-4, 1e8)], 50.0, "touches the stop 'ring' at node 1"),
         ([MuszynskaSeal(1, "", 1e5, 10.0, 0.0, 0.4, 1e-4, stiffness_exponent=0.0)], 50.0,
          "no equilibrium is found"),
         ([Stop(1, "ring", 2e-4, 1e8)], 50.0, "nothing holds the rotor"),
@@ -171,6 +169,15 @@ def test_a_sag_on_other_forces_is_that_of_their_formulas():
 def test_what_has_no_equilibrium_is_refused_with_node_and_reason(forces, speed, words):
     with pytest.raises(ValueError, match=words):
         equilibrium(mass_on(forces, 500.0), speed)
+
+
+def test_a_shaft_rests_on_a_stop():
+    """k z + k_s (z − gap) = W, without friction; and it is told which stop."""
+    ring = Stop(1, "ring", 2e-4, 1e8)
+    resting = equilibrium(mass_on([CubicSpring(1, "", 1e6), ring], 500.0), 50.0)
+    np.testing.assert_allclose(resting.q, [0.0, -(500.0 + 1e8 * 2e-4) / 1.01e8], rtol=1e-9, atol=1e-15)
+    assert resting.touched == (ring,)
+    assert equilibrium(mass_on([CubicSpring(1, "", 1e7), ring], 500.0), 50.0).touched == ()
 
 
 def test_one_journal_bearing_alone_holds_no_rotor():

@@ -9,10 +9,8 @@ from scipy.optimize import brentq
 
 from fem import CubicSpring, InternalDamping, JournalBearing, Motion, SqueezeFilm, Stop
 from fem.forces import law, tables
-from rotorid.motion.bifurcation_diagram import draw_bifurcations
-from rotorid.motion.continuation import DOUBLING, FOLD, HOPF, TORUS
-from rotorid.motion.periodic import periodic_motion
-from rotorid.motion.periodic_table import Readings
+from rotorid.motion.periodic import DOUBLING, FOLD, HOPF, TORUS, Readings, periodic_motion
+from rotorid.motion.plots import draw_bifurcations
 from rotorid.motion.system import system
 
 SPEEDS = np.array([0.01, 1e4])
@@ -51,14 +49,13 @@ def crossings(found, speed):
 
 def exact(problem, found, speed, near):
     """The motion at a speed that is nearest to an amplitude: Newton's method from the branch's own point."""
-    from rotorid.motion.collocation import Periodic
-    from rotorid.motion.continuation import at_speed
+    from rotorid.motion.periodic import Periodic
 
     points = [p for branch in found.branches for p in branch.points]
     sizes = [abs(np.hypot(*p.orbit.ends.T).max() - near) + abs(p.orbit.speed - speed) for p in points]
     guess = points[int(np.argmin(sizes))].orbit
-    start = at_speed(Periodic(problem, 1), guess)
-    return Periodic(problem, 1).solve(guess, start.rows, np.array([speed]))[0]
+    sought = Periodic(problem, 1)
+    return sought.solve(guess, sought.at_speed(guess)[0], np.array([speed]))[0]
 
 
 def test_three_circular_orbits_in_a_squeeze_film():
@@ -185,35 +182,20 @@ def by_size(values):
 
 
 @pytest.mark.full
-def test_a_period_doubling_and_its_branch_against_integration():
+def test_period_doublings_against_integration():
     damping = 0.04
     problem = disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=damping, **SAGGING)
-    found = periodic_motion(problem, 2.1, 2.7, subsynchronous=2)
-    main, double = found.branches
+    found = periodic_motion(problem, 2.1, 2.7)
+    (main,) = found.branches
     assert [b.kind for b in main.bifurcations] == [DOUBLING, DOUBLING]
     for bifurcation in main.bifurcations:
         away, multipliers = monodromy(bifurcation.point.orbit, SAGGING, damping)
         assert away < 1e-7
         assert min(abs(multipliers + 1)) < 1e-6
-    assert double.kind == "period 2"
-    assert "joins" in double.ended
-    for point in (main.points[len(main.points) // 2], *double.points[5:-5:40]):
-        away, multipliers = monodromy(point.orbit, SAGGING, damping)
-        assert away < 1e-5
-        np.testing.assert_allclose(by_size(multipliers), by_size(point.multipliers), atol=3e-5)
-    # long integration inside comes to the motion of two revolutions
-    speed = 2.25
-    end = solve_ivp(
-        duffing, (0, 800 * np.pi / speed), [1e-3, -1, 0, 0], "DOP853", rtol=1e-10, atol=1e-11,
-        args=(speed, SAGGING, damping), t_eval=np.arange(796, 801, 2) * np.pi / speed,
-    ).y.T  # fmt: skip
-    assert abs(end[0] - end[2]).max() < 1e-6
-    assert abs(end[0] - end[1]).max() > 0.1
-    stable = [p for p in double.points if p.outside == 0]
-    states = np.array([p.orbit.ends[k] for p in stable for k in (0, len(p.orbit.velocities) // 2)])
-    speeds = np.array([p.orbit.speed for p in stable for _ in (0, 1)])
-    near = np.abs(speeds - speed) < 0.03
-    assert min(np.abs(states[near] - end[0, :2]).max(axis=1)) < 0.1
+    point = main.points[len(main.points) // 2]
+    away, multipliers = monodromy(point.orbit, SAGGING, damping)
+    assert away < 1e-5
+    np.testing.assert_allclose(by_size(multipliers), by_size(point.multipliers), atol=3e-5)
 
 
 def test_a_neimark_sacker_bifurcation_against_integration():
@@ -252,10 +234,7 @@ def test_hopf_point_of_a_rigid_rotor_in_a_short_bearing(critical, eccentricity, 
     (point,) = found.branches[0].bifurcations
     assert point.kind == HOPF
     assert point.point.orbit.speed == pytest.approx(NOMINAL, rel=3e-6)
-    (row,) = [
-        c.values for c in Readings(found, ("1",), np.eye(2)[:1]).bifurcations() if c.name == "whirl_ratio"
-    ]
-    assert row[0] == pytest.approx(whirl, abs=1e-5)
+    assert point.frequency / point.point.orbit.speed == pytest.approx(whirl, abs=1e-5)
     assert any("no unbalance" in warning for warning in found.warnings)
 
 
@@ -363,7 +342,7 @@ def test_what_cannot_be_sought_is_refused(low, high, options, words):
 
 
 def test_too_few_steps_are_said(monkeypatch):
-    monkeypatch.setattr("rotorid.motion.continuation._MOST_STEPS", 4)
+    monkeypatch.setattr("rotorid.motion.periodic.MOST_STEPS", 4)
     monkeypatch.setattr("rotorid.motion.periodic.LEAST_STEPS", 4)
     found = periodic_motion(damper(0.05, 0.3), 0.5, 1.5)
     assert any("too few steps" in warning for warning in found.warnings)
@@ -383,24 +362,26 @@ def test_motions_that_no_branch_shows_are_said():
     """A period doubling and self-excited whirl, not asked for."""
     damping = 0.04
     problem = disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=damping, **SAGGING)
-    (told,) = periodic_motion(problem, 2.1, 2.7).warnings
-    assert "2 revolutions only (--subsynchronous 2)" in told
+    told = periodic_motion(problem, 2.1, 2.7).warnings
+    assert "motion in time comes again after 2 revolutions only, at 21.5318 and 22.9183 rpm" in told
     given = [CubicSpring(1, "", 1.0, 0.5), InternalDamping(1, "", 0.1)]
     told = periodic_motion(disc(1.0, given, damping=0.1), 1.0, 3.0).warnings[-1]
     assert "(--limit-cycle), at 23.8732 and 28.6479 rpm" in told  # 2.5 and 3 rad/s; below 2 it rests
 
 
+@pytest.mark.parametrize("cubic", [[], [CubicSpring(1, "", 0.0, 1.0)]])
 @pytest.mark.parametrize("external", [20.0, 8.0])
-def test_the_whirl_that_begins_is_told_by_its_shape(external):
+def test_the_whirl_that_begins_is_told_by_its_shape(external, cubic):
     """c_i ω / (c_i + c_e): the natural frequency by the speed, which the multiplier does not tell."""
     internal, stiffness, mass = 40.0, 1e5, 5.0
     natural = np.sqrt(stiffness / mass)
     damping = [InternalDamping(1, "", damping=internal)]
-    problem = disc(mass, damping, damping=external, stiffness=(stiffness,) * 2, unbalance=1e-4)
+    problem = disc(mass, [*damping, *cubic], damping=external, stiffness=(stiffness,) * 2, unbalance=1e-4)
     found = periodic_motion(problem, 1.05 * natural, 1.1 * natural * (1 + external / internal))
-    (row,) = Readings(found, ("1",), np.eye(2)[:1]).to_dict()["bifurcations"]
-    assert row["bifurcation"] == TORUS
-    assert row["whirl_ratio"] == pytest.approx(internal / (internal + external), rel=1e-4)
+    (lost,) = found.branches[0].bifurcations
+    assert lost.kind == TORUS
+    ratio = lost.frequency / lost.point.orbit.speed
+    assert ratio == pytest.approx(internal / (internal + external), rel=1e-4)
 
 
 def test_time_that_runs_out_leaves_what_is_known(monkeypatch):

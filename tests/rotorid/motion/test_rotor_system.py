@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fem import Disc, Model, Rotor, Support, static_deflection, unbalance_response
-from rotorid.motion.rotor_system import rotor_system
+from rotorid.motion.system import rotor_system
+from rotorid.reduction import SmallModel
 
 TABLE = Support(
     7,
@@ -75,6 +76,20 @@ def test_what_is_impossible():
     with pytest.raises(ValueError, match="its table holds"):
         rotor_system(rotor(), 10.0, 390.0)
     with pytest.raises(ValueError, match="ascend"):
-        rotor_system(rotor(), 200.0, 200.0)
+        rotor_system(rotor(), 200.0, 190.0)
     with pytest.raises(ValueError, match="node 9"):
         rotor_system(rotor(), 110.0, 390.0, unbalance={9: 1e-3})
+
+
+def test_nodes_without_mass_and_damping_follow_the_others():
+    """A mass between two springs of k: its weight, and that of the ends, sag as in the whole model."""
+    K = 1e6 * np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]])
+    supports = [Support(1, 2e6), Support(3, 3e6)]
+    small = SmallModel((1, 2, 3), [0.0, 10.0, 0.0], [5.0, 90.0, 7.0], K, supports=supports)
+    made = rotor_system(small, 0.0, 100.0, unbalance={2: 1e-3})
+    assert made.coordinates == ("x2", "y2")
+    whole = small.motion(0.0)
+    sag = np.linalg.solve(whole.K[3:, 3:], [-5.0, -90.0, -7.0])
+    np.testing.assert_allclose(np.linalg.solve(made.K[0], made.weight), [0.0, sag[1]], atol=1e-15)
+    np.testing.assert_allclose(made.M, 10.0 * np.eye(2))
+    np.testing.assert_allclose(made.unbalance, [1e-3, -1e-3j])

@@ -7,11 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fem
-from fem import CubicSpring, JournalBearing, MuszynskaSeal
+from fem import CubicSpring, JournalBearing, MuszynskaSeal, Stop
 from rotorid.motion.run import MotionRun, run
-from rotorid.motion.start import begin
-from rotorid.motion.steady_end import steady_end
-from rotorid.motion.synchronous_part import synchronous_part
+from rotorid.motion.steady import begin, steady_end, synchronous_part
 from rotorid.motion.system import system
 
 REST = np.zeros(2), np.zeros(2)
@@ -107,7 +105,7 @@ def rotor():
 
 def test_the_steady_end_on_linear_supports_is_the_response():
     from fem import unbalance_response
-    from rotorid.motion.rotor_system import rotor_system
+    from rotorid.motion.system import rotor_system
 
     speed, unbalance = 200.0, {3: 1e-3 * np.exp(0.4j)}
     made = rotor_system(rotor(), speed, 210.0, unbalance=unbalance, gravity=0.0)
@@ -196,9 +194,32 @@ def test_above_its_critical_mass_a_rotor_ends_on_a_limit_cycle():
 def test_the_end_is_not_called_steady_while_it_changes():
     end = steady_end(moved(7.0, "pressure", 40))
     assert not end.steady
-    assert end.trend
+    assert end.trend == "decays"
     assert not end.periodic
     assert end.change > 0.01
+
+
+@pytest.mark.parametrize(
+    ("speed", "load", "chaotic"), [(1.1, 1.2, True), (0.9, 0.5, True), (1.6, 0.0, False), (2.4, 0.0, False)]
+)
+def test_a_chaotic_rub_is_not_called_steady(speed, load, chaotic):
+    """A disc in a stop with friction; the others beat, which is steady, and do not come again either."""
+    ring = Stop(1, "", gap=1.0, stiffness=20.0, damping=0.1, friction=0.1)
+    made = one_mass(1.0, 0.1, 1.0, forces=[ring], unbalance={1: 0.4}, weight={"y1": -load})
+    q, v, _ = begin(made, speed)
+    end = steady_end(run(made, (speed, speed), 150 * 2 * np.pi / speed, (q, v)))
+    assert np.isnan(end.period)
+    assert end.chaotic is chaotic
+    assert end.steady is not chaotic
+    assert not end.periodic
+
+
+@pytest.mark.parametrize(("damping", "trend"), [(0.01, "decays"), (-0.01, "grows")])
+def test_what_dies_down_and_what_grows_are_told_apart(damping, trend):
+    made = one_mass(1.0, damping, 1.0)
+    end = steady_end(run(made, (2.0, 2.0), 100.0, (np.array([1e-3, 0.0]), np.zeros(2))))
+    assert not end.steady
+    assert end.trend == trend
 
 
 def told(z, turns=100.0, speed=100.0, rate=64):
@@ -229,7 +250,7 @@ def test_what_is_called_steady(z, steady, trend, turns, rate):
     end = steady_end(told(z, rate=rate))
     assert end.steady is steady
     if trend is not None:
-        assert end.trend is trend
+        assert bool(end.trend) is trend
     if turns is None:
         assert not end.periodic or end.at_rest
     elif rate > 9:
@@ -325,7 +346,7 @@ def test_a_motion_that_begins_beyond_a_wall_ends_at_once():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"speeds": (0.0, 50.0)}, "speed 0: the film of the journal bearing 'drive end' at node 1"),
+        ({"speeds": (0.0, 50.0)}, "speed 0: the journal bearing 'drive end' at node 1"),
         ({"speeds": (50.0, 2e5)}, "not at 200000 rad/s"),
         ({"time": 0.0}, "time must be above 0"),
         ({"tolerance": 1.0}, "tolerance must be from"),

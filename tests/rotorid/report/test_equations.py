@@ -9,6 +9,7 @@ import pytest
 import sympy
 from matplotlib.mathtext import MathTextParser
 
+from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.expressions import parse
 from rotorid.harmonic import harmonic_model
 from rotorid.harmonic.experiments import experiments
@@ -19,7 +20,6 @@ from rotorid.timedomain import Record, ode_model, second_order, simulate
 from rotorid.workflows import BalanceOptions, balance
 from rotorid.workflows.fit import fit
 from rotorid.workflows.identify import IdentifyOptions, identify
-from rotorid.workflows.reduce import ReduceOptions, reduce
 
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
 ROTOR = sample_data() / "rotor23.csv"

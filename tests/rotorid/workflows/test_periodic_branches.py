@@ -63,8 +63,7 @@ def test_the_answer_and_the_picture(cli, tmp_path):
     ("given", "message"),
     [
         (("--speeds", "0:3000rpm"), "speeds above 0"),
-        (("--speeds", "3000rpm"), "is not a range"),
-        ((*RANGE, "--subsynchronous", "99"), "from 2 to 8"),
+        (("--speeds", "3000:2000rpm"), "is not a range"),
         ((*RANGE, "--sensors", "99"), "node 99 does not exist"),
     ],
 )
@@ -113,3 +112,40 @@ def test_a_limit_of_time_that_is_none(cli):
     told = cli("periodic", ROTOR, *RANGE, "--max-seconds", "0")
     assert told.code == 2
     assert "max-seconds" in told.err
+
+
+@pytest.mark.parametrize("speeds", ["590:600", "600:600"])
+def test_a_second_stable_motion_beside_is_found_from_large_whirls(cli, tmp_path, speeds):
+    """Both are centred circles in the film, 34 and 90 µm."""
+    (tmp_path / "damper.toml").write_text(DAMPER)
+    found = cli("periodic", tmp_path / "damper.toml", "--speeds", speeds, "--json").json
+    assert [branch["kind"] for branch in found["branches"]] == ["synchronous"] * 2
+    assert all(all(branch["stable"]) for branch in found["branches"])
+    at_600 = [branch["amplitude_m"][0][-1] for branch in found["branches"]]
+    # zeros of (e (1 − r²) + 2 B r e² / (1 − e²)²)² + (π / 2 B r e / (1 − e²)^1.5)² − (u r²)², r = 3
+    assert at_600 == pytest.approx([34.2944e-6, 90.3404e-6], abs=3e-9)
+
+
+def test_linear_rotors_are_answered_at_once_and_sharply(cli, tmp_path):
+    """A disc on a shaft with 0.1 % of damping: the peak is 1 / (2 ζ) times the eccentricity."""
+    text = """
+    nodes = [1]
+    masses_kg = [10]
+    shaft_stiffness_N_per_m = [[0]]
+    [[bearing]]
+    node = 1
+    stiffness_N_per_m = 1e7
+    damping_N_s_per_m = 20
+    [[unbalance]]
+    node = 1
+    unbalance_g_mm = 10
+    angle_deg = 0
+    """
+    (tmp_path / "linear.toml").write_text(text)
+    found = cli("periodic", tmp_path / "linear.toml", "--speeds", "10:9000", "--json", "--sensors", "1").json
+    (branch,) = found["branches"]
+    assert all(branch["stable"])
+    assert found["bifurcations"] == []
+    assert "linear" in found["tried"]
+    assert max(branch["amplitude_m"][0]) == pytest.approx(1e-6 / (2 * 1e-3), rel=1e-3)
+    assert len(branch["speeds_rad_s"]) < 400

@@ -5,9 +5,9 @@ import pytest
 
 import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
-from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import SmallModel
 from rotorid.tables import InputError, TableWarning
-from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes
+from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes, small_model_files
 from tests.helpers.cases import each_of
 
 PLAIN = """
@@ -107,8 +107,12 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
     (tmp_path / "far.csv").write_text("speed_rad_s,stiffness_N_per_m\n0,1e7\n100,2e7\n")
     model = read_small_model(written(tmp_path, PLAIN.replace("stiffness_N_per_m = 1e7", 'table = "far.csv"')))
     assert model.motion(50.0).K[0, 0] == pytest.approx(1e6 + 1.5e7)
-    with pytest.raises(ValueError, match="bearing at node 1 depend on speed: leave it out"):
+    with pytest.raises(ValueError, match="in a file of their own"):
         small_model_bytes(model)
+    for path, content in small_model_files(tmp_path / "again.toml", model).items():
+        path.write_bytes(content)
+    again = read_small_model(tmp_path / "again.toml")
+    assert again.supports == model.supports
 
 
 @each_of(

@@ -10,8 +10,7 @@ from timedomain_cases import motion_in
 
 import fem
 from fem import state_space as of_motion
-from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.small_rotor import small_rotor
+from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes
@@ -80,8 +79,8 @@ def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):
 )
 def test_both_planes_with_gyroscopic_discs_and_cross_coupling(tmp_path, damping, supports):
     """Supports that are condensed leave matrices; those that are kept become states."""
-    small = small_rotor(turning(damping), (3, 5, 6), [40.0, 25.0, 10.0], modal_damping=(0.01, 0.02))
-    motion = small.motion(SPEED, supports=supports)
+    small = small_model(turning(damping), (3, 5, 6), [40.0, 25.0, 10.0], modal_damping=(0.01, 0.02))
+    motion = small.motion(SPEED, condensed=supports == "condensed")
     shown = ["x3", "x5", "x6", "y3", "y5", "y6"]
     forces = ["f_x3", "f_y6"]
     path = written(tmp_path, motion, inputs=forces, outputs=shown)
@@ -98,7 +97,7 @@ def test_both_planes_with_gyroscopic_discs_and_cross_coupling(tmp_path, damping,
 
 
 def test_dampers_in_states_act_like_dampers(tmp_path):
-    small = small_rotor(turning(800.0), (3, 5, 6), [40.0, 25.0, 10.0])
+    small = small_model(turning(800.0), (3, 5, 6), [40.0, 25.0, 10.0])
     motion = small.motion(SPEED)
     path = written(tmp_path, motion, dampers={"x3": 400.0, "y6": 70.0})
     C = motion.C.copy()
@@ -107,7 +106,7 @@ def test_dampers_in_states_act_like_dampers(tmp_path):
     damped = fem.Motion(motion.M, C, motion.K, motion.coordinates, SPEED)
     found = state_space(read_ode_model(path)).eigenvalues
     assert farthest(found, of_motion(damped).eigenvalues) < 1e-10
-    assert farthest(found, small.eigenvalues(SPEED)) > 1e-4
+    assert farthest(found, small.state_space(SPEED).eigenvalues) > 1e-4
 
 
 def test_a_model_with_inputs_that_act_on_outputs():

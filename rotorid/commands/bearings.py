@@ -1,0 +1,208 @@
+"""`bearings`: static equilibrium in journal bearings over speed, their linear coefficients, stability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import RPM
+from rotorid.base.text import capital, counted, figures
+from rotorid.commands.moving import moving
+from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
+from rotorid.commands.quantities import Speeds, degrees, rising_speeds
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import Rotor, Stability
+    from rotorid.motion.equilibrium import Equilibrium
+    from rotorid.reduction import SmallModel
+
+_ROWS = 14
+"""Of the table that is printed with the answer."""
+_AXES = ("xx", "xy", "yx", "yy")
+
+
+@dataclass(frozen=True)
+class BearingsOptions:
+    """Options of `bearings`.
+
+    Attributes
+    ----------
+    speeds : SPEEDS
+        FIRST:LAST:STEP or a list, rad/s; or with a unit: 1000:9000:250rpm.
+    gravity_direction : DEGREES
+        Where gravity points, from x with the rotation; default: -90, to -y.
+    """
+
+    speeds: Speeds
+    gravity_direction: float = -90.0
+    outputs: ClassVar[tuple[str, ...]] = (".csv", ".xlsx", ".toml")
+    to: ClassVar[tuple[str, ...]] = USUAL
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BearingEquilibria(Delivered):
+    """Equilibria at ascending speeds, the linear rotor with their coefficients, and where it loses stability.
+
+    Attributes
+    ----------
+    found
+        One for each speed.
+    linear
+        The rotor with bearing tables in place of its forces.
+    stability
+        Of the linear rotor; None for one speed alone.
+    warnings
+        What the reader must know.
+    """
+
+    found: Sequence[Equilibrium]
+    linear: Rotor | SmallModel
+    stability: Stability | None
+    warnings: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return plain(
+            {
+                "speeds_rad_s": [at.speed for at in self.found],
+                "bearings": rows(self._columns(self.found)),
+                "stability": self.stability and self.stability.to_dict(),
+                "warnings": self.warnings,
+            }
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per bearing and speed."""
+        return frame(self._columns(self.found))
+
+    @property
+    def answer(self) -> Answer:
+        """Stability, and the bearings at a few of the speeds; behind it at all."""
+        every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
+        shown = [*self.found[:-1:every], self.found[-1]]
+        return Answer(
+            capital(self.stability.summary()) if self.stability else "One speed: no threshold is sought.",
+            text(self._columns(shown), width=COLUMNS),
+            self.warnings,
+            tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),
+            more="every speed",
+        )
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the bearings."""
+        from rotorid.motion.equilibrium import named
+
+        return [one.name or named(one).removeprefix("the ") for one in self.found[0].bearings]
+
+    def _columns(self, found: Sequence[Equilibrium]) -> tuple[Column, ...]:
+        import numpy as np
+
+        from rotorid.motion.linear_coefficients import coefficients
+
+        bearings, forces = found[0].bearings, found[0].system.forces
+        walled = [k for k, force in enumerate(forces) if force in bearings]
+        K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(found))
+        speeds = np.repeat([at.speed for at in found], len(bearings))
+        load, e, attitude, sommerfeld = (
+            np.concatenate([getattr(at, name) for at in found])
+            for name in ("load", "eccentricity", "attitude", "sommerfeld")
+        )
+        film = np.tile([one.wall for one in bearings], len(found)) * (1 - e)
+        return (
+            Column("bearing", self.labels * len(found), str),
+            Column("node", [one.node for one in bearings] * len(found)),
+            Column("speed_rad_s", speeds),
+            Column("speed_rpm", speeds * RPM, "{:.6g}".format, "rpm"),
+            Column("load_N", abs(load), figures, "load, N"),
+            Column("eccentricity", e, "{:.4f}".format),
+            Column("attitude_deg", np.degrees(attitude), "{:z.2f}".format, "attitude, °"),
+            Column("film_m", film, lambda film: figures(1e6 * film), "least film, µm"),
+            Column("sommerfeld", sommerfeld, figures, "Sommerfeld"),
+            *(Column(f"k{n}_N_per_m", values) for n, values in zip(_AXES, K, strict=True)),
+            *(Column(f"c{n}_N_s_per_m", values) for n, values in zip(_AXES, C, strict=True)),
+        )
+
+    def figure(self) -> Figure:
+        """Paths of the journals in their clearance circles."""
+        from rotorid.base.plot_style import on_figure
+        from rotorid.motion.plots import draw_journals
+
+        return on_figure(lambda ax: draw_journals(self.found, self.labels, ax), height=4.6)
+
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
+        """The linear rotor as a rotor file, .toml, with its tables; or the table, .csv or .xlsx.
+
+        Raises
+        ------
+        ValueError
+            For a rotor file of one speed, which would hold at all.
+        """
+        from fem import Rotor
+        from rotorid.tables.models.small_model_file import small_model_files
+        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
+
+        if path.suffix.lower() != ".toml":
+            return super().table_file(path)
+        if len(self.found) < 2:
+            raise ValueError(f"{path}: a table over speed needs two speeds at least (--speeds)")
+        if isinstance(self.linear, Rotor):
+            return rotor_file_bytes(path, self.linear)
+        return small_model_files(path, self.linear)
+
+
+@command
+def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -> BearingEquilibria:
+    """Static equilibrium in journal bearings over speed, linear coefficients, stability.
+
+    --output FILE.toml writes the rotor with bearing tables over speed, which critical, campbell, response
+    and reduce read.
+
+    Example: rotorid bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm
+
+    Example: rotorid bearings sample_data/motion/rotor.toml --speeds 600:9000:100rpm --output linear.toml
+    --plot bearings.png
+
+    Parameters
+    ----------
+    rotor : MODEL
+        Rotor file (.toml) or small model (.toml), with journal bearings, squeeze films or seals.
+    options
+        The speeds, and what differs from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a rotor or an option that cannot be, and where there is no equilibrium.
+    """
+    from fem import SqueezeFilm
+    from rotorid.motion.equilibrium import equilibria, named
+    from rotorid.motion.linear_coefficients import linear_rotor, threshold
+
+    speeds = rising_speeds(options.speeds)
+    what = moving(rotor, direction=degrees(options.gravity_direction, "--gravity-direction"))
+    system = what.system(speeds[0], speeds[-1])
+    if not (system.walls < float("inf")).any():
+        raise ValueError("the rotor has no [[journal_bearing]], [[squeeze_film]] or [[annular_seal]]")
+    with phase(f"equilibrium at {counted(len(speeds), 'speed')}"):
+        resting = equilibria(system, speeds)
+    with phase("stability"):
+        stability = threshold(what.model, system, resting) if len(resting) > 1 else None
+    small = "stiffness and damping are those at its centre, they hold for small orbits about it"
+    films = [f"{named(f)}: {small}" for f in system.forces if isinstance(f, SqueezeFilm)]
+    touched = dict.fromkeys(named(stop) for at in resting for stop in at.touched)
+    return BearingEquilibria(
+        found=resting,
+        linear=linear_rotor(what.model, resting),
+        stability=stability,
+        warnings=(*(f"the shaft rests on {stop}" for stop in touched), *films),
+        provenance=provenance(what.files, options),
+    )

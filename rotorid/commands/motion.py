@@ -1,0 +1,474 @@
+"""`motion`: motion in time of a rotor whose forces are not linear, at a speed or through a range of them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import figures, percent
+from rotorid.commands.moving import moving
+from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
+from rotorid.commands.quantities import (
+    FASTEST,
+    Nodes,
+    Speeds,
+    degrees,
+    nodes,
+    number,
+    one_of,
+    one_speed,
+    pairs,
+    speeds,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import Rotor
+    from rotorid.commands.moving import Moving
+    from rotorid.motion.run import MotionRun
+    from rotorid.motion.steady import SteadyEnd
+    from rotorid.motion.system import MotionSystem, ReducedSystem
+    from rotorid.reduction import SmallModel
+
+View = Literal["motion", "orbits", "bode"]
+"""What a picture shows."""
+Start = Literal["rest", "steady"]
+_SMALL = 24
+"""Unknowns above which a rotor is reduced, where nothing else is asked for."""
+_LOOSER = 30.0
+"""Times the tolerance: the motion is found twice, and what differs is told as its error."""
+_UNSURE = 1e-3
+
+
+@dataclass(frozen=True)
+class MotionOptions:
+    """Options of `motion`.
+
+    Attributes
+    ----------
+    speed : SPEED
+        A constant speed, 6000rpm; without a unit rad/s.
+    run_up : A:B
+        From one speed to another one, up or down, evenly: 500:9000rpm, 9000:500rpm.
+    time : TIME
+        How long, 2s.
+    acceleration : A
+        Of a run-up or a run-down, in place of its time: 300rpm/s; without a unit rad/s².
+    unbalance : FILE
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
+    bow : FILE
+        Table of the shaft's bow at rest; in place of a small model's own.
+    gravity_direction : DEGREES
+        Where gravity points, from x with the rotation; default: -90, to -y.
+    start
+        At rest in equilibrium, or in steady motion at the first speed.
+    displaced : LIST
+        Nodes moved from there, with the direction from x: 7=20um@90,12=5um.
+    sensors : NODES
+        Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
+    modes : N from 0
+        Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
+        together; default: as many as its natural frequencies up to twice the highest speed need to agree
+        to 0.03 %; small models keep all.
+    rate : N
+        Samples a second; default: 64 a turn at the highest speed.
+    tolerance : T
+        Error of one step, by how far the rotor has moved from where it began.
+    view
+        What --plot draws: x and y over time with the spectrum, orbits, or a run-up over speed.
+    """
+
+    speed: str | float | None = None
+    run_up: Speeds | None = None
+    time: str | float | None = None
+    acceleration: str | float | None = None
+    unbalance: Path | str | Mapping[int, complex] | None = None
+    bow: Path | str | Mapping[int, complex] | None = None
+    gravity_direction: float = -90.0
+    start: Start = "rest"
+    displaced: str | Mapping[str, complex] | None = None
+    sensors: Nodes | None = None
+    modes: int | None = None
+    rate: float | None = None
+    tolerance: float = 1e-6
+    view: View = "motion"
+    panels: ClassVar[Mapping[str, str]] = {
+        "Start": "start displaced",
+        "Method": "modes rate tolerance",
+        "Output": "view",
+    }
+    to: ClassVar[tuple[str, ...]] = USUAL
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion(Delivered):
+    """Motion in time, what it comes to, and how sure it is.
+
+    Attributes
+    ----------
+    motion
+        What was found.
+    reduced
+        What moved, if it is a rotor with fewer unknowns than it has.
+    end
+        What it has come to; None where the speed changes or too little is known.
+    error
+        Largest difference of positions from those with a tolerance thirty times as large, by its way;
+        the error itself is smaller, except where two motions part.
+    warnings
+        What the reader must know.
+    view
+        What the picture shows.
+    """
+
+    motion: MotionRun
+    reduced: ReducedSystem | None
+    end: SteadyEnd | None
+    error: float
+    warnings: tuple[str, ...]
+    view: View = "motion"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        import numpy as np
+
+        motion, end, reduced = self.motion, self.end, self.reduced
+        ranges = motion.eccentricity() if end is None else end.eccentricity
+        nodes = [str(node) for node in motion.nodes]
+        deflections = np.stack([motion.z.real, motion.z.imag], axis=2)
+        return plain(
+            {
+                "time_s": motion.time,
+                "speed_rad_s": motion.speed,
+                "angle_rad": motion.turned,
+                "positions_m": {node: deflections[:, i] for i, node in enumerate(nodes)},
+                "furthest": {
+                    **dict(
+                        zip(("node", "time_s", "speed_rad_s", "distance_m"), self._furthest(), strict=True)
+                    )
+                },
+                "steady": end and end.steady,
+                "at_rest": end and end.at_rest,
+                "chaotic": end and end.chaotic,
+                "trend": end and (end.trend or None),
+                "change": end and end.change,
+                "periodic": end and end.periodic,
+                "period_s": end and end.period,
+                "whirl_ratio": end and end.whirl_ratio,
+                "whirl_frequency_rad_s": end and end.frequency,
+                "multipliers": [[value.real, value.imag] for value in self._multipliers()] or None,
+                "amplitude_m": end and dict(zip(nodes, end.amplitude, strict=True)),
+                "eccentricity": dict(zip(self._bearings, ranges.tolist(), strict=True)),
+                "tolerance": motion.tolerance,
+                "position_error": self.error,
+                "reduction": reduced and {"modes": reduced.modes, "frequency_error": reduced.error},
+                "warnings": self.warnings,
+            }
+        )
+
+    def _multipliers(self) -> list[complex]:
+        """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
+        import numpy as np
+
+        from rotorid.motion.periodic import repeating
+        from rotorid.motion.run import run
+
+        motion, end = self.motion, self.end
+        if end is None or end.at_rest or not end.periodic or not end.speed:
+            return []
+        angle = float(motion.turned[-1]) % (2 * np.pi)
+        on = run(  # to the angle 0
+            *(motion.system, (end.speed, end.speed), (2 * np.pi - angle) / end.speed, (motion.q, motion.v)),
+            angle=angle,
+        )
+        found = repeating(motion.system, end.speed, end.period, on.q, on.v)
+        return [] if found is None else found.multipliers.tolist()
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a sample: time, speed, angle, deflections."""
+        import numpy as np
+
+        motion = self.motion
+        places = [
+            Column(f"{axis}_{node}_um", 1e6 * part)
+            for node, z in zip(motion.nodes, motion.z.T, strict=True)
+            for axis, part in (("x", z.real), ("y", z.imag))
+        ]
+        return frame(
+            (
+                Column("t_s", motion.time),
+                Column("speed_rpm", motion.speed * RPM),
+                Column("angle_deg", np.degrees(motion.turned)),
+                *places,
+            )
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """What it has come to or where it was largest, and each node; how it was found."""
+        tables = [text(self._nodes(), width=COLUMNS)]
+        if self._bearings:
+            when = "" if self.end is None else "at the end "
+            least, most = (self.motion.eccentricity() if self.end is None else self.end.eccentricity).T
+            ranges = (
+                Column("bearing", self._bearings, str),
+                Column("least", least, "{:.4f}".format, f"eccentricity {when}from"),
+                Column("most", most, "{:.4f}".format, "to"),
+            )
+            tables.append(text(ranges, width=COLUMNS))
+        return Answer(self._judgement(), "\n\n".join(tables), self.warnings, self._notes())
+
+    @property
+    def _bearings(self) -> list[str]:
+        return [force.name or f"node {force.node}" for force, _ in self.motion.bearings]
+
+    def _judgement(self) -> str:
+        end, motion = self.end, self.motion
+        first, last = motion.speeds
+        if end is None and first == last:
+            return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
+        if end is None:
+            node, _, speed, distance = self._furthest()
+            return (
+                f"From {rpm_text(first)} to {rpm_text(last)} in {figures(motion.time[-1])} s: furthest from "
+                f"the line of bearings at node {node}, {figures(1e6 * distance)} µm at {rpm_text(speed)}."
+            )
+        where = f"At {rpm_text(first)}"
+        if end.at_rest:
+            return f"{where} it comes to rest."
+        whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
+        if end.speed:
+            way = ", against the rotation" if end.frequency < 0 else ""
+            whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
+        if not end.steady:
+            more = {
+                "grows": "it grows, to a limit cycle or to a wall: more --time shows which",
+                "decays": "it dies down: give it more --time to settle",
+                "drifts": "its mean drifts: give it more --time to settle",
+                "": "with more --time still so, it beats",
+            }[end.trend]
+            if end.chaotic:
+                more = "it does not come again, and its spectrum is no few lines: it is chaotic"
+            return (
+                f"{where} it is NOT STEADY after {figures(motion.time[-1])} s: size or mean change by "
+                f"{percent(end.change)} % in its last part; {more}; {whirl}."
+            )
+        again = "does not come again"
+        if end.periodic:
+            turns = end.period * end.speed * RPM / 60
+            unit = "s" if not turns else "turn" if round(turns, 3) == 1 else "turns"
+            again = f"comes again every {turns or end.period:.5g} {unit}"
+        return f"{where} the motion is steady to {percent(max(end.change, 1e-4))} % and {again}; {whirl}."
+
+    def _furthest(self) -> tuple[int, float, float, float]:
+        """Node, time, speed and distance where it is furthest from the line of bearings."""
+        motion, size = self.motion, abs(self.motion.z)
+        k, i = divmod(int(size.argmax()), len(motion.nodes))
+        return motion.nodes[i], float(motion.time[k]), float(motion.speed[k]), float(size[k, i])
+
+    def _nodes(self) -> tuple[Column, ...]:
+        """A row for each node: where it was furthest from the line of bearings, and what the end is."""
+        motion, end = self.motion, self.end
+        size = abs(motion.z)
+        at = size.argmax(axis=0)
+        columns = (
+            Column("node", motion.nodes, str),
+            Column("largest_m", 1e6 * size.max(axis=0), figures, "furthest, µm"),
+            Column("at_s", motion.time[at], figures, "at, s"),
+            Column("at_rpm", motion.speed[at] * RPM, "{:.6g}".format, "at, rpm"),
+        )
+        if end is None:
+            return columns
+        return (
+            *columns,
+            Column("amplitude", 1e6 * end.amplitude, figures, "at the end: amplitude, µm"),
+            Column("x", 1e6 * end.mean.real, figures, "mean x, µm"),
+            Column("y", 1e6 * end.mean.imag, figures, "mean y, µm"),
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        motion, reduced = self.motion, self.reduced
+        step = 1e3 * motion.time[-1] / motion.steps
+        found = (
+            f"steps of about {figures(step, 1)} ms, each to {motion.tolerance:g} of how far the rotor moves; "
+            f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
+        )
+        return found if reduced is None else (*found, reduced.note)
+
+    def figure(self) -> Figure:
+        """What was asked for: time and spectrum, orbits, or the Bode picture of a run-up."""
+        from rotorid.motion.plots import FIGURES
+
+        return FIGURES[self.view](self.motion)
+
+
+@command
+def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Motion:
+    """Motion in time at a constant speed, through a run-up or a run-down.
+
+    Example: rotorid motion sample_data/motion/rotor.toml --speed 4000rpm --time 2s --plot motion.png
+
+    Example: rotorid motion sample_data/motion/rotor.toml --run-up 1000:9000rpm --time 10 --plot bode.png
+    --view bode
+
+    Parameters
+    ----------
+    model : MODEL
+        Rotor file (.toml, .csv, .xlsx) or small model (.toml).
+    options
+        Speed and time, and what differs from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a model or options that cannot be; where a journal touches its wall, with time and node.
+    """
+    import numpy as np
+
+    from rotorid.motion.run import LOOSEST, run
+    from rotorid.motion.steady import begin, steady_end
+    from rotorid.motion.system import reduced_system
+
+    one_of(options.view, "--view", get_args(View))
+    ends, time = _course(options)
+    direction = degrees(options.gravity_direction, "--gravity-direction")
+    source = moving(model, options.unbalance, options.bow, direction)
+    system = source.system(min(ends), max(ends))
+    shown = _shown(source, system, options.sensors)
+    shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
+    reduced, tolerance = None, options.tolerance
+    if tolerance > LOOSEST / _LOOSER:
+        raise ValueError(f"--tolerance {tolerance:g}: {LOOSEST / _LOOSER:.0e} at most")
+    if options.modes is not None or system.size > _SMALL:
+        with phase("equations"):
+            reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
+        system = reduced.system
+    with phase("start"):
+        q, v, unsettled = begin(system, ends[0], options.start, shift, tolerance)
+    move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
+    with phase("motion"):
+        found = move(tolerance=tolerance)
+    with phase(f"motion with {_LOOSER:g} times the tolerance"):
+        rough = move(tolerance=_LOOSER * tolerance)
+    if found.stopped:
+        until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
+        raise ValueError(found.stopped + until)
+    k = min(found.time.size, rough.time.size)
+    moved = np.abs(found.z - found.z[0]).max()
+    error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
+    return Motion(
+        motion=found,
+        reduced=reduced,
+        end=steady_end(found),
+        error=error,
+        warnings=(*unsettled, *_warnings(found, error, bool(shift))),
+        view=options.view,
+        provenance=provenance(source.files, options),
+    )
+
+
+def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
+    """First and last speed, rad/s, and the time between them, s."""
+    if (options.speed is None) == (options.run_up is None):
+        raise ValueError("one of --speed and --run-up is needed")
+    if options.speed is not None:
+        speed = one_speed(options.speed, "--speed")
+        if options.acceleration is not None:
+            raise ValueError("--acceleration belongs to --run-up")
+        ends = (speed, speed)
+    else:
+        given = options.run_up or ""
+        found = speeds(given.replace(":", ",") if isinstance(given, str) else given, what="--run-up")
+        if len(found) != 2 or found[0] == found[1]:
+            raise ValueError(
+                f"--run-up {options.run_up!r}: use FIRST:LAST, two different speeds: 500:9000rpm"
+            )
+        ends = (found[0], found[1])
+    if (options.time is None) == (options.acceleration is None):
+        one = (
+            "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"
+        )
+        raise ValueError(one)
+    if options.time is None:
+        return ends, abs(ends[1] - ends[0]) / _acceleration(options.acceleration or 0.0)
+    time = number(str(options.time).strip().removesuffix("s"))
+    if not 0 < time < FASTEST:
+        raise ValueError(f"--time {options.time!r}: seconds above 0 are needed, such as 2s")
+    return ends, time
+
+
+def _acceleration(given: str | float) -> float:
+    """Read "300rpm/s", or a number in rad/s², as --run-up without a unit is in rad/s."""
+    text = re.sub(r"/s(²|\^?2)$", "/s/s", str(given).strip())
+    if math.isnan(number(text)) and not re.search("(rpm|Hz|rad[/_]s)/s$", text):
+        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
+    value = one_speed(text.removesuffix("/s") if math.isnan(number(text)) else text, "--acceleration")
+    if not value > 0:
+        raise ValueError(
+            f"--acceleration {given!r} must be above 0; the speeds tell whether it goes up or down"
+        )
+    return value
+
+
+def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[int, ...]:
+    """Nodes whose motion is told."""
+    import numpy as np
+
+    walled = [force.node for force in system.forces if np.isfinite(force.wall)]
+    if given is not None:
+        return tuple(dict.fromkeys([*(source.node(node) for node in nodes(given, "--sensors")), *walled]))
+    stations = list(getattr(source.model, "stations", {}))
+    supports = [support.node for support in source.model.supports if support.node in system.nodes]
+    chosen = (
+        {*map(source.node, stations), *walled, *supports, *_loaded(system)}
+        if stations or system.size > _SMALL
+        else ()
+    )
+    return tuple(sorted(chosen)) or system.nodes
+
+
+def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
+    """Read "7=20um@90" as x + iy in m, by node."""
+    import numpy as np
+
+    from rotorid.commands.option_quantities import quantity
+    from rotorid.tables.reader import units
+
+    def read(_: str, value: str) -> complex:
+        size, _, angle = value.partition("@")
+        length = quantity(size, "--displaced", units.LENGTH, "20um")
+        return complex(length * np.exp(1j * np.radians(degrees(angle or "0", "--displaced"))))
+
+    return pairs(given or {}, "--displaced", read, "7=20um@90")
+
+
+def _loaded(system: MotionSystem) -> list[int]:
+    """Nodes with unbalance, unless they are too many."""
+    found = [node for node in system.nodes if system.unbalance[system.index(node)[0]]]
+    return found if len(found) <= _SMALL // 2 else []
+
+
+def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
+    said = []
+    if not found.resolved:
+        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
+    if error > _UNSURE:
+        said.append(
+            f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "
+            "the rotor moves: where it whips, amplitude and frequency of the whirl count, not its phase; "
+            "where it is chaotic, positions cannot be compared"
+        )
+    if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
+        said.append("nothing excites it: no unbalance, no bow (--unbalance)")
+    return tuple(said)

@@ -1,0 +1,86 @@
+"""What `bearings`, `motion` and `periodic` take: a rotor or a small model, its unbalance, bow and weight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rotorid.commands.input_checks import rotor_source
+
+if TYPE_CHECKING:
+    from fem import Rotor
+    from rotorid.motion.system import MotionSystem
+    from rotorid.reduction import SmallModel
+
+Table = Mapping[int, complex] | Path | str
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """A model, what is mounted on it, and its weight.
+
+    Attributes
+    ----------
+    model
+        The rotor or the small model.
+    unbalance, bow
+        By node, kg·m and m, complex; None: the small model's own.
+    direction
+        Of gravity, degrees from x with the rotation.
+    files
+        Read for it.
+    """
+
+    model: Rotor | SmallModel
+    unbalance: Mapping[int, complex] | None
+    bow: Mapping[int, complex] | None
+    direction: float
+    files: tuple[Path, ...]
+
+    def node(self, name: str | int) -> int:
+        """Number of a node, as the model's `node`."""
+        return self.model.node(name)
+
+    def system(self, lowest: float, highest: float) -> MotionSystem:
+        """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
+        from rotorid.motion.system import rotor_system
+
+        return rotor_system(
+            self.model, lowest, highest, unbalance=self.unbalance, bow=self.bow, direction=self.direction
+        )
+
+
+def moving(
+    given: Rotor | SmallModel | Path | str,
+    unbalance: Table | None = None,
+    bow: Table | None = None,
+    direction: float = -90.0,
+) -> Moving:
+    """Read a rotor table, a rotor file or a small model, and tables of unbalance and bow.
+
+    Raises
+    ------
+    ValueError
+        For files that cannot be read.
+    """
+    from rotorid.reduction import SmallModel
+    from rotorid.tables import read_bow, read_small_model, read_unbalance, rotor_files
+    from rotorid.tables.models.small_model_file import is_small_model
+
+    model: Rotor | SmallModel
+    files: tuple[Path, ...] = ()
+    if isinstance(given, SmallModel):
+        model = given
+    elif isinstance(given, Path | str) and is_small_model(Path(given)):
+        model, files = read_small_model(given), rotor_files(Path(given))
+    else:
+        model, files = rotor_source(given)
+    if isinstance(unbalance, Path | str):
+        files = (*files, Path(unbalance))
+        unbalance = read_unbalance(files[-1], model)
+    if isinstance(bow, Path | str):
+        files = (*files, Path(bow))
+        bow = read_bow(files[-1], model)
+    return Moving(model, unbalance, bow, direction, files)

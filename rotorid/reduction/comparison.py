@@ -1,0 +1,513 @@
+"""A small model beside the full rotor in running: unbalance response and stability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import fem
+from fem import (
+    DIRECTION_NAMES,
+    SensorLike,
+    Whirl,
+    available_modes,
+    checked_number,
+    critical_speeds_below,
+    label,
+    polar,
+    runs_away,
+    solve_whirl,
+)
+from fem.assembly import both_planes
+from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.checks import checked_speeds
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.text import counted, sentence
+from rotorid.reduction.small_model import SmallModel
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CLOSE = 0.08
+"""Largest difference, relative to the largest entry, up to which the small model follows the rotor well."""
+POINTS, STEPS = 400, 40
+"""Speeds of a response that are compared where none are given, and steps of a range for stability."""
+APART, FAR = 0.2, 0.3
+"""Relative differences that are named: of whirl frequencies at the thresholds, of smallest decrements."""
+UNDAMPED = 1e-8
+"""A logarithmic decrement below this is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseCost(Answered):
+    """Influence coefficients of both models: unbalance at the masses, readings at the masses.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, ascending, shape (S,).
+    full, small
+        m per kg·m, shape (S, C, P); positive phase = lead.
+    nodes
+        Where the masses stand: the P planes.
+    sensors
+        What the C readings are: at each mass in x, of a rotor that is not symmetric in y, too (90°).
+    criticals
+        Critical speeds of the full rotor (undamped) whose bands reach into the range, rad/s.
+    bands
+        Half-width of the band around each critical speed that is left out, relative to it.
+    excluded
+        Speeds that are left out, shape (S,): in the bands, and standstill.
+    warnings
+        What the reader must know.
+    """
+
+    speeds: FloatArray
+    full: ComplexArray
+    small: ComplexArray
+    nodes: tuple[int, ...]
+    sensors: tuple[SensorLike, ...]
+    criticals: FloatArray
+    bands: float
+    excluded: BoolArray
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def relative_difference(self) -> FloatArray:
+        """|small − full| by the largest |full| at the same speed, shape (S, C, P); NaN at standstill."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.abs(self.full).max(axis=(1, 2))[:, None, None]
+            return np.asarray(np.abs(self.small - self.full) / size)
+
+    @property
+    def worst(self) -> FloatArray:
+        """Largest relative difference of all sensors and planes at each speed, shape (S,)."""
+        return np.asarray(self.relative_difference.max(axis=(1, 2)))
+
+    @property
+    def where(self) -> tuple[float, SensorLike, int]:
+        """Speed (rad/s), sensor and plane of the largest relative difference that is not left out."""
+        difference = np.where(self.excluded[:, None, None], -1.0, self.relative_difference)
+        s, c, p = np.unravel_index(int(np.argmax(difference)), difference.shape)
+        return float(self.speeds[s]), self.sensors[int(c)], self.nodes[int(p)]
+
+    @property
+    def left_out(self) -> list[tuple[float, float]]:
+        """Bands around the critical speeds, rad/s."""
+        return [(w * (1 - self.bands), w * (1 + self.bands)) for w in self.criticals.tolist()]
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Largest and median difference of the speeds that are not left out: `largest`, `median`."""
+        used = self.worst[~self.excluded]
+        return {"largest": float(used.max()), "median": float(np.median(used))}
+
+    @property
+    def answer(self) -> Answer:
+        """What the reduction costs, in words."""
+        used, size = self.speeds[~self.excluded], self.sizes
+        speed, sensor, plane = self.where
+        left_out = "no critical speed of the full rotor lies near the range; no band is left out"
+        if self.criticals.size:
+            bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
+            left_out = (
+                f"left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
+                f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands} rpm)"
+            )
+        details = (
+            "the difference is in percent of the largest influence coefficient at the same speed",
+            f"worst at {rpm_text(speed)}: reading at node {label(sensor)}, unbalance at node {plane}",
+            left_out,
+        )
+        return Answer(
+            f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
+            f"{counted(len(self.nodes), 'mass', 'masses')} is within {_percent(size['largest'])} of the full "
+            f"rotor's, median {_percent(size['median'])}.",
+            warnings=self.warnings,
+            tables=("\n".join(fill(sentence(text), COLUMNS, subsequent_indent="  ") for text in details),),
+            more="where the response differs most",
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed, sensor and plane."""
+        S, C, P = self.full.shape
+        columns = (
+            Column("speed_rad_s", np.repeat(self.speeds, C * P)),
+            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.nodes] * S),
+            Column("plane", list(self.nodes) * (S * C)),
+            *polar("full_m_per_kg_m", "full_phase_deg", self.full),
+            *polar("small_m_per_kg_m", "small_phase_deg", self.small),
+            Column("relative_difference", self.relative_difference.ravel()),
+            Column("excluded", np.repeat(self.excluded, C * P)),
+        )
+        return frame(Table("responses", columns))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: sizes over all speeds, and the worst of each as relative difference."""
+        speed, sensor, plane = self.where
+        return plain(
+            {
+                "nodes": self.nodes,
+                "sensors": [str(label(each)) for each in self.sensors],
+                "speeds_rad_s": self.speeds,
+                "criticals_rad_s": self.criticals,
+                "bands": self.bands,
+                "excluded": self.excluded,
+                "relative_difference": self.worst,
+                **self.sizes,
+                "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
+                "warnings": self.warnings,
+            }
+        )
+
+
+def compare_response(
+    rotor: fem.Rotor, small: SmallModel, speeds: ArrayLike | None = None, *, bands: float = 0.10
+) -> ResponseCost:
+    """Compare the synchronous response of a small model with the full rotor's.
+
+    Parameters
+    ----------
+    rotor
+        The full rotor.
+    small
+        Its small model; damping of the surroundings, which the full rotor does not have, is left out.
+    speeds
+        rad/s, ascending; by default 400 and the ends of the bands, up to 1.1 times the second critical speed
+        of the full rotor (the fourth, where x and y differ), within the tables of its supports.
+    bands
+        Half-width of the band around each critical speed of the full rotor that is left out, relative to it:
+        there the response of a lightly damped rotor is a matter of its damping, and of frequencies that
+        differ a little.
+
+    Raises
+    ------
+    ValueError
+        For impossible speeds or bands, if the bands leave no speed, at a speed outside the table of a
+        support, or exactly at a critical speed of an undamped model.
+
+    Notes
+    -----
+    An unbalance U e^{iωt} pushes with U Ω² in z = x + i y: with Ω² in x and −i Ω² in y as phasors. So
+    `fem.influence` has it, too. The critical speeds are those of the undamped rotor, as
+    `fem.critical_speeds` gives them: bands are left out around them also where damping is large.
+    """
+    nodes = small.massive
+    if not (np.isfinite(bands) and 0 <= bands < 1):
+        raise ValueError(f"the bands are a part of the critical speed, 0 to below 1, not {bands!r}")
+    omega = _default_speeds(rotor, bands) if speeds is None else checked_speeds(speeds, ascending=True)
+    sensors: tuple[SensorLike, ...] = nodes
+    if not rotor.symmetric:
+        sensors = (*((node, 0.0) for node in nodes), *((node, 90.0) for node in nodes))
+    full = fem.influence(rotor, nodes, sensors, omega)
+    small, remarks = _undamped(small)
+    response = small.response(omega)[:, : len(sensors)]
+    try:
+        criticals = critical_speeds_below(rotor, omega[-1] / (1 - bands) * (1 - 1e-9))
+    except ValueError as problem:
+        criticals = np.empty(0)
+        remarks.append(f"no band is left out: {problem}")
+    criticals = criticals[criticals * (1 + bands) > omega[0]]
+    near = np.abs(omega[:, None] - criticals) < bands * criticals * (1 - 1e-9)  # its ends are compared
+    excluded = near.any(axis=1) | (omega == 0)
+    if excluded.all():
+        raise ValueError(
+            f"all {omega.size} speeds are standstill or lie within ±{100 * bands:.3g} % of a critical speed "
+            "of the full rotor: give other speeds, or narrower bands"
+        )
+    remarks += [f"full rotor: {warning}" for warning in full.warnings]
+    if omega.size > 1:
+        growth = stability_threshold(small, float(omega[-1]), lowest=float(omega[0]), steps=12)
+        if growth.status != "stable":
+            at = growth.threshold if growth.threshold is not None else growth.lowest
+            remarks.append(
+                f"the small model has no steady response from {at:.6g} rad/s on: a motion grows there; "
+                "amplitudes computed there are never reached"
+            )
+    cost = ResponseCost(omega, full.W, response, nodes, sensors, criticals, float(bands), excluded)
+    largest = cost.sizes["largest"]
+    if not largest <= CLOSE:
+        remarks.append(
+            f"at {cost.where[0]:.6g} rad/s the small model is {_percent(largest)} off: take more masses, "
+            "other nodes or more modes, or use it below this speed"
+        )
+    return replace(cost, warnings=tuple(remarks))
+
+
+def _undamped(small: SmallModel) -> tuple[SmallModel, list[str]]:
+    """The model without damping of the surroundings, and what to say of it."""
+    if not small.damping.any():
+        return small, []
+    remark = "the modal damping of the small model is left out of this comparison: the full rotor has none"
+    return replace(small, damping=np.zeros_like(small.damping)), [remark]
+
+
+def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:
+    """Up to 1.1 times the second critical speed of each plane, within the tables; with the bands' ends."""
+    criticals = np.sort(fem.critical_speeds(rotor, 2 if rotor.symmetric else 4).frequencies)
+    tables = [support.speeds for support in rotor.supports if support.speeds]
+    first = max((table[0] for table in tables), default=0.0)
+    last = min((table[-1] for table in tables), default=np.inf)
+    top = min(1.1 * float(criticals[-1]), last)
+    even = np.linspace(max(first, top / POINTS), top, POINTS)
+    ends = np.concatenate((criticals * (1 - bands), criticals * (1 + bands)))
+    return np.unique(np.concatenate((even, ends[(ends > even[0]) & (ends < top)])))
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.2g} %" if part < 0.1 else f"{100 * part:.0f} %"
+
+
+def stability_threshold(
+    small: SmallModel, highest: float, *, lowest: float = 0.0, steps: int = STEPS
+) -> fem.Stability:
+    """The first speed at which a mode of a small model stops decaying, as `fem.stability_threshold`.
+
+    Parameters
+    ----------
+    small
+        The small model, of which all motions are watched.
+    highest, lowest
+        Range of speeds, rad/s: within the tables of all supports.
+    steps
+        Into how many steps the range is divided; a mode that is unstable only between two neighbouring
+        speeds is not seen. The threshold itself is found by iteration, to 1e-10 of it or better.
+
+    Raises
+    ------
+    ValueError
+        For an impossible range, or outside the table of a support.
+    """
+    return fem.threshold_of(small.whirl(fem.range_of_speeds(lowest, highest, steps)))
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityCost(Answered):
+    """Stability of a small model over speed beside the full rotor's.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    full_decrement, small_decrement
+        Smallest logarithmic decrement of all modes that oscillate, shape (S,): negative where one grows,
+        −inf where the rotor runs away without oscillating, NaN where nothing oscillates.
+    full_frequency, small_frequency
+        Whirl frequency of the mode that has it, rad/s, shape (S,); NaN where there is none.
+    full, small
+        Where each loses stability.
+    nodes
+        Where the masses stand.
+    n_full, n_small
+        How many modes were watched.
+    warnings
+        What the reader must know.
+    """
+
+    speeds: FloatArray
+    full_decrement: FloatArray
+    small_decrement: FloatArray
+    full_frequency: FloatArray
+    small_frequency: FloatArray
+    full: fem.Stability
+    small: fem.Stability
+    nodes: tuple[int, ...]
+    n_full: int
+    n_small: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def relative_difference(self) -> float | None:
+        """Of the small model's threshold from the full rotor's; None unless both have one."""
+        if self.full.threshold is None or self.small.threshold is None:
+            return None
+        return self.small.threshold / self.full.threshold - 1.0
+
+    @property
+    def answer(self) -> Answer:
+        """What the reduction costs, in words and a table."""
+        both = (self.full, self.small)
+        number = "{:.6g}".format
+        rows = (
+            ("status", [each.status for each in both]),
+            ("threshold, rpm", [each.threshold and number(each.threshold * RPM) for each in both]),
+            ("whirl frequency, rpm", [each.frequency and number(each.frequency * RPM) for each in both]),
+            ("whirl by running speed", [each.whirl_ratio and number(each.whirl_ratio) for each in both]),
+            ("direction", [_way(each.direction) for each in both]),
+            ("smallest log decrement", ["" if np.isnan(s.margin) else f"{s.margin:.4g}" for s in both]),
+            ("modes watched", [str(self.n_full), str(self.n_small)]),
+        )
+        names = ("", "full rotor", counted(len(self.nodes), "mass", "masses"))
+        cells = zip(*((words, *values) for words, values in rows), strict=True)
+        table = Table(
+            "stability", tuple(Column(name, values) for name, values in zip(names, cells, strict=True))
+        )
+        return Answer(
+            sentence(self._verdict()),
+            warnings=self.warnings,
+            tables=(terminal(table),),
+            more="both thresholds of stability",
+        )
+
+    def _verdict(self) -> str:
+        where = f"from {range_text(self.speeds[0], self.speeds[-1])}"
+        begin = rpm_text(self.speeds[0])
+        difference = self.relative_difference
+        if difference is not None:
+            small, full = (rpm_text(each.threshold or 0.0) for each in (self.small, self.full))
+            return (
+                f"the small model loses stability at {small}, the full rotor at {full}: "
+                f"{100 * difference:+.3g} %"
+            )
+        if self.full.status == self.small.status == "stable":
+            decrements = [a[np.isfinite(a)] for a in (self.full_decrement, self.small_decrement)]
+            if all(np.abs(a).max(initial=0.0) < UNDAMPED for a in decrements):
+                return f"no damping acts on either model {where}: no motion grows, and none decays"
+            return f"both models are stable {where}"
+        if self.full.status == self.small.status:
+            return f"both models are unstable already at {begin}"
+        words = {"stable": f"is stable {where}", "unstable": f"is unstable already at {begin}"}
+        full, small = (
+            words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
+            for each in (self.full, self.small)
+        )
+        return f"the models disagree: the full rotor {full}, the small model {small}"
+
+    def _curves(self) -> dict[str, FloatArray]:
+        names = ("full_log_decrement", "small_log_decrement", "full_frequency_rad_s", "small_frequency_rad_s")
+        values = (self.full_decrement, self.small_decrement, self.full_frequency, self.small_frequency)
+        return dict(zip(names, values, strict=True))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed: smallest logarithmic decrement and its whirl frequency in both models."""
+        curves = {"speed_rad_s": self.speeds, **self._curves()}
+        return frame(Table("stability", tuple(Column(name, values) for name, values in curves.items())))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; what is not known is None."""
+        return plain(
+            {
+                "nodes": self.nodes,
+                "speeds_rad_s": self.speeds,
+                **self._curves(),
+                "full": self.full.to_dict(),
+                "small": self.small.to_dict(),
+                "relative_difference_of_threshold": self.relative_difference,
+                "modes_watched": {"full": self.n_full, "small": self.n_small},
+                "warnings": self.warnings,
+            }
+        )
+
+
+def compare_stability(
+    rotor: fem.Rotor,
+    small: SmallModel,
+    highest: float,
+    *,
+    lowest: float = 0.0,
+    steps: int = STEPS,
+    n: int | None = None,
+) -> StabilityCost:
+    """Compare where a small model and the full rotor lose stability.
+
+    Parameters
+    ----------
+    rotor, small
+        The full rotor and its small model; damping of the surroundings is left out.
+    highest, lowest
+        Range of speeds, rad/s: within the tables of all supports.
+    steps
+        Into how many steps the range is divided; a mode that is unstable only between two neighbouring
+        speeds is not seen, in neither model. The thresholds themselves are found by iteration.
+    n
+        Of how many modes of lowest frequency of the full rotor the decrements are taken, forward and backward
+        whirl apart; by default 8, or as many as the small model has. Of the small model all are.
+
+    Raises
+    ------
+    ValueError
+        For an impossible range, a number of modes out of range, or a speed outside the table of a support.
+    """
+    speeds = fem.range_of_speeds(lowest, highest, steps)
+    small, remarks = _undamped(small)
+    whirl = small.whirl(speeds)
+    n_small = int(np.isfinite(whirl.values).sum(axis=1).max())
+    n_full = checked_number(rotor, min(max(8, n_small), available_modes(rotor)) if n is None else n)
+    full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n_full, steps=steps)
+    of_small = fem.threshold_of(whirl)
+    full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
+    small_decrement, small_frequency = _least_damped(whirl)
+    remarks += _doubts(full, of_small)
+    if far := _furthest(full_decrement, small_decrement):
+        k, a, b = far
+        remarks.append(
+            f"the damping differs: at {speeds[k]:.6g} rad/s the smallest logarithmic decrement is {a:.3g} "
+            f"of the full rotor, {b:.3g} of the small model; take more masses or other nodes"
+        )
+    return StabilityCost(
+        speeds=speeds,
+        full_decrement=full_decrement,
+        small_decrement=small_decrement,
+        full_frequency=full_frequency,
+        small_frequency=small_frequency,
+        full=full,
+        small=of_small,
+        nodes=small.massive,
+        n_full=n_full,
+        n_small=n_small,
+        warnings=tuple(remarks),
+    )
+
+
+def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
+    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each.
+
+    −inf and NaN where the rotor runs away.
+    """
+    decrements = -2 * np.pi * whirl.values.real / np.abs(whirl.values.imag)
+    rows, k = np.arange(len(decrements)), np.nan_to_num(decrements, nan=np.inf).argmin(axis=1)
+    away = np.array(runs_away(whirl))
+    frequency = np.abs(whirl.values.imag)[rows, k]
+    return np.where(away, -np.inf, decrements[rows, k]), np.where(away, np.nan, frequency)
+
+
+def _doubts(full: fem.Stability, small: fem.Stability) -> list[str]:
+    """What makes a comparison of the two thresholds doubtful."""
+    if full.frequency is None or small.frequency is None:
+        return []
+    remarks = []
+    if abs(small.frequency / full.frequency - 1) > APART:
+        remarks.append(
+            f"the full rotor loses stability with whirl at {full.frequency:.6g} rad/s, the small model with "
+            f"{small.frequency:.6g} rad/s: not the same mode; use other nodes or more masses"
+        )
+    if small.direction != full.direction:
+        remarks.append(
+            f"where stability is lost the full rotor whirls {_way(full.direction)}, the small model "
+            f"{_way(small.direction)}"
+        )
+    return remarks
+
+
+def _furthest(full: FloatArray, small: FloatArray) -> tuple[int, float, float] | None:
+    """Where the two smallest decrements are furthest apart, and both, if that is far."""
+    both = np.isfinite(full) & np.isfinite(small)
+    if not both.any():
+        return None
+    apart = np.full(full.shape, -1.0)
+    apart[both] = np.abs(full[both] - small[both])
+    k = int(np.argmax(apart))
+    if apart[k] <= max(FAR * float(np.abs(full[both]).max()), UNDAMPED):
+        return None
+    return k, float(full[k]), float(small[k])
+
+
+def _way(direction: float | None) -> str:
+    return "" if direction is None else DIRECTION_NAMES[direction]

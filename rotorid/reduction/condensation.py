@@ -1,0 +1,467 @@
+"""Guyan reduction, IRS and SEREP of a rotor beside formula (50), all at the same masters.
+
+K and M are those of the rotor's plane x at rest, with all its unknowns: deflections and slopes, shear angles,
+pedestals. Split into masters d (deflections of the chosen nodes) and the others o, each method but the
+regression writes the whole rotor as x = T x_d and keeps Tᵀ K T and Tᵀ M T:
+
+- Guyan (static condensation): x_o = −K_oo⁻¹ K_od x_d, the shape of the shaft at rest. Inertia of the others
+  acts, but bends nothing.
+- IRS (O'Callahan's improved reduced system): the inertia forces of Guyan's model bend the others further.
+  In a mode of it M_G x″ = −K_G x, so that M T x″ = −M T M_G⁻¹ K_G x; the reaction of this force on the others
+  adds K_oo⁻¹ (M T M_G⁻¹ K_G)_o to the rows of T. The sign is that of a load −M x″, which K_oo carries.
+- SEREP: T = Φ Φ_d⁻¹ with the first n modes Φ: exact frequencies and shapes, by construction.
+
+The frequencies of all three are those of a Ritz method, never below the rotor's of the same number. Formula
+(50) is another thing: Guyan's stiffness, and masses one can point at.
+
+Sources: R. J. Guyan, AIAA J. 3 (1965) 380; J. O'Callahan, Proc. 7th IMAC (1989) 17; J. O'Callahan,
+P. Avitabile, R. Riemer, Proc. 7th IMAC (1989) 29.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import fem
+from fem import Pencil, Spectrum, lowest_modes, whole_rotor
+from fem.assembly import assemble, ignored_inertia, multiply
+from rotorid.base import registry
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.checks import whole
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, text
+from rotorid.base.text import counted, listing, percent
+from rotorid.reduction.masses import (
+    Normalisation,
+    RowWeights,
+    design,
+    equivalent_masses,
+    held,
+    like,
+    mac,
+    mass_nodes,
+    natural_frequencies,
+    plane_at_rest,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DEPENDENT = 1e-6
+"""Shapes whose smallest combination at the masters is below this share of their largest entries are one."""
+NEARLY = 1e-2
+"""Below this share SEREP says that errors of the shapes are magnified."""
+MASSLESS = 1e-12
+"""Of the largest eigenvalue of Guyan's mass matrix: below, some motion of the masters moves no mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """One reduced model M x″ + K x = f, x the deflections of the n masters, and how well it does.
+
+    Attributes
+    ----------
+    name
+        As titled in `METHODS`; "regression, k modes".
+    M, K
+        Mass, kg, and stiffness, N/m, shape (n, n); None where the method fails at these masters.
+    T
+        Deflections of all nodes of the rotor from those of the masters, shape (N, n). None for the
+        regression: its masses are no projection.
+    frequencies
+        rad/s, ascending, shape (n,); NaN for a mode that does not vibrate.
+    shapes
+        At the masters, a column per mode, each scaled to fit the rotor's, shape (n, n).
+    relative_error
+        Of each frequency against the rotor's of the same number, shape (n,).
+    mac
+        Of each shape with the rotor's of the same number, at the masters, shape (n,).
+    diagonal
+        Whether the mass matrix is diagonal: only then does a mass stand at a node.
+    reason
+        Why there is no model, or what to know about it; empty where nothing is to be said.
+    """
+
+    name: str
+    M: FloatArray | None
+    K: FloatArray | None
+    T: FloatArray | None
+    frequencies: FloatArray
+    shapes: FloatArray
+    relative_error: FloatArray
+    mac: FloatArray
+    diagonal: bool
+    reason: str = ""
+
+    @property
+    def masses(self) -> FloatArray | None:
+        """The masses at the masters, kg, shape (n,); None where the mass matrix is not diagonal."""
+        return np.diag(self.M).copy() if self.diagonal and self.M is not None else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; the transformation T is left to Python."""
+        return plain(
+            {
+                "method": self.name,
+                "mass_matrix_kg": self.M,
+                "stiffness_matrix_N_per_m": self.K,
+                "masses_kg": self.masses,
+                "diagonal": self.diagonal,
+                "natural_frequencies_rad_s": self.frequencies,
+                "relative_error": self.relative_error,
+                "mac": self.mac,
+                "mode_shapes": self.shapes.T,
+                "reason": self.reason or None,
+            }
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Methods(Answered):
+    """Reduced models of the same rotor at the same nodes by different methods.
+
+    Attributes
+    ----------
+    rotor
+        The rotor; its plane x at rest is reduced.
+    nodes
+        Masters, n of them.
+    rotor_frequencies
+        The rotor's first n natural frequencies, rad/s.
+    rows
+        A `Method` each.
+    warnings
+        What a user should know before choosing.
+    """
+
+    rotor: fem.Rotor
+    nodes: tuple[int, ...]
+    rotor_frequencies: FloatArray
+    rows: tuple[Method, ...]
+    warnings: tuple[str, ...]
+
+    def row(self, name: str) -> Method:
+        """The model of one method; "regression" is the regression however many modes it used.
+
+        Raises
+        ------
+        ValueError
+            For a method that was not compared.
+        """
+        for row in self.rows:
+            if row.name.split(",")[0].lower() == name.split(",")[0].lower():
+                return row
+        raise ValueError(f"no method {name!r}: there are {', '.join(row.name for row in self.rows)}")
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row per method and mode."""
+        return frame(self._columns())
+
+    def _columns(self) -> tuple[Column, ...]:
+        n, several = len(self.nodes), len(self.rows)
+        frequency, share = "{:.4f}".format, "{:+.3%}".format
+
+        def each(name: str) -> FloatArray:
+            return np.concatenate([getattr(row, name) for row in self.rows])
+
+        return (
+            Column("method", np.repeat([row.name for row in self.rows], n), str),
+            Column("mode", np.tile(np.arange(1, n + 1), several), str),
+            Column("frequency_rad_s", each("frequencies"), frequency, "rad/s"),
+            Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several), frequency, "rotor"),
+            Column("relative_error", each("relative_error"), share, "error"),
+            Column("mac", each("mac"), "{:.5f}".format, "MAC"),
+            Column("diagonal", np.repeat([row.diagonal for row in self.rows], n)),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        return plain(
+            {
+                "nodes": self.nodes,
+                "positions_m": self.rotor.positions[np.array(self.nodes) - 1],
+                "rotor_frequencies_rad_s": self.rotor_frequencies,
+                "methods": [row.to_dict() for row in self.rows],
+                "warnings": self.warnings,
+            }
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """The largest error of each method; behind it frequencies, errors and MAC by method and mode."""
+        worst = [
+            f"{row.name} {percent(round(float(np.abs(row.relative_error).max()), 8))} %"
+            if np.isfinite(row.relative_error).all()
+            else f"{row.name}: no model of all modes"
+            for row in self.rows
+        ]
+        full = [row.name for row in self.rows if row.M is not None and not row.diagonal]
+        remark = "full mass matrices; they couple the nodes, and no single mass stands at a node"
+        return Answer(
+            f"Largest error of {counted(len(self.nodes), 'frequency', 'frequencies')}: {', '.join(worst)}.",
+            warnings=self.warnings,
+            notes=(f"{listing(full, 'and')}: {remark}",) if full else (),
+            tables=(text(self._columns()),),
+            more="frequencies and shapes of each method",
+        )
+
+
+class _NoModelError(ValueError):
+    """A method that fails at masters where others work."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Condensed:
+    """What the methods share: the plane at rest, and its static shapes T on masters that are held.
+
+    `factor` is the Cholesky band of K with the masters' rows and columns those of the identity.
+    """
+
+    nodes: tuple[int, ...]
+    remarks: tuple[str, ...]
+    plane: fem.Rotor
+    pencil: Pencil
+    masters: IndexArray
+    modes: fem.Modes
+    spectrum: Spectrum
+    factor: FloatArray
+    T: FloatArray
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Of the rotor's modes at the masters, (n, n)."""
+        return np.asarray(self.modes.shapes[np.array(self.nodes) - 1])
+
+    def mass(self, T: FloatArray) -> FloatArray:
+        """Tᵀ M T."""
+        M = T.T @ multiply(self.pencil.mass, np.asfortranarray(T))
+        return np.asarray((M + M.T) / 2)
+
+    def carried(self, force: FloatArray) -> FloatArray:
+        """K_oo⁻¹ of forces on the others, masters held."""
+        from scipy.linalg.lapack import dpbtrs
+
+        force[self.masters] = 0.0
+        return np.asarray(dpbtrs(self.factor, force)[0])
+
+
+def reduce_by(
+    rotor: fem.Rotor, nodes: Sequence[str | int], method: str = "guyan", *, speed: float | None = None
+) -> Method:
+    """Reduce a rotor to the deflections of some nodes by one of `METHODS`.
+
+    Parameters
+    ----------
+    rotor
+        On supports; its plane x at rest is reduced.
+    nodes
+        Masters: different nodes, as numbers from 1 or names of stations.
+    method
+        "guyan", "irs", "serep", or "regression" over one mode.
+    speed
+        Where tables of supports are read, rad/s; by default their lowest common speed.
+
+    Raises
+    ------
+    ValueError
+        For nodes that do not exist or repeat, more masters than the rotor has modes, a rotor that is free
+        to move, a speed outside a table, an unknown method; for "irs" where Guyan's mass matrix is singular;
+        for "serep" where the modes' shapes at the masters depend on one another.
+
+    Examples
+    --------
+    >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
+    >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
+    >>> model = reduce_by(shaft, [3])
+    >>> model.M.round(2), model.relative_error.round(4)
+    (array([[7.5]]), array([0.0075]))
+    """
+    chosen = registry.find(METHODS, method, "method")
+    condensed = _condense(rotor, nodes, speed)
+    if chosen.function is None:
+        return _regression(condensed, 1, "first", "equal")
+    return _projected(chosen.title, condensed, *chosen.function(condensed))
+
+
+def compare_methods(
+    rotor: fem.Rotor,
+    nodes: Sequence[str | int],
+    *,
+    modes: int = 2,
+    speed: float | None = None,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+) -> Methods:
+    """Reduce a rotor to the same nodes by all `METHODS`.
+
+    Parameters
+    ----------
+    rotor, nodes, speed
+        As in `reduce_by`.
+    modes
+        How many modes the regression uses, 1 … n.
+    normalise, rows
+        Scaling of shapes and weights of rows of the regression, as in `equivalent_masses`.
+
+    Returns
+    -------
+    A row per method. A method that fails at these nodes has no matrices, NaN as frequencies, and its reason
+    among the warnings.
+
+    Raises
+    ------
+    ValueError
+        As for `reduce_by`, or for a number of modes out of range.
+    """
+    condensed = _condense(rotor, nodes, speed)
+    n, modes = len(condensed.nodes), whole(modes, "the number of modes")
+    if not 1 <= modes <= n:
+        raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
+    design(np.eye(n), np.ones(modes), np.ones((n, modes)), normalise=normalise, rows=rows)  # wrong choices
+    table = []
+    for method in METHODS:
+        if method.function is None:
+            table.append(_regression(condensed, modes, normalise, rows))
+            continue
+        try:
+            table.append(_projected(method.title, condensed, *method.function(condensed)))
+        except _NoModelError as failure:
+            table.append(_without(method.title, n, str(failure)))
+    ours = ignored_inertia(condensed.plane)
+    warnings = (
+        *condensed.remarks,
+        *ignored_inertia(rotor),
+        *(warning for warning in condensed.modes.warnings if warning not in ours),
+        *(f"{row.name}: {row.reason}" for row in table if row.reason),
+    )
+    return Methods(rotor, condensed.nodes, condensed.modes.frequencies, tuple(table), warnings)
+
+
+def _condense(rotor: fem.Rotor, nodes: Sequence[str | int], speed: float | None) -> _Condensed:
+    from scipy.linalg.lapack import dpbtrf
+
+    places = mass_nodes(rotor, nodes)
+    plane, remarks = plane_at_rest(rotor, speed)
+    fem.compliance(plane, places)  # refuses a rotor that is free, or a mesh lost in float64
+    modes = fem.critical_speeds(plane, len(places))
+    A = assemble(plane)
+    pencil = whole_rotor(plane, A)
+    spectrum = lowest_modes(plane, A, len(places), pencil)
+    masters = pencil.waves[0][np.array(places) - 1]
+    unit = np.zeros((pencil.size, len(places)), order="F")
+    unit[masters, np.arange(len(places))] = 1.0
+    factor, info = dpbtrf(held(pencil.stiffness, masters))
+    if info != 0:
+        raise ValueError(
+            "the rotor held at the masters is statically unstable: a support has negative stiffness; check "
+            "its sign and size"
+        )
+    still = _Condensed(places, tuple(remarks), plane, pencil, masters, modes, spectrum, factor, unit)
+    T = unit + still.carried(-multiply(pencil.stiffness, unit))
+    return _Condensed(places, tuple(remarks), plane, pencil, masters, modes, spectrum, factor, T)
+
+
+def _guyan(condensed: _Condensed) -> tuple[FloatArray, str]:
+    return condensed.T, ""
+
+
+def _irs(condensed: _Condensed) -> tuple[FloatArray, str]:
+    T = condensed.T
+    M, K = condensed.mass(T), np.asarray(condensed.pencil.energy(T))
+    least, most = np.linalg.eigvalsh(M)[[0, -1]]
+    if least <= MASSLESS * most:
+        raise _NoModelError(
+            "Guyan's mass matrix is singular at these nodes, and IRS needs its inverse: some motion of the "
+            "masters moves no mass; choose nodes with mass or fewer of them"
+        )
+    inertia = multiply(condensed.pencil.mass, np.asfortranarray(T @ np.linalg.solve(M, K)))
+    return T + condensed.carried(inertia), ""
+
+
+def _serep(condensed: _Condensed) -> tuple[FloatArray, str]:
+    vectors = condensed.spectrum.vectors
+    vectors = vectors / np.abs(vectors[condensed.pencil.waves[0]]).max(axis=0)
+    at_masters = vectors[condensed.masters]
+    smallest = float(np.linalg.svd(at_masters, compute_uv=False)[-1])
+    nodes = condensed.nodes
+    if not smallest > DEPENDENT:
+        raise _NoModelError(
+            f"the rotor's first {len(nodes)} shapes depend on one another at the nodes {list(nodes)}"
+            if len(nodes) > 1
+            else f"node {nodes[0]} is a node of the rotor's first mode"
+        )
+    reason = (
+        f"at these nodes the shapes nearly depend on one another (smallest combination {smallest:.1e} of "
+        "their largest deflection): small errors of the model change its matrices much"
+    )
+    return np.linalg.solve(at_masters.T, vectors.T).T, reason if smallest < NEARLY else ""
+
+
+def _projected(name: str, condensed: _Condensed, T: FloatArray, reason: str) -> Method:
+    from scipy.linalg import eigh
+
+    # K from strains, which keep their digits on fine meshes
+    M, K = condensed.mass(T), np.asarray(condensed.pencil.energy(T))
+    mu, shapes = eigh(M, K)  # μ = 1/ω²: the inverse form keeps the digits of the low modes
+    mu, shapes = mu[::-1], shapes[:, ::-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        frequencies = np.where(mu > 1e-15 * mu[0], 1 / np.sqrt(mu), np.nan)
+    return _judged(name, condensed, M, K, T[condensed.pencil.waves[0]], frequencies, shapes, reason)
+
+
+def _regression(condensed: _Condensed, modes: int, normalise: Normalisation, rows: RowWeights) -> Method:
+    """Formula (50) at the masters."""
+    name, nodes = f"regression, {counted(modes, 'mode')}", condensed.nodes
+    alpha = fem.compliance(condensed.plane, nodes)
+    used = condensed.modes.frequencies[:modes], condensed.shapes[:, :modes]
+    try:
+        estimate = equivalent_masses(alpha, *used, normalise=normalise, rows=rows)
+    except ValueError as failure:
+        return _without(name, len(nodes), str(failure))
+    if not estimate.full_rank:
+        why = f"these modes do not determine the masses: {estimate.describe_rank()}"
+        return _without(name, len(nodes), why)
+    masses = estimate.solution
+    omega, shapes = natural_frequencies(alpha, masses)
+    bad = [node for node, m in zip(nodes, masses, strict=True) if m <= 0]
+    reason = ""
+    if bad:
+        reason = f"the mass at node {bad[0]} is not positive: no physical model; use other nodes or modes"
+    K = np.linalg.inv(alpha)
+    return _judged(name, condensed, np.diag(masses), (K + K.T) / 2, None, omega, shapes, reason)
+
+
+METHODS: tuple[registry.Method[Callable[[_Condensed], tuple[FloatArray, str]] | None], ...] = (
+    registry.Method("guyan", "the shaft bent as at rest", _guyan, "Guyan"),
+    registry.Method("irs", "Guyan's shapes bent further by their inertia forces", _irs, "IRS"),
+    registry.Method("serep", "the rotor's first modes, exact for these", _serep, "SEREP"),
+    registry.Method("regression", "masses that stand at the nodes, formula (50)", None, "regression"),
+)
+
+
+def _judged(
+    name: str,
+    condensed: _Condensed,
+    M: FloatArray,
+    K: FloatArray,
+    T: FloatArray | None,
+    frequencies: FloatArray,
+    shapes: FloatArray,
+    reason: str,
+) -> Method:
+    reference = condensed.shapes
+    error = frequencies / condensed.modes.frequencies - 1
+    agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, reference)), np.nan)
+    return Method(
+        name, M, K, T, frequencies, like(shapes, reference), error, agreement, T is None, reason
+    )  # fmt: skip
+
+
+def _without(name: str, n: int, reason: str) -> Method:
+    unknown = np.full(n, np.nan)
+    return Method(name, None, None, None, unknown, np.full((n, n), np.nan), unknown, unknown, False, reason)

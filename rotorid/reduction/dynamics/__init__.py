@@ -1,1 +1,0 @@
-"""The small model in motion: its matrices, response and stability beside the full rotor's."""

@@ -1,1 +1,0 @@
-"""Equivalent masses by formula (50): regression, matched frequencies, derivatives, errors."""

@@ -1,0 +1,169 @@
+"""A small model that keeps its supports.
+
+Bearings and films are held rigidly while formula (50) gives the masses, as
+if they were simple supports: then the masses are those of the shaft, whatever it runs on, and what the
+formula cannot see, the mass that these supports hold at rest, stands at them. It is shared so that mass and
+centre of mass of the model are the rotor's: with two supports that is one way only, with more the nearest
+to the shares of static condensation, 1ᵀ M T. The model is then that of Craig and Bampton with masses
+instead of modes: exact for what the supports carry, and near to the rotor on supports from soft to stiff.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+import fem
+from fem import GRAVITY, JournalBearing, SqueezeFilm
+from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing, percent
+from rotorid.reduction.small_model import SmallModel, small_model
+
+RIGID = 1e7
+"""Stiffness of a rigid support by that of a shaft on two of them."""
+NEAR = 0.05
+"""Of a natural frequency on springs: what a model that keeps its supports is off by, if it is named."""
+
+
+def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
+    """Nodes of its bearings that have a stiffness, journal bearings and squeeze films, ascending."""
+    films = {force.node for force in rotor.forces if isinstance(force, (JournalBearing, SqueezeFilm))}
+    springs = {s.node for s in rotor.supports if s.kind == "bearing" and s.at(s.speeds or 0.0)[0].any()}
+    return tuple(sorted(films | springs))
+
+
+def held_rigidly(rotor: fem.Rotor, stiffness: float = RIGID) -> fem.Rotor:
+    """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
+
+    `stiffness` of a support is by that of the shaft, 48 E I / l³. ValueError if these are fewer than two.
+    """
+    nodes = held_nodes(rotor)
+    if len(nodes) < 2:
+        raise ValueError(
+            "to keep the supports, the masses are found with the shaft held rigidly at its bearings, journal "
+            f"bearings and squeeze films: two nodes at least are needed, this rotor has {len(nodes)}"
+        )
+    bending = float((rotor.youngs_modulus * rotor.second_moment).max())
+    stiffness *= 48 * bending / float(np.sum(rotor.length)) ** 3
+    tilting = {node: sum(s.tilting_stiffness for s in rotor.supports if s.node == node) for node in nodes}
+    return replace(
+        rotor,
+        supports=[fem.Support(node, stiffness, tilting_stiffness=tilting[node]) for node in nodes],
+        forces=(),
+    )
+
+
+def check_free(held: Sequence[int], nodes: Sequence[int]) -> None:
+    """Refuse masses where the shaft is held."""
+    if both := [node for node in nodes if node in held]:
+        raise ValueError(
+            f"node {both[0]} is held rigidly while the masses are found, so none can be found there: leave "
+            "it out of --nodes; it is kept with its bearing, and with its share of the rotor's mass"
+        )
+
+
+def keep_supports(
+    rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray, *, modal_damping: Sequence[float] = ()
+) -> SmallModel:
+    """Condense a shaft to its masses, supports and forces; nodes of the model ascend.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+    nodes, masses
+        As estimated on `held_rigidly`, n of them.
+    modal_damping
+        Damping ratios of the first modes on rigid supports; of the surroundings, in both planes alike.
+
+    Raises
+    ------
+    ValueError
+        As `small_model`, and for a mass at a node that was held.
+    """
+    rigid = held_nodes(rotor)
+    check_free(rigid, nodes)
+    model = small_model(rotor, nodes, masses)
+    at, n = rotor.positions[np.array(model.nodes) - 1], len(nodes)
+    rest = [i for i, node in enumerate(model.nodes) if node in rigid]
+    every, z = model.masses.copy(), rotor.positions
+    shaft = rotor.density * rotor.area * rotor.length * (z[:-1] + z[1:]) / 2
+    moment = float(shaft.sum() + sum(disc.mass * z[disc.node - 1] for disc in rotor.discs))
+    lacking = rotor.total_mass - every.sum(), moment - float(every @ at)
+    every[rest] = _shared(model.weight[rest] / GRAVITY, at[rest], *lacking)
+    damping = np.zeros_like(model.stiffness)
+    if modal_damping:
+        on_rigid = small_model(held_rigidly(rotor), nodes, masses, modal_damping=modal_damping)
+        damping[:n, :n] = on_rigid.damping[:n, :n]
+    order = np.argsort(model.nodes)
+    grid = np.ix_(order, order)
+    sorted_model = replace(
+        model,
+        nodes=tuple(model.nodes[i] for i in order),
+        masses=every[order],
+        weight=model.weight[order],
+        damping=damping[grid],
+        **{name: getattr(model, name)[grid] for name in ("stiffness", "material_damping", "gyroscopic")},
+    )
+    return replace(sorted_model, warnings=(*model.warnings, *_of_masses(rotor, sorted_model)))
+
+
+def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> FloatArray:
+    """Masses of this sum and this first moment about 0, the nearest to `shares`, each a tenth of it at least.
+
+    Where that cannot be, sum and moment are the nearest.
+    """
+    from scipy.optimize import lsq_linear
+
+    first = 1e7  # weight of mass and moment by that of the shares
+    largest = np.abs(shares).max()  # an overhang or a mass nearby may lift what a node carries
+    scale = np.sqrt(np.maximum(shares, 1e-3 * largest))
+    length = float(np.ptp(at))
+    rows = first * np.stack((np.ones_like(at), (at - at.mean()) / length)) * scale
+    wanted = first * np.array([mass, (moment - mass * at.mean()) / length])
+    least = np.maximum(0.1 * shares, 0.01 * largest) / scale
+    solved = lsq_linear(
+        np.vstack((rows, np.eye(len(at)))),
+        np.concatenate((wanted, shares / scale)),
+        bounds=(least, np.inf),
+        method="bvls",
+        tol=1e-14,
+    )
+    return np.asarray(scale * solved.x)
+
+
+def _of_masses(rotor: fem.Rotor, model: SmallModel) -> list[str]:
+    """What is wrong with the masses of a model that keeps its supports, in words."""
+    remarks, total = [], rotor.total_mass
+    if abs(model.masses.sum() / total - 1) > 1e-9:
+        remarks.append(
+            "the masses are too large to leave some for the supports: together "
+            f"{model.masses.sum():.1f} kg of the rotor's {total:.1f} kg; use other nodes or more modes"
+        )
+    if (off := _on_springs(rotor, model)) > NEAR:
+        remarks.append(
+            "on springs as stiff as the shaft, in place of the rigid supports, its first two natural "
+            f"frequencies are off by {percent(off)} %: use other nodes or more masses"
+        )
+    if bare := [str(node) for node, mass in zip(model.nodes, model.masses, strict=True) if mass == 0]:
+        remarks.append(
+            f"no mass stands at node {listing(bare, 'and')}, where supports or forces act: the shaft follows "
+            "there without inertia; better let a mass stand there, with --nodes"
+        )
+    return remarks
+
+
+def _on_springs(rotor: fem.Rotor, model: SmallModel) -> float:
+    """Largest relative error of the first two natural frequencies on springs as stiff as the shaft."""
+    from scipy.linalg import eigh
+
+    sprung = held_rigidly(rotor, 1.0)
+    still = replace(sprung, model=replace(rotor.model, gyroscopic=False))
+    K = model.stiffness.copy()
+    for support in sprung.supports:
+        i = model.nodes.index(support.node)
+        K[i, i] += support.stiffness
+    periods = eigh(np.diag(model.masses), K, eigvals_only=True)[:-3:-1]
+    return float(np.abs(periods**-0.5 / fem.critical_speeds(still, 2).frequencies - 1).max())

@@ -1,0 +1,469 @@
+"""Equivalent masses of a rotor by regression over its modes, formula (50), and the model that they make.
+
+Free vibration of n masses in compliance form ([S] (49)), with springs c to the ground at the masses
+(seals), is `x + α (M x″ + C x) = 0`. In a mode (λ = 1/ω², shape U) this reads
+
+    Σ_j α_ij U_jk m_j = λ_k (U_ik + Σ_j α_ij c_j U_jk)          for every mass i and mode k,
+
+linear in the masses: formula (50) of [S], B m = D. Where there are more rows (n k) than masses the masses
+depend on how large the rows are: how each shape is scaled and how each row is weighted. Both are stated.
+
+Shaft flexibility apart from that of two supports, formula (47): a force at a from the left support A loads
+the supports, a span l apart, by the shares (l − a)/l and a/l ([S] (41)), whatever their stiffness. With R of
+these shares, (n, 2), and δ of the shaft on rigid supports, α = δ + R diag(1/c) Rᵀ.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import fem
+from rotorid.base.arrays import FloatArray
+from rotorid.regression import Estimate, least_squares
+
+Normalisation = Literal["first", "largest", "length"]
+"""Each shape scaled to 1 at the first mass, to 1 at its largest entry, or to unit length."""
+RowWeights = Literal["equal", "relative"] | ArrayLike
+"""Rows as they stand, rows of mode k divided by λ_k, or factors of shape (n, k)."""
+ZERO_AT_FIRST = 1e-9
+"""A shape smaller than this share of its largest entry at the first mass has a node there."""
+ASYMMETRY = 1e-4
+"""A compliance matrix is symmetric (Maxwell); larger differences, of its largest entry, are refused."""
+
+
+def design(
+    compliance: ArrayLike,
+    frequencies: ArrayLike,
+    shapes: ArrayLike,
+    *,
+    seal_stiffness: ArrayLike = 0.0,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+) -> tuple[FloatArray, FloatArray]:
+    """Matrix B and right side D of formula (50), for one set of masses or many at once.
+
+    Parameters
+    ----------
+    compliance
+        Deflection at mass i under unit force at mass j, m/N, shape (…, n, n), symmetric.
+    frequencies
+        Natural frequencies of the k modes, rad/s, shape (k,) or (…, k).
+    shapes
+        Mode shapes at the masses, shape (…, n, k), of any size and sign.
+    seal_stiffness
+        Of springs from each mass to the ground that `compliance` does not hold, N/m, scalar or (…, n).
+    normalise
+        "first": each shape is 1 at the first mass, as in the book; the result then depends on which mass is
+        the first, and a shape with almost a node there outweighs all others. "largest": 1 at the largest
+        entry; "length": unit length. The last two do not depend on the order of the masses: prefer them for
+        ranking places and for measured shapes. For one mode all three give the same masses.
+    rows
+        "equal": rows as they stand, as in the book; those of the first mode are largest (by λ_1/λ_k) and
+        dominate, so that the first frequency fits best. "relative": rows of mode k divided by
+        λ_k = 1/ω_k², so that every mode counts the same; prefer it where the upper frequencies matter as
+        much as the first. An array (n, k), or one that broadcasts to it: factors ≥ 0 of the rows (not
+        squared; 0 leaves a row out), such as the inverse of their errors.
+
+    Returns
+    -------
+    B (…, n k, n) and D (…, n k), weighted, rows mode by mode (row n k' + i is mass i in mode k'). In a batch
+    (leading dimensions) members whose shapes cannot be scaled have NaN rows.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit, NaN or infinite entries, frequencies that are not positive, a compliance
+        that is not symmetric, unknown choices, negative weights; without leading dimensions also for a mode
+        with a node at the first mass (scaled to 1 there) or without any displacement.
+    """
+    alpha, omega, U, springs = _checked(compliance, frequencies, shapes, seal_stiffness)
+    n, k = U.shape[-2:]
+    batch = np.broadcast_shapes(alpha.shape[:-2], omega.shape[:-1], U.shape[:-2], springs.shape[:-1])
+    U = _normalised(U, normalise, quiet=len(batch) > 0)
+    factors = _row_factors(rows, omega, n)
+    B = np.swapaxes(U, -1, -2)[..., :, None, :] * alpha[..., None, :, :]  # (…, k, i, j)
+    B = B * np.swapaxes(factors, -1, -2)[..., None]
+    D = np.swapaxes(factors * (U + alpha @ (springs[..., :, None] * U)) / omega[..., None, :] ** 2, -1, -2)
+    return (
+        np.ascontiguousarray(np.broadcast_to(B, (*batch, k, n, n))).reshape(*batch, k * n, n),
+        np.ascontiguousarray(np.broadcast_to(D, (*batch, k, n))).reshape(*batch, k * n),
+    )
+
+
+def _normalised(shapes: FloatArray, normalise: Normalisation, *, quiet: bool = False) -> FloatArray:
+    """Shapes (…, n, k) scaled; with `quiet` NaN where that is impossible, else a ValueError."""
+    largest = np.abs(shapes).max(axis=-2, keepdims=True)
+    bad = largest == 0
+    if not quiet and bad.any():
+        raise ValueError("a mode has no displacement at any mass; choose other nodes or leave the mode out")
+    if normalise == "first":
+        scale = shapes[..., :1, :]
+        bad = bad | (np.abs(scale) < ZERO_AT_FIRST * largest)
+    elif normalise == "largest":
+        scale = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=-2, keepdims=True), axis=-2)
+    elif normalise == "length":
+        scale = np.linalg.norm(shapes, axis=-2, keepdims=True)
+    else:
+        raise ValueError(f'normalise must be "first", "largest" or "length", not {normalise!r}')
+    if not quiet and bad.any():
+        raise ValueError(
+            "a mode has a node at the first mass; choose another node for the first mass, "
+            'or normalise="largest"'
+        )
+    return np.asarray(shapes / np.where(bad, np.nan, scale))
+
+
+def _row_factors(rows: RowWeights, omega: FloatArray, n: int) -> FloatArray:
+    """What the rows of (50) are multiplied by: (…, n, k) or what broadcasts to it."""
+    k = omega.shape[-1]
+    if isinstance(rows, str):
+        if rows not in ("equal", "relative"):
+            raise ValueError(f'rows must be "equal", "relative" or an array of weights (n, k), not {rows!r}')
+        return np.ones((n, k)) if rows == "equal" else np.asarray(omega[..., None, :] ** 2)
+    factors = np.asarray(rows, dtype=float)
+    if factors.ndim > 2 or any(a not in (1, b) for a, b in zip(factors.shape[::-1], (k, n), strict=False)):
+        raise ValueError(f"row weights must have shape (n, k) = ({n}, {k}); got {factors.shape}")
+    if not np.isfinite(factors).all() or (factors < 0).any() or not factors.any():
+        raise ValueError("row weights must be finite, not negative, and not all zero")
+    return np.broadcast_to(factors, (n, k))
+
+
+def _checked(
+    compliance: ArrayLike, frequencies: ArrayLike, shapes: ArrayLike, seal_stiffness: ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    alpha = np.asarray(compliance, dtype=float)
+    omega = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    U, springs = np.asarray(shapes, dtype=float), np.asarray(seal_stiffness, dtype=float)
+    fits = alpha.ndim >= 2 and U.ndim >= 2 and alpha.shape[-2] == alpha.shape[-1] == U.shape[-2] > 0
+    if not fits or U.shape[-1] != omega.shape[-1] or omega.shape[-1] == 0:
+        raise ValueError(
+            f"compliance must be (n, n) and shapes (n, k) for k frequencies; got {alpha.shape}, {U.shape} "
+            f"and {omega.shape[-1]} frequencies"
+        )
+    n = U.shape[-2]
+    if springs.ndim and springs.shape[-1] not in (1, n):
+        raise ValueError(f"seal_stiffness must be one number or one per mass ({n}); got {springs.shape}")
+    springs = np.broadcast_to(springs, (*springs.shape[:-1], n))
+    for name, value in (("compliance", alpha), ("shapes", U), ("seal_stiffness", springs)):
+        if not np.isfinite(value).all():
+            raise ValueError(f"{name} must be finite; found NaN or infinity")
+    if not ((omega > 0) & np.isfinite(omega)).all():
+        raise ValueError(
+            "natural frequencies must be positive and finite: a rigid-body mode determines no masses"
+        )
+    gap = np.abs(alpha - np.swapaxes(alpha, -1, -2)).max(axis=(-2, -1))
+    if (gap > ASYMMETRY * np.abs(alpha).max(axis=(-2, -1))).any():
+        raise ValueError(
+            "compliance must be symmetric (deflection at i under a force at j equals that at j under a force "
+            "at i); correct it, or average the two entries if both are measured"
+        )
+    return alpha, omega, U, springs
+
+
+@dataclass(frozen=True, eq=False)
+class BoundedEstimate(Estimate):
+    """Masses that had to be ≥ 0; those at the bound are kept at zero and have no interval.
+
+    Attributes
+    ----------
+    at_bounds
+        Names of the masses at the bound: the data would make them negative.
+    """
+
+    at_bounds: tuple[str, ...] = ()
+
+
+def equivalent_masses(
+    compliance: ArrayLike,
+    frequencies: ArrayLike,
+    shapes: ArrayLike,
+    *,
+    seal_stiffness: ArrayLike = 0.0,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+    nonnegative: bool = False,
+) -> Estimate:
+    """Estimate the masses of an n-mass model from k modes, [S] (50).
+
+    Parameters
+    ----------
+    compliance, frequencies, shapes, seal_stiffness, normalise, rows
+        As in `design`, without leading dimensions. Computed or measured: the modes need not be those of a
+        computed rotor.
+    nonnegative
+        Least squares over masses ≥ 0; the result is a `BoundedEstimate`, which names the masses at the
+        bound. Where the bound holds nothing back the masses are those of the free regression.
+
+    Returns
+    -------
+    Estimate of m1 … mn, kg. Masses that the modes do not determine are NaN in `values`, and
+    `describe_rank()` names them. The intervals take the scatter of the rows of (50) for random; what errors
+    of compliance and shapes do is `InputErrors` of `reduce`.
+
+    Raises
+    ------
+    ValueError
+        As in `design`.
+
+    Examples
+    --------
+    >>> estimate = equivalent_masses([[2e-8, 1e-8], [1e-8, 2e-8]], [1e3], [[1.0], [1.0]])
+    >>> estimate.values.round(3)
+    array([33.333, 33.333])
+    """
+    choices: dict[str, Any] = {"seal_stiffness": seal_stiffness, "normalise": normalise, "rows": rows}
+    B, D = design(compliance, frequencies, shapes, **choices)
+    if B.ndim != 2:
+        raise ValueError("equivalent_masses takes one model at a time; for many at once use design")
+    names = [f"m{i + 1}" for i in range(B.shape[1])]
+    weights = np.where(np.abs(B).max(axis=1) > 0, 1.0, 0.0)  # rows of weight 0 are no degrees of freedom
+    if not weights.any():
+        raise ValueError("every row of the regression is zero: these modes and compliances say nothing")
+    free = least_squares(B, D, names=names, weights=weights)
+    return _bounded(B, D, weights, free) if nonnegative else free
+
+
+def _bounded(B: FloatArray, D: FloatArray, weights: FloatArray, free: Estimate) -> BoundedEstimate:
+    """The masses ≥ 0 with the least residual; covariance of the regression of the positive masses alone."""
+    from scipy.optimize import nnls
+
+    norms = np.linalg.norm(B, axis=0)
+    start, _ = nnls(B / np.where(norms > 0, norms, 1.0), D / (np.linalg.norm(D) or 1.0))
+    kept, n = np.flatnonzero(start > 0), len(free.names)
+    determined = ~np.isnan(free.values)
+    solution, residuals, full = np.zeros(n), D.copy(), None
+    if kept.size:
+        inner = least_squares(B[:, kept], D, names=[free.names[j] for j in kept], weights=weights)
+        solution[kept], residuals = inner.solution, inner.residuals
+        if inner.covariance is not None:
+            full = np.zeros((n, n))
+            full[np.ix_(kept, kept)] = inner.covariance
+    covariance = None if full is None else full.copy()
+    if covariance is not None:
+        lost = ~determined | (solution == 0)
+        covariance[lost, :] = covariance[:, lost] = np.nan
+    changed = {
+        **{field.name: getattr(free, field.name) for field in dataclasses.fields(free)},
+        "values": np.where(determined, solution, np.nan),
+        "solution": solution,
+        "residuals": residuals,
+        "covariance": covariance,
+        "solution_covariance": full,
+        "dof": int(np.count_nonzero(weights)) - kept.size,
+    }
+    at_bounds = tuple(name for j, name in enumerate(free.names) if determined[j] and j not in kept)
+    return BoundedEstimate(**changed, at_bounds=at_bounds)
+
+
+def natural_frequencies(
+    compliance: ArrayLike, masses: ArrayLike, *, seal_stiffness: ArrayLike = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Natural frequencies and shapes of a model in compliance form.
+
+    Parameters
+    ----------
+    compliance, seal_stiffness
+        As in `equivalent_masses`.
+    masses
+        kg, shape (n,). Masses that are zero or negative are taken as they are.
+
+    Returns
+    -------
+    Frequencies, rad/s, ascending, shape (n,), NaN where a mode does not vibrate (only with masses that are
+    not positive); shapes (n, n), a column per mode, scaled to the largest entry = 1.
+    """
+    alpha = np.asarray(compliance, dtype=float)
+    m = np.asarray(masses, dtype=float)
+    n = len(alpha)
+    springs = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,))
+    flexibility = np.linalg.solve(np.eye(n) + alpha * springs, alpha)
+    flexibility = (flexibility + flexibility.T) / 2
+    if (m > 0).all():
+        root = np.sqrt(m)
+        lam, vectors = np.linalg.eigh(root[:, None] * flexibility * root)
+        shapes = vectors / root[:, None]
+    else:
+        complex_lam, complex_shapes = np.linalg.eig(flexibility * m)
+        real = np.abs(complex_lam.imag) <= 1e-9 * np.abs(complex_lam)
+        lam, shapes = np.where(real, complex_lam.real, np.nan), complex_shapes.real
+    with np.errstate(divide="ignore", invalid="ignore"):
+        omega = np.where(lam > 1e-15 * np.nanmax(np.abs(lam)), 1.0 / np.sqrt(lam), np.nan)
+    order = np.argsort(omega)  # NaN last
+    omega, shapes = omega[order], shapes[:, order]
+    largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], axis=0)
+    return omega, shapes / largest
+
+
+def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Modal assurance criterion between the columns of two sets of shapes.
+
+    Parameters
+    ----------
+    a, b
+        Shapes at the same points, (n, j) and (n, k).
+
+    Returns
+    -------
+    (j, k), 1 where two shapes are proportional, 0 where they are orthogonal.
+
+    Examples
+    --------
+    >>> mac([[1.0], [2.0]], [[2.0, 2.0], [4.0, -1.0]])
+    array([[1., 0.]])
+    """
+    A, B = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    return np.asarray((A.T @ B) ** 2 / np.outer((A**2).sum(axis=0), (B**2).sum(axis=0)))
+
+
+def like(shapes: FloatArray, reference: FloatArray) -> FloatArray:
+    """Scale each column to the least-squares size of the reference column, so that both can be drawn."""
+    factor = (shapes * reference).sum(axis=0) / (shapes**2).sum(axis=0)
+    return np.asarray(shapes * np.where(np.abs(factor) < 1e-12, 1.0, factor))
+
+
+def mass_nodes(rotor: fem.Rotor, nodes: Sequence[int | str]) -> tuple[int, ...]:
+    """Numbers of different nodes, given as numbers from 1 or names of stations; ValueError for others."""
+    places = tuple(rotor.node(node) for node in nodes)
+    if not places or len(set(places)) != len(places):
+        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
+    return places
+
+
+def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, list[str]]:
+    """The rotor's plane x without rotation, on springs to the ground or to pedestals, and what to say of it.
+
+    Neither gyroscopic moments nor coupling between x and y nor damping have a place in formula (50).
+    """
+    if speed is not None and not (np.isfinite(speed) and speed >= 0):
+        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
+    lowest = max((support.speeds[0] for support in rotor.supports if support.speeds), default=0.0)
+    omega = lowest if speed is None else float(speed)
+    supports = []
+    for support in rotor.supports:
+        stand = support.pedestal
+        supports.append(
+            fem.Support(
+                support.node,
+                float(support.at(omega)[0][0, 0]),
+                name=support.name,
+                pedestal=None if stand is None else fem.Pedestal(0.0, stand.xy("stiffness")[0]),
+                kind=support.kind,
+                tilting_stiffness=support.tilting_stiffness,
+            )
+        )
+    model = dataclasses.replace(rotor.model, gyroscopic=False)
+    plane = dataclasses.replace(rotor, supports=supports, model=model)
+    stiffnesses = [support.at(support.speeds or 0.0)[0] for support in rotor.supports]
+    coupled = any(K[..., 0, 1].any() or K[..., 1, 0].any() for K in stiffnesses)
+    remarks = []
+    if rotor.model.gyroscopic or coupled or not rotor.symmetric:
+        remarks.append(
+            "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
+            "of the rotor at rest, without gyroscopic effect and cross-coupling"
+        )
+    if any(support.pedestal is not None and support.pedestal.mass > 0 for support in rotor.supports):
+        remarks.append(
+            "the masses of the pedestals are left out here, of the rotor and of the model: they come back in "
+            "the small model (response, stability, model file)"
+        )
+    if not rotor.symmetric:
+        remarks.append("the supports are not the same in x and y: only x is fitted and compared here")
+    if not rotor.constant:
+        which = "the lowest of" if speed is None else "chosen in"
+        remarks.append(
+            f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s, {which} their tables"
+        )
+    return plane, remarks
+
+
+@dataclass(frozen=True, eq=False)
+class Separated:
+    """The shaft's flexibility apart from that of its two supports.
+
+    Attributes
+    ----------
+    nodes, positions
+        Of the n masses, and their distance a from the left support, m.
+    supports, span
+        Nodes of both supports, and l between them, m.
+    delta
+        Compliance of the shaft on rigid supports, m/N, shape (n, n).
+    """
+
+    nodes: tuple[int, ...]
+    positions: FloatArray
+    supports: tuple[int, int]
+    span: float
+    delta: FloatArray
+
+    @property
+    def fractions(self) -> FloatArray:
+        """Shares R of a force at each mass that both supports carry, (n, 2)."""
+        return np.stack((self.span - self.positions, self.positions), axis=1) / self.span
+
+    def compliance(self, stiffness: ArrayLike) -> FloatArray:
+        """α, m/N, shape (n, n), with supports of this stiffness, N/m, one or (2,); formula (47).
+
+        Raises
+        ------
+        ValueError
+            For a stiffness that is not positive and finite.
+        """
+        c = np.asarray(stiffness, dtype=float)
+        if c.shape not in ((), (2,)) or not (np.isfinite(c).all() and (c > 0).all()):
+            raise ValueError(f"the stiffness of both supports must be positive and finite, in N/m; got {c}")
+        R = self.fractions
+        return np.asarray(self.delta + (R / np.broadcast_to(c, (2,))) @ R.T)
+
+
+def separate(rotor: fem.Rotor, nodes: Sequence[int | str]) -> Separated:
+    """Separate the shaft's flexibility from that of its two supports, [S] (41)–(47).
+
+    Parameters
+    ----------
+    rotor
+        On supports at exactly two nodes, without tilting stiffness; how stiff they are does not matter.
+    nodes
+        Of the n masses: different numbers from 1, or names of stations; they may overhang.
+
+    Raises
+    ------
+    ValueError
+        For more or fewer than two supported nodes, seals among them or tilting stiffness (equilibrium alone
+        then does not give the shares of a force), nodes that do not exist or repeat.
+    """
+    places = mass_nodes(rotor, nodes)
+    ends = sorted({support.node for support in rotor.supports})
+    seals = any(support.kind == "seal" for support in rotor.supports)
+    if len(ends) != 2 or seals or any(support.tilting_stiffness > 0 for support in rotor.supports):
+        raise ValueError(
+            "formula (47) needs bearings at exactly two nodes, without tilting stiffness and seals: "
+            "equilibrium alone must share a force among them; this rotor has supports at "
+            f"{', '.join(map(str, ends)) or 'no node'}: use the small model, which keeps every support"
+        )
+    at = rotor.positions[np.array([*ends, *places]) - 1]
+    span, positions = float(at[1] - at[0]), at[2:] - at[0]
+    # on supports about as stiff as the shaft neither δ nor R diag(1/c) Rᵀ is lost in their sum
+    c = 48 * float((rotor.youngs_modulus * rotor.second_moment).max()) / float(np.sum(rotor.length)) ** 3
+    even = dataclasses.replace(rotor, supports=[fem.Support(node, c) for node in ends])
+    apart = Separated(places, positions, (ends[0], ends[1]), span, np.zeros((len(places),) * 2))
+    delta = fem.compliance(even, places) - apart.compliance(c)
+    held = np.isin(places, ends)
+    delta[held, :] = delta[:, held] = 0.0
+    return dataclasses.replace(apart, delta=(delta + delta.T) / 2)
+
+
+def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
+    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
+    free = np.ones(band.shape[1])
+    free[unknowns] = 0.0
+    above = range(len(band) - 1, -1, -1)
+    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
+    K[-1, unknowns] = 1.0
+    return K

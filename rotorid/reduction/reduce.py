@@ -1,0 +1,626 @@
+"""Reduction of a rotor to masses at chosen nodes, beside the rotor itself."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import fem
+from fem.assembly import ignored_inertia
+from rotorid.base.answer import Answer, Answered, together
+from rotorid.base.arrays import FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, text
+from rotorid.base.rpm import RPM
+from rotorid.base.text import counted, error_figures, percent
+from rotorid.reduction.input_errors import InputErrors, Inputs, MassErrors, Shift
+from rotorid.reduction.masses import (
+    BoundedEstimate,
+    Normalisation,
+    RowWeights,
+    Separated,
+    equivalent_masses,
+    like,
+    mac,
+    mass_nodes,
+    natural_frequencies,
+    plane_at_rest,
+    separate,
+)
+from rotorid.regression.estimate import Estimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SENSITIVE = 0.1
+"""Where input errors of 1 % move a mass by more than this share, the regression is called ill-conditioned."""
+HEAVY = 1.05
+"""Masses that weigh more than this times the rotor are named."""
+ALIKE = 0.9
+"""Below this MAC two shapes are not those of one mode."""
+OFF, APART = 0.1, 0.05
+"""Relative errors of a model's frequency, and of a measured one beside the rotor's, that are named."""
+_RESIDUAL = "± is one standard deviation from the regression's residuals (model error, not measurement)"
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """How a regression was done.
+
+    Attributes
+    ----------
+    source
+        Whether the modes were computed from the rotor or measured.
+    normalise, rows, nonnegative
+        As in `equivalent_masses`.
+    """
+
+    source: Literal["rotor", "measured"]
+    normalise: Normalisation
+    rows: RowWeights
+    nonnegative: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        rows = self.rows if isinstance(self.rows, str) else "own"
+        return {**vars(self), "rows": rows}
+
+    def words(self, modes: int) -> str:
+        """Such as "the first 2 measured modes, rows relative"."""
+        kind = "measured " if self.source == "measured" else ""
+        parts = [f"the first {kind}mode" if modes == 1 else f"the first {modes} {kind}modes"]
+        parts += [] if self.normalise == "first" else [f"shapes scaled by {self.normalise}"]
+        rows = self.to_dict()["rows"]
+        parts += [] if rows == "equal" else [f"rows {rows}"]
+        parts += ["masses not negative"] if self.nonnegative else []
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction(Answered):
+    """An n-mass model of a rotor beside the rotor itself.
+
+    Attributes
+    ----------
+    rotor
+        The rotor; None where only its compliance and measured modes are known.
+    nodes
+        Where the masses stand: node numbers, or labels where there is no rotor.
+    modes
+        How many modes of the rotor the regression used.
+    masses
+        Estimate of the masses, kg, with the scatter of the regression.
+    compliance
+        m/N, shape (n, n), without the seals in `seal_stiffness`.
+    seal_stiffness
+        Of springs from the masses to the ground beside the compliance, N/m, shape (n,).
+    frequencies, shapes
+        Of the n-mass model: rad/s (n,), and at the masses (n, n), scaled to fit the rotor's.
+    rotor_frequencies, rotor_shapes
+        Of the rotor, computed for its plane at rest or measured: rad/s (j,), and at the masses (n, j).
+    rotor_modes
+        The computed modes at every node, to draw; None without a rotor.
+    choices
+        How the regression was done: normalisation, row weights, sign of the masses, source of the modes.
+    errors
+        What stated errors of the inputs do to masses and frequencies; None where none are stated.
+    separated
+        The compliance of the shaft apart from its two supports, (47); None where not asked for.
+    warnings
+        What a user should know before trusting the model.
+    """
+
+    rotor: fem.Rotor | None
+    nodes: tuple[int | str, ...]
+    modes: int
+    masses: Estimate
+    compliance: FloatArray
+    seal_stiffness: FloatArray
+    frequencies: FloatArray
+    shapes: FloatArray
+    rotor_frequencies: FloatArray
+    rotor_shapes: FloatArray
+    rotor_modes: fem.Modes | None
+    choices: Choices
+    errors: MassErrors | None
+    separated: Separated | None
+    warnings: tuple[str, ...]
+
+    @property
+    def positions(self) -> FloatArray | None:
+        """Of the masses, m from the left end, shape (n,); None without a rotor."""
+        if self.rotor is None:
+            return None
+        return np.asarray(self.rotor.positions[[int(node) - 1 for node in self.nodes]])
+
+    @property
+    def relative_error(self) -> FloatArray:
+        """Of each frequency against the rotor's, shape (n,); NaN where the rotor's is not known."""
+        return np.asarray(self.frequencies / self._padded(self.rotor_frequencies) - 1.0)
+
+    @property
+    def mac_matrix(self) -> FloatArray:
+        """MAC of the model's modes (rows) with the rotor's (columns) at the masses, (n, j)."""
+        return mac(self.shapes, self.rotor_shapes)
+
+    @property
+    def mac(self) -> FloatArray:
+        """MAC of each mode with the rotor's mode of the same number, shape (n,); NaN where unknown."""
+        return self._padded(np.diag(self.mac_matrix))
+
+    @property
+    def inputs(self) -> Inputs:
+        """Of formula (50)."""
+        used = self.rotor_frequencies[: self.modes], self.rotor_shapes[:, : self.modes]
+        return Inputs(self.compliance, *used, self.seal_stiffness, self.choices.normalise, self.choices.rows)
+
+    @cached_property
+    def sensitivity(self) -> FloatArray:
+        """Relative standard deviation of each mass per that of compliances and shapes, shape (n,)."""
+        return self.inputs.sensitivity()
+
+    @property
+    def equations_of_motion(self) -> fem.Motion:
+        """M x'' + K x = f of the small model: masses, and the inverse of the compliance.
+
+        The displacement of the mass at node 7 is `x7`. There is no damping: what a rotor's bearings and its
+        surroundings take out is for the user to add, or to estimate, or comes with the supports (`small`).
+        """
+        K = np.linalg.inv(self.compliance) + np.diag(self.seal_stiffness)
+        n = len(self.nodes)
+        names = tuple(f"x{node}" for node in self.nodes)
+        return fem.Motion(np.diag(self.masses.solution), np.zeros((n, n)), (K + K.T) / 2, names, 0.0)
+
+    def what_if(self, changes: Mapping[str, float]) -> Shift:
+        """Changes of masses and frequencies by relative changes of inputs, such as {"alpha12": 0.013}.
+
+        Raises
+        ------
+        ValueError
+            For an input that does not exist (they are `alpha12`, `U31`, `omega1`, `c2` …), or a change
+            that is not finite.
+        """
+        inputs = self.inputs
+        row = inputs.change(changes)
+        changed, now = inputs.recomputed(np.concatenate((row, np.zeros_like(row))))
+        return Shift(*(changed - now))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
+        document: dict[str, Any] = {
+            "nodes": self.nodes,
+            "positions_m": self.positions,
+            "modes": self.modes,
+            **self.choices.to_dict(),
+            "masses_kg": self.masses.solution,
+            "masses_std_kg": self.masses.std,
+            "mass_sensitivity": self.sensitivity,
+            "compliance_m_per_N": self.compliance,
+            "seal_stiffness_N_per_m": self.seal_stiffness,
+            "natural_frequencies_rad_s": self.frequencies,
+            "rotor_frequencies_rad_s": self._padded(self.rotor_frequencies),
+            "relative_error": self.relative_error,
+            "mac": self.mac,
+            "condition_number": self.masses.condition_number,
+            "warnings": self.warnings,
+        }
+        if (apart := self.separated) is not None:
+            document["separated"] = {
+                "nodes": apart.nodes,
+                "positions_m": apart.positions,
+                "supports": apart.supports,
+                "span_m": apart.span,
+                "delta_m_per_N": apart.delta,
+                "fractions": apart.fractions,
+            }
+        if self.errors is not None:
+            document["uncertainty"] = self.errors.to_dict()
+        return plain(document)
+
+    def to_frame(self) -> pd.DataFrame:
+        """First a row per mass (`table` is "masses"), then a row per mode ("modes").
+
+        Masses have node, position and mass; modes have number, frequencies, error and MAC. Cells of the other
+        kind are blank.
+        """
+        import pandas as pd
+
+        n = len(self.nodes)
+        masses = pd.DataFrame({"node": self.nodes, "mass_kg": self.masses.solution})
+        if self.positions is not None:
+            masses.insert(1, "position_m", self.positions)
+        modes = pd.DataFrame(
+            {
+                "mode": np.arange(1, n + 1),
+                "frequency_rad_s": self.frequencies,
+                "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
+                "relative_error": self.relative_error,
+                "mac": self.mac,
+            }
+        )
+        modes.index += n
+        frame = pd.concat((masses, modes), axis=1).astype({"mode": "Int64"})
+        if self.rotor is not None:
+            frame = frame.astype({"node": "Int64"})
+        frame.insert(0, "table", ["masses"] * n + ["modes"] * n)
+        return frame
+
+    @property
+    def answer(self) -> Answer:
+        """How well the masses stand for the rotor, the masses, and both frequencies beside each other."""
+        whole = "" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
+        masses = Answer(
+            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from "
+            f"{self.choices.words(self.modes)}, formula (50), together "
+            f"{self.masses.solution.sum():.1f}{whole or ' kg'}.\n"
+            f"{self._judgement()}; condition number {self.masses.condition_number:.3g}.",
+            f"{text(self._mass_columns())}\n\n{text(self._mode_columns())}",
+            self.warnings[::-1],  # of the model as it came out before those of what it is made for
+            (_RESIDUAL,) if self.masses.std is not None else (),
+        )
+        more = [] if self.errors is None else [self.errors.answer]
+        if (apart := self.separated) is not None:
+            a, b = apart.supports
+            columns = (
+                Column("node", apart.nodes, str, "mass at node"),
+                Column("a", 100 * apart.fractions[:, 0], "{:.4g}".format, f"% on node {a}"),
+                Column("b", 100 * apart.fractions[:, 1], "{:.4g}".format, f"% on node {b}"),
+                Column("delta", np.diag(apart.delta), "{:.6g}".format, "shaft on rigid supports, m/N"),
+            )
+            words = f"The shaft apart from its supports at nodes {a} and {b}, {apart.span:.6g} m apart."
+            more.append(Answer(words, tables=(text(columns),), more="shares of the supports"))
+        return together([masses, *more])
+
+    def _judgement(self) -> str:
+        """How near the modes are."""
+        errors, macs = np.abs(self.relative_error[: self.modes]), self.mac[: self.modes]
+        if (self.masses.solution <= 0).any():
+            return "NO physical model, a mass is not positive"
+        if not np.isfinite(errors).all():
+            return "NO model of these modes, not all of them vibrate"
+        whose = "measured" if self.choices.source == "measured" else "rotor's"
+        words = f"Frequencies within {percent(round(errors.max(), 8))} % of the {whose}, MAC {macs.min():.4g}"
+        k = self.modes
+        if k < len(self.nodes) and np.isfinite(self.relative_error[k]):
+            words += f"; mode {k + 1} off by {100 * self.relative_error[k]:+.3g} %"
+        return words
+
+    def _mass_columns(self) -> tuple[Column, ...]:
+        std, positions = self.masses.std, self.positions
+        at = () if positions is None else (Column("at, m", positions, "{:.3f}".format),)
+        spread = () if std is None else (Column("±", std, error_figures),)
+        masses = Column("mass, kg", self.masses.solution, "{:.3f}".format)
+        return (Column("node", self.nodes, str), *at, masses, *spread)
+
+    def _mode_columns(self) -> tuple[Column, ...]:
+        model, other = self.frequencies, self._padded(self.rotor_frequencies)
+        whose = "measured" if self.choices.source == "measured" else "rotor"
+        still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
+        return (
+            Column("mode", range(1, len(self.nodes) + 1), str),
+            Column("model", model * RPM, "{:.1f}".format, "model, rpm"),
+            Column("rad/s", model, "{:.4f}".format),
+            Column("rotor", other * RPM, "{:.1f}".format, f"{whose}, rpm"),
+            Column("rotor_rad_s", other, "{:.4f}".format, "rad/s"),
+            Column("error", 100 * self.relative_error, "{:+.3f}".format, "error, %"),
+            Column("MAC", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format),
+            *((Column("", still, str),) if any(still) else ()),
+        )
+
+    def _padded(self, values: FloatArray) -> FloatArray:
+        out = np.full(len(self.nodes), np.nan)
+        out[: len(values)] = values[: len(out)]
+        return out
+
+
+def reduce(  # noqa: PLR0913
+    rotor: fem.Rotor,
+    nodes: Sequence[int],
+    modes: int = 2,
+    *,
+    speed: float | None = None,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+    nonnegative: bool = False,
+    measured: tuple[ArrayLike, ArrayLike] | None = None,
+    supports_apart: bool = False,
+    errors: InputErrors | None = None,
+) -> Reduction:
+    """Reduce a rotor to masses at chosen nodes by regression over its first modes.
+
+    Formula (50) is one of a plane that does not turn: of a rotor with gyroscopic effect, or on supports that
+    are more than constant isotropic springs, the plane x at rest is reduced, and `warnings` say so. What
+    turns, couples and damps comes back in the small model.
+
+    Parameters
+    ----------
+    rotor
+        On supports; its static compliance must exist.
+    nodes
+        Different node numbers, from 1, where the masses stand.
+    modes
+        How many of the modes the regression uses, 1 … n.
+    speed
+        Where tables of supports are read, rad/s; by default their lowest common speed.
+    normalise, rows, nonnegative
+        As in `equivalent_masses`; the defaults are those of [S].
+    measured
+        Frequencies, rad/s (k,), and shapes at the nodes (n, k), used instead of the computed ones.
+    supports_apart
+        Take the compliance from (47): that of the shaft on rigid supports, and the two bearings beside it;
+        seals at the masses then stand in the right side of (50).
+    errors
+        Relative standard deviations of the inputs: then `errors` of the result has those of masses and
+        frequencies, of 2000 draws with a fixed seed.
+
+    Raises
+    ------
+    ValueError
+        For a speed outside a table, nodes that do not exist or repeat, a number of modes out of range, a
+        rotor free to move, masses that these modes do not determine, or supports that cannot be set apart.
+
+    Notes
+    -----
+    Source: [S] 1.10, tasks 9.1 and 9.2. The frequencies of the small model come from its eigenvalue
+    problem, so their agreement with the rotor's is a check, also for the modes that the regression used.
+    """
+    places = mass_nodes(rotor, nodes)
+    n = len(places)
+    plane, remarks = plane_at_rest(rotor, speed)
+    if measured is not None and any(s.pedestal is not None and s.pedestal.mass for s in rotor.supports):
+        raise ValueError(
+            "measured modes hold the masses of the pedestals, which formula (50) cannot take apart: give the "
+            "pedestals no mass in the rotor file (the equivalent masses then hold it), or use computed modes"
+        )
+    full = fem.critical_speeds(plane, n)
+    index = np.array(places) - 1
+    seals, apart = np.zeros(n), None
+    if supports_apart:
+        bare, seals = _without_seals(plane, places)
+        apart = separate(bare, places)
+        zero = np.zeros(1)
+        stiffness = [
+            sum(float(s.dynamic_stiffness(zero)[0, 0, 0].real) for s in bare.supports if s.node == node)
+            for node in apart.supports
+        ]
+        alpha = apart.compliance(stiffness)
+    else:
+        alpha = fem.compliance(plane, places)
+    if measured is None:
+        omega, shapes = full.frequencies, full.shapes[index]
+    else:
+        omega, shapes = _modes(measured, n)
+        remarks += _other_modes(omega, full.frequencies, shapes, full.shapes[index], places)
+    source: Literal["rotor", "measured"] = "rotor" if measured is None else "measured"
+    how = Choices(source, normalise, rows, nonnegative)
+    result = _reduced(places, alpha, seals, omega, shapes, modes, how, errors)
+    ours = ignored_inertia(full.rotor)
+    together_kg, total = float(result.masses.solution.sum()), rotor.total_mass
+    heavy = (
+        f"the masses weigh {together_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they stand "
+        "where it hardly moves; use other nodes"
+    )
+    return dataclasses.replace(
+        result,
+        rotor=rotor,
+        rotor_modes=full,
+        separated=apart,
+        warnings=(
+            *remarks,
+            *ignored_inertia(rotor),
+            *(warning for warning in full.warnings if warning not in ours),
+            *result.warnings,
+            *([heavy] if together_kg > HEAVY * total else []),
+        ),
+    )
+
+
+def reduce_measured(  # noqa: PLR0913
+    compliance: ArrayLike,
+    frequencies: ArrayLike,
+    shapes: ArrayLike,
+    modes: int | None = None,
+    *,
+    nodes: Sequence[int | str] | None = None,
+    seal_stiffness: ArrayLike = 0.0,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+    nonnegative: bool = False,
+    errors: InputErrors | None = None,
+) -> Reduction:
+    """Estimate equivalent masses of a rotor of which compliance and modes are given, without a model of it.
+
+    Parameters
+    ----------
+    compliance
+        m/N, shape (n, n).
+    frequencies, shapes
+        Measured, rad/s (k,), and at the masses (n, k).
+    modes
+        How many of them the regression uses; default all.
+    nodes
+        Names of the places, 1 … n by default.
+    seal_stiffness, normalise, rows, nonnegative
+        As in `equivalent_masses`.
+    errors
+        As in `reduce`.
+
+    Raises
+    ------
+    ValueError
+        As `equivalent_masses`, and for masses that these modes do not determine.
+    """
+    alpha = np.asarray(compliance, dtype=float)
+    n = len(alpha)
+    omega, U = _modes((frequencies, shapes), n)
+    places = tuple(nodes) if nodes is not None else tuple(range(1, n + 1))
+    if len(places) != n or len(set(places)) != n:
+        raise ValueError(f"{n} different names of places are needed; got {list(places)}")
+    seals = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,)).copy()
+    how = Choices("measured", normalise, rows, nonnegative)
+    return _reduced(places, alpha, seals, omega, U, len(omega) if modes is None else modes, how, errors)
+
+
+def _reduced(
+    places: tuple[int | str, ...],
+    alpha: FloatArray,
+    seals: FloatArray,
+    omega: FloatArray,
+    shapes: FloatArray,
+    modes: int,
+    choices: Choices,
+    errors: InputErrors | None,
+) -> Reduction:
+    """The regression and its checks, whatever the inputs come from."""
+    n, most = len(places), min(len(places), len(omega))
+    if not 1 <= modes <= most:
+        raise ValueError(f"{n} masses can use 1 … {most} modes; got {modes}")
+    used = omega[:modes], shapes[:, :modes]
+    how: dict[str, Any] = {"seal_stiffness": seals, "normalise": choices.normalise, "rows": choices.rows}
+    estimate = equivalent_masses(alpha, *used, **how, nonnegative=choices.nonnegative)
+    if not estimate.full_rank:
+        raise ValueError(
+            f"the first {counted(modes, 'mode')} cannot determine the masses at nodes {list(places)}: "
+            f"{estimate.describe_rank()}; use more modes or other nodes"
+        )
+    frequencies, model = natural_frequencies(alpha, estimate.solution, seal_stiffness=seals)
+    compared = shapes[:, :n]
+    j = compared.shape[1]
+    model[:, :j] = like(model[:, :j], compared)
+    result = Reduction(
+        rotor=None,
+        nodes=places,
+        modes=modes,
+        masses=estimate,
+        compliance=alpha,
+        seal_stiffness=seals,
+        frequencies=frequencies,
+        shapes=model,
+        rotor_frequencies=omega[:n],
+        rotor_shapes=compared,
+        rotor_modes=None,
+        choices=choices,
+        errors=None,
+        separated=None,
+        warnings=(),
+    )
+    warnings = [*_at_bounds(estimate, errors), *_of_regression(result)]
+    if errors is not None and not _bounded(estimate):
+        result = dataclasses.replace(result, errors=result.inputs.errors(errors))
+    return dataclasses.replace(result, warnings=tuple(warnings))
+
+
+def _bounded(estimate: Estimate) -> tuple[str, ...]:
+    """Names of masses at the bound 0."""
+    return estimate.at_bounds if isinstance(estimate, BoundedEstimate) else ()
+
+
+def _at_bounds(estimate: Estimate, errors: InputErrors | None) -> list[str]:
+    """What to say of masses at the bound 0."""
+    names = _bounded(estimate)
+    if not names:
+        return []
+    one = len(names) == 1
+    warnings = [
+        f"{', '.join(names)} {'stands at its bound' if one else 'stand at their bounds'} 0 (the "
+        "modes ask for less than nothing there): no standard deviation is given, and those of the others "
+        f"hold {'it' if one else 'them'} fixed; leave {'this place' if one else 'these places'} out, or "
+        "choose others"
+    ]
+    if errors is not None:
+        warnings.append("what the stated errors do was not computed: masses at a bound do not follow them")
+    return warnings
+
+
+def _of_regression(result: Reduction) -> list[str]:
+    """Masses that are not positive, modes of other shape, an ill-conditioned regression, frequencies off."""
+    warnings = [
+        f"the mass at node {node} is {mass:.4g} kg, not positive: no physical model; use other nodes, more "
+        "modes, or masses that are not negative (nonnegative)"
+        for node, mass in zip(result.nodes, result.masses.solution, strict=True)
+        if mass <= 0 and not result.choices.nonnegative
+    ]
+    if np.isnan(result.frequencies).any():
+        warnings.append("with these masses the model has modes that do not vibrate")
+    warnings += [
+        f"mode {k} of the model does not have the shape of the rotor's (MAC {value:.2f}, below {ALIKE}): "
+        "do not rely on its frequency; use other nodes or more masses"
+        for k, value in enumerate(result.mac[: result.modes], start=1)
+        if not value >= ALIKE
+    ]
+    if (result.sensitivity > SENSITIVE / 0.01).any():
+        moves = ", ".join(f"{x:.0f} %" for x in result.sensitivity)
+        warnings.append(
+            f"the regression is ill-conditioned (condition number {result.masses.condition_number:.1f}): "
+            f"errors of 1 % in the compliances and shapes move the masses by {moves}; more modes make them "
+            "firmer"
+        )
+    far = [(k, e) for k, e in enumerate(result.relative_error, start=1) if abs(e) > OFF]
+    if far:
+        which = ", ".join(f"mode {k} by {100 * e:+.1f} %" for k, e in far)
+        warnings.append(
+            f"frequencies of the model are far off: {which}; use it below them, or more masses or other nodes"
+        )
+    return warnings
+
+
+def _other_modes(
+    omega: FloatArray,
+    rotor_omega: FloatArray,
+    measured: FloatArray,
+    computed: FloatArray,
+    places: tuple[int, ...],
+) -> list[str]:
+    """What to say where the measured rotor is not that of the model: frequencies, then shapes."""
+    remarks = [
+        f"the measured frequency {k}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
+        f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
+        for k, (f, g) in enumerate(zip(omega, rotor_omega, strict=False), start=1)
+        if abs(f / g - 1) > APART
+    ]
+    agreement = mac(measured, computed)
+    for k in range(min(agreement.shape)):
+        if agreement[k, k] >= ALIKE:
+            continue
+        which, value = k + 1, agreement[k, k]
+        words = (
+            f"the shape of measured mode {which} is not that of the rotor's mode {which} (MAC {value:.2f})"
+        )
+        best = int(np.argmax(agreement[k]))
+        if agreement[k, best] >= ALIKE:
+            other = f"its mode {best + 1} (MAC {agreement[k, best]:.2f})"
+            remarks.append(f"{words} but of {other}: is a mode missing?")
+            continue
+        flips = 1.0 - 2.0 * np.eye(len(measured))
+        turned = mac(flips * measured[:, k : k + 1], computed[:, k : k + 1])[:, 0]
+        at = int(np.argmax(turned))
+        hint = f": is its sign at node {places[at]} right?" if turned[at] >= ALIKE else ""
+        remarks.append(words + hint)
+    return remarks
+
+
+def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, FloatArray]:
+    """Frequencies and shapes as arrays that fit n masses."""
+    omega, shapes = (np.asarray(part, dtype=float) for part in measured)
+    omega = np.atleast_1d(omega)
+    if shapes.shape != (n, len(omega)):
+        raise ValueError(
+            f"shapes must be (n, k) for {n} masses and {len(omega)} frequencies; got {shapes.shape}"
+        )
+    if not (np.isfinite(omega).all() and np.isfinite(shapes).all()):
+        raise ValueError("frequencies and shapes must be finite numbers")
+    return omega, shapes
+
+
+def _without_seals(plane: fem.Rotor, places: tuple[int, ...]) -> tuple[fem.Rotor, FloatArray]:
+    """The plane without its seals at the masses, and their stiffness."""
+    taken = [s for s in plane.supports if s.kind == "seal" and s.node in places and s.plain]
+    stiffness = np.array([sum(float(s.stiffness) for s in taken if s.node == node) for node in places])
+    kept = [s for s in plane.supports if s not in taken]
+    return dataclasses.replace(plane, supports=kept), stiffness

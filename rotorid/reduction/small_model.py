@@ -1,0 +1,538 @@
+"""A few masses on a massless shaft with its supports and other forces: the small model, and what it does.
+
+The deflections of some nodes are kept, those of the masses and of all supports and forces; between them the
+shaft hangs statically. With T the static shapes of the shaft, one column for a unit deflection of each kept
+node (all others held), the equations of `fem.assembly` in the basis T read, per plane with M = diag(m)
+(zero where only a support or a force acts), B = Tᵀ B T, G = Tᵀ G T, K = Tᵀ K T and rotation from x to y,
+
+    x:  M x'' + (B + C) x' + Ω G y' + K x + Ω B y + supports = f_x
+    y:  M y'' + (B + C) y' − Ω G x' + K y − Ω B x + supports = f_y.
+
+Supports and pedestals stand at their places and act as in the whole rotor, so that they stay parameters of
+the small model. C is the damping of the surroundings: it does not turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import fem
+from fem import GRAVITY, NodeForce, StateSpace, Whirl, solve
+from fem.assembly import (
+    Reduced,
+    assemble,
+    both_planes,
+    free_motions,
+    ignored_inertia,
+    multiply,
+    project,
+    rounding_error,
+)
+from fem.forces import kind_of
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import ComplexArray, FloatArray, read_only
+from rotorid.base.checks import checked_speeds, number
+from rotorid.base.text import counted, listing
+from rotorid.reduction.masses import held, mass_nodes
+
+LOST = 1e-3
+"""Relative rounding error of a static shape."""
+NONE = 1e-12
+"""Share of the largest entry below which damping, or a stiffness, is none."""
+INFINITE = 1e13
+"""Response times largest stiffness, per unit force: beyond, only rounding is left."""
+_ROUNDING = 1e-5  # share of the largest entry that stands in few digits
+_MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
+
+
+def _zero() -> FloatArray:
+    return np.array(0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SmallModel(Answered):
+    """Masses at nodes of a shaft that is given by its matrices, the same in both planes.
+
+    Attributes
+    ----------
+    nodes
+        Different numbers of the k nodes.
+    masses
+        kg, shape (k,); 0 where only a support or a force acts.
+    weight
+        N at 9.80665 m/s², shape (k,).
+    stiffness
+        K of the shaft, N/m, shape (k, k); symmetric and not negative, as the others.
+    material_damping, gyroscopic, damping
+        B, N·s/m, which turns with the shaft, G, kg, and C, N·s/m, of the surroundings, shape (k, k), or
+        the number 0.
+    supports, forces
+        At these nodes.
+    unbalance
+        m e e^{iβ} by node, kg·m, β with the rotation.
+    bow
+        How far the shaft at rest deviates from a straight line by node, m, at three nodes or more.
+    warnings
+        What the reader must know.
+
+    Raises
+    ------
+    ValueError
+        For what no shaft has; the message begins with the attribute.
+    """
+
+    nodes: tuple[int, ...]
+    masses: FloatArray
+    weight: FloatArray
+    stiffness: FloatArray
+    material_damping: FloatArray = field(default_factory=_zero)
+    gyroscopic: FloatArray = field(default_factory=_zero)
+    damping: FloatArray = field(default_factory=_zero)
+    supports: Sequence[fem.Support] = ()
+    forces: Sequence[NodeForce] = ()
+    unbalance: Mapping[int, complex] = field(default_factory=dict)
+    bow: Mapping[int, complex] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        k = len(self.nodes)
+        if not k or len(set(self.nodes)) != k:
+            raise ValueError(f"nodes: different nodes, one at least, not {list(self.nodes)}")
+        for name in ("masses", "weight", *_MATRICES):
+            object.__setattr__(self, name, _array(name, getattr(self, name), k))
+        if (self.masses < 0).any() or not self.masses.any():
+            raise ValueError("masses: 0 or more, and not all of them 0")
+        acting = *(support.node for support in self.supports), *(force.node for force in self.forces)
+        for node in (*acting, *self.unbalance, *self.bow):
+            self.node(node)
+        if any(support.tilting_stiffness for support in self.supports):
+            raise ValueError(
+                "supports: a small model has no slopes; tilting stiffness belongs into the shaft's stiffness"
+            )
+
+    def node(self, name: str | int) -> int:
+        """Number of a node, given as a number or as its text.
+
+        Raises
+        ------
+        ValueError
+            If the model has no such node.
+        """
+        if str(name) not in map(str, self.nodes):
+            nodes = listing(map(str, self.nodes), "and")
+            raise ValueError(f"node {name} does not exist: the small model has {nodes}")
+        return int(name)
+
+    @property
+    def massive(self) -> tuple[int, ...]:
+        """Nodes with a mass."""
+        return tuple(node for node, mass in zip(self.nodes, self.masses, strict=True) if mass > 0)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the unknowns: x and y of the nodes, `x7` and `y7`, then pedestals, `foot_x1`."""
+        stands = [i for i, support in enumerate(self.supports, start=1) if support.pedestal is not None]
+        return (
+            *(f"{axis}{node}" for axis in "xy" for node in self.nodes),
+            *(f"foot_{axis}{i}" for axis in "xy" for i in stands),
+        )
+
+    def equations(self, *, complex_coordinate: bool | None = False) -> Reduced:
+        """λ² M + λ D(Ω) + K(Ω) in the form of `fem.assembly`, of the linear model.
+
+        `complex_coordinate`: of z = x + i y; None: where all supports are rotationally symmetric.
+        """
+        k = len(self.nodes)
+        # a shaft that only carries the supports: its own matrices are replaced
+        supports = [replace(each, node=self.nodes.index(each.node) + 1) for each in self.supports]
+        carrier = fem.Rotor(np.ones(k), np.array(1.0), supports=supports)
+        P = both_planes(carrier, complex_coordinate=complex_coordinate)
+        basis = np.zeros((P.A.size, k))
+        basis[P.A.deflections[:k], np.arange(k)] = 1.0
+        Q, p = project(P, basis), P.planes
+        along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
+        blocks = {
+            "M": np.kron(along, np.diag(self.masses)),
+            "D0": np.kron(along, self.material_damping + self.damping),
+            "K0": np.kron(along, self.stiffness),
+            "D1": np.kron(across, self.gyroscopic),
+            "K1": np.kron(across, self.material_damping),
+        }
+        matrices: dict[str, Any] = {}
+        for name, block in blocks.items():
+            matrices[name] = np.array(getattr(Q, name))
+            matrices[name][: p * k, : p * k] = block
+        return replace(Q, **matrices)
+
+    def motion(self, speed: float = 0.0, plane: str = "both", *, condensed: bool = False) -> fem.Motion:
+        """The linear equations at a speed, without forces that are not linear.
+
+        Parameters
+        ----------
+        speed
+            rad/s; tables of supports are read there.
+        plane
+            "both", or "x" alone where nothing couples the planes.
+        condensed
+            Eliminate coordinates without mass, which is possible only where no damping acts on them, and
+            exact but for gyroscopic moments: these follow the static shapes of shaft and supports then.
+
+        Raises
+        ------
+        ValueError
+            For an impossible speed or one outside a table, planes that are coupled, or damping on unknowns
+            that are to be condensed.
+        """
+        if plane not in ("both", "x"):
+            raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")
+        speed = number(speed, "speed")
+        Q, names = self.equations(), self.coordinates
+        D, K = (matrix[0] for matrix in Q.at(np.array([speed])))
+        inside = np.array([plane == "both" or name.removeprefix("foot_")[0] == "x" for name in names])
+        across = np.ix_(inside, ~inside)
+        if D[across].any() or K[across].any():
+            raise ValueError("the planes x and y of this rotor are coupled: take both")
+        grid = np.ix_(inside, inside)
+        kept = tuple(name for name, taken in zip(names, inside, strict=True) if taken)
+        motion = fem.Motion(Q.M[grid], D[grid], K[grid], kept, speed)
+        return without_massless(motion, speed * np.real(Q.D1[grid])) if condensed else motion
+
+    def state_space(
+        self,
+        speed: float = 0.0,
+        *,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> StateSpace:
+        """The model as s' = A s + B u, y = C s + D u at a speed, rad/s, both planes.
+
+        Parameters
+        ----------
+        speed
+            As in `motion`.
+        inputs, outputs
+            As in `fem.state_space`; by default forces on the masses and their deflections. Forces and
+            deflections at the bearings have the names of their nodes, `f_x2` and `x2`.
+
+        Raises
+        ------
+        ValueError
+            As `motion` and `fem.state_space`.
+        """
+        masses = [f"{axis}{node}" for axis in "xy" for node in self.massive]
+        return fem.state_space(
+            self.motion(speed),
+            inputs=[f"f_{name}" for name in masses] if inputs is None else inputs,
+            outputs=masses if outputs is None else outputs,
+        )
+
+    def whirl(self, speeds: ArrayLike) -> Whirl:
+        """All modes that oscillate, at each speed, rad/s, as `fem.threshold_of` takes them.
+
+        Raises
+        ------
+        ValueError
+            For a speed outside the table of a support.
+        """
+        omega = checked_speeds(speeds)
+        Q = self.equations(complex_coordinate=None)
+        # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
+        n = Q.size if Q.P.planes == 2 else 2 * Q.size
+        K = np.real(self.equations().at(omega[:1])[1][0]).diagonal()[: len(self.nodes)]
+        massive = self.masses > 0
+        scale = float(np.sqrt(np.median(np.abs(K[massive]) / self.masses[massive])))
+        return solve(Q, omega, n, scale)
+
+    def response(self, speeds: ArrayLike) -> ComplexArray:
+        """Response at the masses to unbalance at the masses, as `fem.influence` defines it.
+
+        Parameters
+        ----------
+        speeds
+            rad/s, one or many; tables of supports are read there.
+
+        Returns
+        -------
+        W, m per kg·m, shape (S, 2 n, n): x, then y at the n masses (`massive`) is Re(W U e^{iΩt}) for the
+        unbalance U (kg·m, complex, phase with the rotation) at the mass of the column: f_x is
+        Re(U Ω² e^{iΩt}), f_y Im of it.
+
+        Raises
+        ------
+        ValueError
+            For impossible speeds, outside the table of a support, or exactly at an undamped critical speed.
+        """
+        omega, Q = checked_speeds(speeds), self.equations()
+        D, K = Q.at(omega)
+        in_x = np.flatnonzero(self.masses > 0)
+        in_y, n = len(self.nodes) + in_x, in_x.size
+        loads = np.zeros((len(omega), Q.size, n), dtype=complex)
+        loads[:, in_x, np.arange(n)], loads[:, in_y, np.arange(n)] = 1.0, -1j
+        w = omega[:, None, None]
+        try:
+            X = np.linalg.solve(K - w * w * Q.M + 1j * w * D, loads)
+        except np.linalg.LinAlgError:
+            X = np.full_like(loads, np.inf)
+        if not np.abs(X).max() * np.abs(K).max() < INFINITE:
+            raise ValueError(
+                "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
+                "infinite; leave out this speed"
+            )
+        return np.asarray(w * w * X[:, np.concatenate((in_x, in_y))])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; the file of the model has the rest."""
+        return {
+            "nodes": list(self.nodes),
+            "masses_kg": self.masses.tolist(),
+            "weight_N": self.weight.tolist(),
+            "shaft_stiffness_N_per_m": self.stiffness.tolist(),
+            "coordinates": list(self.coordinates),
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def answer(self) -> Answer:
+        """Where its masses stand, and what acts on it."""
+        acting = [f"{kind_of(force).replace('_', ' ')} at {force.node}" for force in self.forces]
+        acting += [f"{support.kind} at {support.node}" for support in self.supports]
+        masses = ", ".join(f"{m:.2f} at {n}" for n, m in zip(self.nodes, self.masses, strict=True) if m > 0)
+        return Answer(
+            f"Small model: {counted(len(self.nodes), 'node')} in both planes, masses in kg {masses}, in all "
+            f"{self.masses.sum():.2f}, weight {self.weight.sum():.1f} N; {listing(acting, 'and') or 'free'}.",
+            warnings=self.warnings,
+        )
+
+
+def _array(name: str, value: FloatArray, k: int) -> FloatArray:
+    """Checked and read-only; the number 0 is a matrix of zeros."""
+    shape = (k, k) if name in _MATRICES else (k,)
+    array = np.array(value, dtype=float)
+    if not array.ndim and array == 0:
+        array = np.zeros(shape)
+    if array.shape != shape or not np.isfinite(array).all():
+        numbers = " × ".join(map(str, shape))
+        raise ValueError(f"{name}: {numbers} finite numbers for {counted(k, 'node')}")
+    if name in _MATRICES:
+        rounding = _ROUNDING * np.abs(array).max()
+        if np.abs(array - array.T).max() > rounding or np.linalg.eigvalsh(array)[0] < -rounding:
+            raise ValueError(f"{name}: a symmetric matrix that has no negative eigenvalue")
+    read_only(array)
+    return array
+
+
+def small_model(
+    rotor: fem.Rotor, nodes: Sequence[int | str], masses: ArrayLike, *, modal_damping: Sequence[float] = ()
+) -> SmallModel:
+    """Put masses in place of a rotor's distributed mass; supports and forces stay where they are.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+    nodes
+        Where the masses stand: different node numbers, from 1, or names of stations.
+    masses
+        kg, all positive, shape (n,), as `equivalent_masses` estimates them.
+    modal_damping
+        Damping ratios ζ of the first modes of the plane x at rest on its springs, without masses of
+        pedestals: C = Σ 2 ζ ω (M φ)(M φ)ᵀ / (φᵀ M φ), of the surroundings and the same in both planes.
+
+    Returns
+    -------
+    The nodes of the masses come first, then those that only carry supports and forces.
+
+    Raises
+    ------
+    ValueError
+        For nodes that do not exist or repeat, masses that are not positive, too few kept nodes to hold the
+        shaft, impossible damping ratios, or a mesh too fine for float64.
+
+    Notes
+    -----
+    Gyroscopic moments act on slopes, and these follow the kept deflections statically: right to first order
+    in the speed. Where discs with I_p = 0.02 m² × mass shift whirl frequencies by 3 %, 0.3 % is missing.
+    Inertia of tilting is in the masses as far as they were fitted to modes that know it; none is added.
+    """
+    places = mass_nodes(rotor, nodes)
+    try:
+        m = np.array(masses, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError("masses must be numbers in kg, one for each node") from None
+    if m.shape != (len(places),):
+        raise ValueError(f"{len(places)} nodes need as many masses, not an array of shape {m.shape}")
+    for place, mass in zip(places, m, strict=True):
+        if not (np.isfinite(mass) and mass > 0):
+            raise ValueError(
+                f"the mass at node {place} is {mass:.4g} kg, not positive: a physical model needs positive "
+                "masses, use other nodes or more modes, or non-negative least squares, and leave out nodes "
+                "without mass"
+            )
+    linear = rotor.linear
+    acting = {*(s.node for s in rotor.supports), *(force.node for force in rotor.forces)}
+    kept = (*places, *sorted(acting - set(places)))
+    T = static_shapes(linear, kept)
+    k, n = len(kept), len(places)
+    Q, A = project(both_planes(linear, complex_coordinate=False), T), assemble(linear)
+    ones = np.zeros((A.size, 1))
+    ones[A.deflections] = 1.0
+    remarks = [*ignored_inertia(rotor)]
+    if rotor.model.gyroscopic:
+        remarks.append(
+            "gyroscopic moments act on slopes that follow the masses and supports statically: an "
+            "approximation that gets worse with speed and for higher modes; compare with the rotor"
+        )
+    if rotor.model.rotary_inertia:
+        remarks.append(
+            "the inertia of tilting sections and discs is in the small model only as far as the masses were "
+            "fitted to modes that know it; no moment of inertia is added"
+        )
+    model = SmallModel(
+        nodes=kept,
+        masses=np.concatenate((m, np.zeros(k - n))),
+        weight=GRAVITY * (T.T @ multiply(A.mass, ones)[:, 0]),
+        stiffness=_without_rounding(Q.K0[:k, :k], A.shaft[-1, A.deflections]),
+        material_damping=_without_rounding(Q.D0[:k, :k], A.material[-1, A.deflections]),
+        gyroscopic=np.real(Q.D1[:k, k : 2 * k]),
+        supports=[replace(support, tilting_stiffness=0.0) for support in rotor.supports],
+        forces=rotor.forces,
+        warnings=tuple(remarks),
+    )
+    ratios = _ratios(modal_damping)
+    return replace(model, damping=_modal(model, ratios)) if any(ratios) else model
+
+
+def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
+    """Zero where all is rounding of the shaft's entries, as of two nodes, which nothing bends."""
+    return matrix if np.abs(matrix).max() > NONE * np.abs(whole).max() else np.zeros_like(matrix)
+
+
+def static_shapes(rotor: fem.Rotor, kept: tuple[int, ...]) -> FloatArray:
+    """Shapes of the shaft for a unit deflection of each kept node, shape (size, k): K_oo X_o = −K_od."""
+    from scipy.linalg.lapack import dpbtrf, dpbtrs
+
+    if free_motions(rotor, set(kept)):
+        raise ValueError(
+            "one node, with or without a mass, does not hold the shaft: it can turn about it; give masses or "
+            "supports at two nodes at least, or tilting stiffness"
+        )
+    A = assemble(rotor)
+    at = np.array([A.deflection(node) for node in kept], dtype=np.intp)
+    unit = np.zeros((A.size, len(kept)))
+    unit[at, np.arange(len(kept))] = 1.0
+    load = -multiply(A.shaft, unit)
+    load[at] = 0.0
+    band = held(A.shaft, at)
+    factor, info = dpbtrf(band)
+    X = dpbtrs(factor, load)[0] if info == 0 else load
+    moved = np.abs(X).max(axis=0) > 0
+    if info != 0 or (rounding_error(band, X[:, moved]) > LOST).any():
+        raise ValueError(
+            f"the static shapes of {rotor.n_elements} elements are lost in float64; join neighbouring "
+            "elements (50 to 200 are ample for a rotor)"
+        )
+    return np.asarray(unit + X)
+
+
+def _ratios(modal_damping: Sequence[float]) -> tuple[float, ...]:
+    """Damping ratios of the first modes; ValueError for what is no list of numbers from 0 to below 1."""
+    try:
+        ratios = tuple(float(ratio) for ratio in modal_damping)
+    except (TypeError, ValueError):
+        raise ValueError(
+            "modal_damping must be a list of damping ratios, one for each of the first modes"
+        ) from None
+    for ratio in ratios:
+        if not 0 <= ratio < 1:
+            raise ValueError(f"a damping ratio is at least 0 and below 1 (0.02 is 2 %), not {ratio}")
+    return ratios
+
+
+def _modal(model: SmallModel, ratios: tuple[float, ...]) -> FloatArray:
+    """Damping matrix (k, k) of given ratios of the first modes of the plane x at rest on its springs."""
+    from scipy.linalg import eigh
+
+    K = model.stiffness.copy()
+    zero = np.zeros(1)
+    for support in model.supports:
+        i = model.nodes.index(support.node)
+        at_rest = replace(
+            support, speeds=(), stiffness=float(support.at(_lowest(model))[0][0, 0]), damping=0.0
+        )
+        if support.pedestal is not None:
+            pedestal = fem.Pedestal(0.0, support.pedestal.xy("stiffness")[0])
+            at_rest = replace(at_rest, pedestal=pedestal)
+        K[i, i] += at_rest.dynamic_stiffness(zero)[0, 0, 0].real
+    massive = model.masses > 0
+    on, off = np.flatnonzero(massive), np.flatnonzero(~massive)
+    if len(ratios) > on.size:
+        raise ValueError(
+            f"{len(ratios)} damping ratios are given, but each plane has {on.size} modes: leave some out"
+        )
+    Kmm = K[np.ix_(on, on)]
+    if off.size:
+        Kss, Ksm = K[np.ix_(off, off)], K[np.ix_(off, on)]
+        if np.linalg.cond(Kss) > 1 / NONE:
+            raise ValueError(
+                "the plane x at rest can move without moving mass: no damping ratios exist; give its "
+                "supports stiffness"
+            )
+        Kmm = Kmm - Ksm.T @ np.linalg.solve(Kss, Ksm)
+    squares, shapes = eigh((Kmm + Kmm.T) / 2, np.diag(model.masses[on]))
+    if squares[0] < -1e-9 * np.abs(squares).max():
+        raise ValueError(
+            "the plane x at rest is pushed aside by a negative stiffness: no damping ratios exist"
+        )
+    first = slice(len(ratios))
+    omega = np.sqrt(np.maximum(squares[first], 0.0))
+    momentum = model.masses[on][:, None] * shapes[:, first]  # shapes have φᵀ M φ = 1
+    C = np.zeros_like(K)
+    C[np.ix_(on, on)] = (momentum * (2 * np.array(ratios) * omega)) @ momentum.T
+    return C
+
+
+def _lowest(model: SmallModel) -> float:
+    """Lowest common speed of the tables of supports, rad/s."""
+    return float(max((support.speeds[0] for support in model.supports if support.speeds), default=0.0))
+
+
+def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
+    """Eliminate the coordinates o without mass; the others are m.
+
+    Without forces on them q_o = −K_oo⁻¹ K_om q_m, and K_mm − K_mo K_oo⁻¹ K_om is exact where no damping acts
+    on q_o. The gyroscopic part G of C, shape (n, n), is taken along with the static shapes
+    R = (1; −K_oo⁻¹ K_om) and, for the forces, L = (1, −K_mo K_oo⁻¹): L G R. ValueError where other damping
+    acts on a coordinate without mass, or no stiffness holds it.
+    """
+    massive = np.diag(motion.M) > 0
+    on, off = np.flatnonzero(massive), np.flatnonzero(~massive)
+    if not off.size:
+        return motion
+    damping = np.abs(motion.C - gyroscopic)
+    touched = np.maximum(damping[off].max(axis=1), damping[:, off].max(axis=0))
+    present = touched > NONE * max(float(np.abs(motion.C).max()), float(damping.max()))
+    if present.any():
+        name = motion.coordinates[int(off[int(np.argmax(present))])]
+        raise ValueError(
+            f"damping acts on {name!r}, which has no mass: it cannot be condensed into stiffness; keep the "
+            "supports, or take the state space"
+        )
+    Koo = motion.K[np.ix_(off, off)]
+    sigma = np.linalg.svd(Koo, compute_uv=False)
+    if sigma[-1] <= NONE * sigma[0]:
+        raise ValueError(
+            "supports without mass can move without force: they cannot be condensed; give them stiffness"
+        )
+    L, R = np.zeros((on.size, massive.size)), np.zeros((massive.size, on.size))
+    L[:, on] = R[on] = np.eye(on.size)
+    R[off] = -np.linalg.solve(Koo, motion.K[np.ix_(off, on)])
+    L[:, off] = -np.linalg.solve(Koo.T, motion.K[np.ix_(on, off)].T).T
+    grid = np.ix_(on, on)
+    K = motion.K[grid] + motion.K[np.ix_(on, off)] @ R[off]
+    C = (motion.C - gyroscopic)[grid] + L @ gyroscopic @ R
+    return fem.Motion(motion.M[grid], C, K, tuple(motion.coordinates[i] for i in on), motion.speed)

@@ -1,1 +1,0 @@
-"""Workflows of rotors with forces that are not linear: equilibrium, motion in time, periodic motion."""

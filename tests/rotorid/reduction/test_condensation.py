@@ -1,0 +1,300 @@
+"""Guyan, IRS and SEREP against dense textbook algebra, known numbers and the theorems they must obey."""
+
+import json
+
+import numpy as np
+import pytest
+from cases import each_of
+from fem_rotors import machines, refined, rotor23, rotors, uniform
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.linalg import eigh
+
+import fem
+from rotorid.reduction import reduce
+from rotorid.reduction.condensation import compare_methods, reduce_by
+from rotorid.reduction.masses import plane_at_rest
+
+MASTERS = (7, 12, 18)
+
+
+@pytest.fixture(scope="module")
+def methods():
+    return compare_methods(rotor23(), MASTERS)
+
+
+def test_the_known_frequencies_of_the_reference_rotor(methods):
+    known = {
+        "Guyan": ("135.2973", "545.3615", "1250.853"),
+        "IRS": ("135.2404", "540.7360", "1176.319"),
+        "SEREP": ("135.2404", "540.7329", "1163.805"),
+        "regression, 2 modes": ("135.2358", "539.0517", "1069.258"),
+    }
+    assert [row.name for row in methods.rows] == list(known)
+    for row in methods.rows:
+        assert (f"{row.frequencies[0]:.4f}", f"{row.frequencies[1]:.4f}", f"{row.frequencies[2]:.3f}") == (
+            known[row.name]
+        )
+    np.testing.assert_allclose(methods.row("SEREP").frequencies, methods.rotor_frequencies, rtol=1e-12)
+    assert methods.warnings == ()
+
+
+def textbook(rotor, nodes):
+    """Transformations by dense partitioned matrices, in the order of `fem.equations_of_motion`."""
+    plane, _ = plane_at_rest(rotor, None)
+    motion = fem.equations_of_motion(plane, plane="x")
+    M, K = motion.M, motion.K
+    d = [motion.index(f"x{node}") for node in nodes]
+    o = [i for i in range(len(K)) if i not in d]
+    n = len(d)
+    static = np.zeros((len(K), n))
+    static[d] = np.eye(n)
+    static[o] = -np.linalg.solve(K[np.ix_(o, o)], K[np.ix_(o, d)])
+    S = np.zeros_like(K)
+    S[np.ix_(o, o)] = np.linalg.inv(K[np.ix_(o, o)])
+    M_G, K_G = (static.T @ A @ static for A in (M, K))
+    improved = static + S @ M @ static @ np.linalg.solve(M_G, K_G)
+    mu, vectors = eigh(M, K)
+    modes = vectors[:, ::-1][:, :n]
+    expansion = modes @ np.linalg.inv(modes[d])
+    return motion, {"Guyan": static, "IRS": improved, "SEREP": expansion}, 1 / np.sqrt(mu[::-1][:n])
+
+
+def close(a, b, tolerance):
+    """Matrices as quadratic forms: each entry beside the diagonal entries of its row and column."""
+    scale = np.sqrt(np.outer(np.abs(np.diag(b)), np.abs(np.diag(b))))
+    np.testing.assert_allclose(a / scale, b / scale, atol=tolerance)
+
+
+def check_against_textbook(rotor, nodes, tolerance=1e-6):
+    motion, transformations, frequencies = textbook(rotor, nodes)
+    result = compare_methods(rotor, nodes)
+    np.testing.assert_allclose(result.rotor_frequencies, frequencies, rtol=tolerance)
+    for name, T in transformations.items():
+        row = result.row(name)
+        deflections = [motion.index(f"x{node}") for node in range(1, rotor.n_nodes + 1)]
+        np.testing.assert_allclose(row.T, T[deflections], atol=tolerance * np.abs(T).max())
+        close(row.M, T.T @ motion.M @ T, tolerance)
+        close(row.K, T.T @ motion.K @ T, tolerance)
+        omega = np.sqrt(eigh(row.K, row.M, eigvals_only=True))
+        np.testing.assert_allclose(row.frequencies, omega, rtol=tolerance)
+        np.testing.assert_allclose(
+            row.K @ row.shapes, row.M @ row.shapes * row.frequencies**2, atol=1e-6 * np.abs(row.K).max()
+        )
+
+
+def test_textbook_algebra_on_the_reference_rotor():
+    check_against_textbook(rotor23(), MASTERS)
+    check_against_textbook(rotor23(), (18, 2, 9, 12))
+
+
+def test_textbook_algebra_with_shear_tilting_springs_and_two_pedestals_at_one_node():
+    rotor = fem.Rotor(
+        [0.2] * 6,
+        0.08,
+        discs=[fem.Disc(3, 20.0, 0.4, 0.3)],
+        supports=[
+            fem.Support(1, 2e7, pedestal=fem.Pedestal(30.0, 5e7)),
+            fem.Support(1, 1e7, pedestal=fem.Pedestal(4.0, 3e7)),
+            fem.Support(4, 0.0, 1e3, pedestal=fem.Pedestal(1e-4, 1e7)),
+            fem.Support(7, 3e7, tilting_stiffness=1e5),
+        ],
+        model=fem.Model(shear=True, rotary_inertia=True),
+    )
+    motion, transformations, _ = textbook(rotor, (2, 5))
+    assert [name for name in motion.coordinates if "foot" in name] == ["foot_x1", "foot_x2", "foot_x3"]
+    check_against_textbook(rotor, (2, 5))
+    assert np.abs(transformations["IRS"][-3:]).max(axis=1).tolist()[-1] == 0.0  # nothing ties the third
+
+
+@settings(max_examples=30)
+@given(machines(elements=(4, 12)), st.integers(0, 2**32 - 1))
+def test_any_machine_agrees_with_textbook_algebra(rotor, seed):
+    rng = np.random.default_rng(seed)
+    nodes = rng.choice(np.arange(1, rotor.n_nodes + 1), size=2, replace=False).tolist()
+    _, transformations, _ = textbook(rotor, nodes)
+    # magnified errors of the modes are for another test
+    assume(np.abs(transformations["SEREP"]).max() < 50)
+    check_against_textbook(rotor, nodes, 1e-5)
+
+
+@settings(max_examples=40)
+@given(rotors(elements=(4, 20)), st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_ritz_frequencies_are_never_below_the_rotors(rotor, n, seed):
+    nodes = np.random.default_rng(seed).choice(np.arange(1, rotor.n_nodes + 1), size=n, replace=False)
+    result = compare_methods(rotor, nodes.tolist(), modes=1, normalise="largest")
+    for name in ("Guyan", "IRS"):
+        assert (result.row(name).relative_error > -1e-7).all()  # neighbouring masters cost digits
+    exact = result.row("SEREP")
+    if exact.M is not None and not exact.reason:
+        np.testing.assert_allclose(exact.frequencies, result.rotor_frequencies, rtol=1e-7)
+        np.testing.assert_allclose(exact.mac, 1.0, rtol=1e-9)
+    # the order of the masters only orders the unknowns
+    turned = compare_methods(rotor, nodes[::-1].tolist(), modes=1, normalise="largest")
+    close(turned.row("IRS").M[::-1, ::-1], result.row("IRS").M, 1e-7)
+
+
+def test_a_massless_shaft_with_discs_at_the_masters_is_exact_for_every_method():
+    """Then static condensation loses nothing, the mass matrix is that of the discs, and (50) agrees."""
+    masses = [40.0, 25.0]
+    rotor = fem.Rotor(
+        [0.2] * 6,
+        0.06,
+        density=0.0,
+        discs=[fem.Disc(3, masses[0]), fem.Disc(6, masses[1])],
+        supports=[fem.Support(1, 1e8), fem.Support(7, 1e8)],
+    )
+    result = compare_methods(rotor, (3, 6))
+    for row in result.rows:
+        np.testing.assert_allclose(row.M, np.diag(masses), atol=1e-6)
+        np.testing.assert_allclose(row.frequencies, result.rotor_frequencies, rtol=1e-9)
+        np.testing.assert_allclose(row.mac, 1.0, rtol=1e-9)
+        np.testing.assert_allclose(row.K, np.linalg.inv(fem.compliance(rotor, (3, 6))), rtol=1e-7)
+    assert [row.diagonal for row in result.rows] == [False, False, False, True]
+    np.testing.assert_allclose(result.row("regression").masses, masses, rtol=1e-7)
+    assert result.row("Guyan").masses is None
+
+
+def test_guyan_holds_the_static_deflection_and_the_regression_is_reduce(methods):
+    alpha = fem.compliance(rotor23(), MASTERS)
+    np.testing.assert_allclose(methods.row("Guyan").K @ alpha, np.eye(3), atol=1e-10)
+    reduction = reduce(rotor23(), MASTERS, 2)
+    row = methods.row("regression, 2 modes")
+    np.testing.assert_allclose(row.masses, reduction.masses.values, rtol=1e-12)
+    np.testing.assert_allclose(row.frequencies, reduction.frequencies, rtol=1e-12)
+    np.testing.assert_allclose(row.mac, reduction.mac, rtol=1e-12)
+    assert row.T is None
+
+
+def test_weights_reach_the_regression_and_wrong_ones_are_refused():
+    relative = compare_methods(rotor23(), MASTERS, rows="relative", normalise="length").row("regression")
+    equal = compare_methods(rotor23(), MASTERS).row("regression")
+    assert np.abs(relative.masses / equal.masses - 1).max() > 1e-3
+    with pytest.raises(ValueError, match="normalise must be"):
+        compare_methods(rotor23(), MASTERS, normalise="middle")
+    with pytest.raises(ValueError, match="rows must be"):
+        compare_methods(rotor23(), MASTERS, rows="heavy")
+
+
+def test_400_elements_give_the_same_model():
+    fine = refined(rotor23(), 17)
+    result = compare_methods(fine, [17 * (node - 1) + 1 for node in MASTERS])
+    coarse = compare_methods(rotor23(), MASTERS)
+    assert fine.n_elements == 391
+    for a, b in zip(result.rows, coarse.rows, strict=True):
+        # the mesh itself changes the third frequency by 8e-5
+        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=2e-4)
+    np.testing.assert_allclose(result.row("SEREP").frequencies, result.rotor_frequencies, rtol=1e-9)
+
+
+def test_single_methods_are_those_of_the_comparison(methods):
+    for name in ("Guyan", "IRS", "SEREP"):
+        one = reduce_by(rotor23(), MASTERS, name.lower())
+        np.testing.assert_array_equal(one.frequencies, methods.row(name).frequencies)
+    with pytest.raises(ValueError, match="ritz"):
+        reduce_by(rotor23(), MASTERS, "ritz")
+
+
+def overhung(stiffness=1e16):
+    """Two supports that hardly move: a master at one of them knows nothing of the modes."""
+    return uniform(8, supports=[fem.Support(1, stiffness), fem.Support(9, stiffness)])
+
+
+def test_shapes_that_depend_on_one_another_are_said():
+    result = compare_methods(overhung(), (1, 5))
+    row = result.row("SEREP")
+    assert row.M is None
+    assert np.isnan(row.frequencies).all()
+    assert any(text.startswith("SEREP: the rotor's first 2 shapes depend") for text in result.warnings)
+    assert result.row("Guyan").M is not None
+    assert "no model" in result.summary()
+    with pytest.raises(ValueError, match=r"depend on one another at the nodes \[1, 5\]"):
+        reduce_by(overhung(), (1, 5), "serep")
+    with pytest.raises(ValueError, match="node 1 is a node of the rotor's first mode"):
+        reduce_by(overhung(), [1], "serep")
+    soft = compare_methods(overhung(1e12), (1, 5))
+    assert any("nearly depend" in text for text in soft.warnings)
+
+
+def test_a_singular_mass_matrix_is_said():
+    """One of two masses stands on a support that hardly moves: the second master moves no mass."""
+    rotor = fem.Rotor(
+        [0.25] * 8,
+        0.05,
+        density=0.0,
+        discs=[fem.Disc(3, 10.0), fem.Disc(1, 10.0)],
+        supports=[fem.Support(1, 1e16), fem.Support(9, 1e9)],
+    )
+    result = compare_methods(rotor, (3, 6), modes=1)
+    assert result.row("IRS").M is None
+    assert any(text.startswith("IRS: Guyan's mass matrix is singular") for text in result.warnings)
+    with pytest.raises(ValueError, match="mass matrix is singular"):
+        reduce_by(rotor, (3, 6), "irs")
+    guess = result.row("Guyan")
+    assert guess.relative_error[0] == pytest.approx(0.0, abs=1e-9)
+    assert np.isnan(guess.frequencies[1])
+    assert np.isnan(guess.mac[1])
+
+
+def test_a_regression_that_fails_leaves_the_others(methods):
+    result = compare_methods(rotor23(), (2, 3, 22))
+    assert any("the mass at node 2 is not positive" in text for text in result.warnings)
+    symmetric = uniform(8, supports=[fem.Support(1, 1e8), fem.Support(9, 1e8)])
+    middle = compare_methods(symmetric, (5, 3), modes=2)
+    assert middle.row("regression").M is None
+    assert any("regression, 2 modes: a mode has a node at the first mass" in text for text in middle.warnings)
+    assert middle.row("Guyan").M is not None
+    with pytest.raises(ValueError, match="no method 'craig': there are Guyan, IRS"):
+        methods.row("craig")
+
+
+@each_of(
+    ("nodes", "options", "message"),
+    [
+        ((), {}, "different nodes"),
+        ((7, 7), {}, "different nodes"),
+        ((7, 30), {}, "node 30 does not exist"),
+        ((7.5, 12), {}, "whole number"),
+        ((7, 12), {"modes": 3}, "can use 1 … 2 modes"),
+        ((7, 12), {"modes": 1.5}, "whole number"),
+        ((7, 12), {"modes": float("nan")}, "whole number"),
+        ((7, 12), {"speed": float("nan")}, "must be finite"),
+    ],
+)
+def test_bad_choices_are_refused(nodes, options, message):
+    with pytest.raises(ValueError, match=message):
+        compare_methods(rotor23(), nodes, **options)
+
+
+def test_a_free_rotor_is_refused():
+    with pytest.raises(ValueError, match="supports at two nodes"):
+        compare_methods(uniform(8), (3, 5))
+
+
+def test_the_plane_at_rest_is_said():
+    rotor = uniform(
+        8,
+        supports=[fem.Support(1, ((1e8, 2e7), (0.0, 3e8))), fem.Support(9, 1e8)],
+        stations={"middle": 5},
+    )
+    plain = uniform(8, supports=[fem.Support(1, 1e8), fem.Support(9, 1e8)])
+    a, b = compare_methods(rotor, ["middle", 7]), compare_methods(plain, (5, 7))
+    assert a.nodes == (5, 7)
+    assert "plane x of the rotor at rest" in a.warnings[0]
+    np.testing.assert_allclose(a.row("IRS").M, b.row("IRS").M, rtol=1e-9)
+
+
+def test_document_frame_and_text(methods):
+    document = json.loads(json.dumps(methods.to_dict(), allow_nan=False))
+    assert document["nodes"] == [7, 12, 18]
+    assert [row["method"] for row in document["methods"]] == [row.name for row in methods.rows]
+    assert [row["masses_kg"] is None for row in document["methods"]] == [True, True, True, False]
+    np.testing.assert_allclose(document["methods"][1]["mass_matrix_kg"], methods.row("IRS").M)
+    failed = json.loads(json.dumps(compare_methods(overhung(), (1, 5)).to_dict(), allow_nan=False))
+    assert failed["methods"][2]["natural_frequencies_rad_s"] == [None, None]
+    assert "depend" in failed["methods"][2]["reason"]
+    frame = methods.to_frame()
+    assert len(frame) == 12
+    third = frame[(frame["method"] == "IRS") & (frame["mode"] == 3)].iloc[0]
+    assert third["frequency_rad_s"] == methods.row("IRS").frequencies[2]
+    assert third["relative_error"] == pytest.approx(1176.319 / 1163.805 - 1, abs=2e-6)

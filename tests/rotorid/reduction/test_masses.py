@@ -1,0 +1,200 @@
+"""Formula (50) with other normalisations, row weights, bounds and seals."""
+
+import numpy as np
+import pytest
+from book_task_9 import COMPLIANCE, FREQUENCIES, SHAPES
+from cases import each_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rotorid.reduction import equivalent_masses, natural_frequencies
+from rotorid.reduction.masses import BoundedEstimate, design
+
+NORMALISATIONS = ("first", "largest", "length")
+
+
+def chain(seed, n):
+    """A random n-mass model: compliance, masses, springs, frequencies and shapes."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(n, n))
+    alpha, masses = (A @ A.T + np.eye(n)) * 1e-8, rng.uniform(20, 200, n)
+    springs = rng.uniform(0, 1e7, n)
+    omega, shapes = natural_frequencies(alpha, masses, seal_stiffness=springs)
+    return alpha, masses, springs, omega, shapes
+
+
+def test_the_rows_are_those_printed_in_the_book():
+    """[S] prints B and D for two modes with a seal c at the middle mass."""
+    a, (l1, l2), c = COMPLIANCE, 1 / FREQUENCIES[:2] ** 2, 3e6
+    U21, U31, U22, U32 = SHAPES[1, 0], SHAPES[2, 0], SHAPES[1, 1], SHAPES[2, 1]
+    B, D = design(a, FREQUENCIES[:2], -3 * SHAPES[:, :2], seal_stiffness=[0, c, 0])
+    np.testing.assert_allclose(B[:3], a * [1, U21, U31], rtol=1e-14)
+    np.testing.assert_allclose(B[3:], a * [1, U22, U32], rtol=1e-14)
+    expected = [
+        l1 * (1 + a[0, 1] * c * U21), l1 * U21 * (1 + a[1, 1] * c), l1 * (U31 + a[2, 1] * c * U21),
+        l2 * (1 + a[0, 1] * c * U22), l2 * U22 * (1 + a[1, 1] * c), l2 * (U32 + a[2, 1] * c * U22),
+    ]  # fmt: skip
+    np.testing.assert_allclose(D, expected, rtol=1e-13)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10**6), n=st.integers(1, 5), k=st.integers(1, 5),
+    normalise=st.sampled_from(NORMALISATIONS), rows=st.sampled_from(["equal", "relative"]),
+)  # fmt: skip
+def test_a_true_model_gets_its_masses_back_whatever_is_chosen(seed, n, k, normalise, rows):
+    alpha, masses, springs, omega, shapes = chain(seed, n)
+    k = min(k, n)
+    sizes = np.random.default_rng(seed).uniform(-3, 3, k) + 0.1
+    shapes = shapes[:, :k] * sizes
+    if (np.abs(shapes) < 1e-4 * np.abs(shapes).max(axis=0)).any():
+        return  # a mass in a node of a mode is hardly seen by it
+    found = equivalent_masses(
+        alpha, omega[:k], shapes, seal_stiffness=springs, normalise=normalise, rows=rows, nonnegative=True
+    )
+    np.testing.assert_allclose(found.values, masses, rtol=1e-6)
+    assert found.at_bounds == ()
+
+
+def test_one_mode_gives_the_same_masses_whatever_is_chosen():
+    book = equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
+    for normalise in NORMALISATIONS:
+        for rows in ("equal", "relative", [[2.0], [1.0], [0.5]]):
+            other = equivalent_masses(
+                COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1], normalise=normalise, rows=rows
+            ).values
+            np.testing.assert_allclose(other, book, rtol=1e-9)
+
+
+@pytest.mark.parametrize("normalise", ["largest", "length"])
+def test_the_order_of_the_masses_matters_only_where_the_first_is_the_unit(normalise):
+    order = [2, 0, 1]
+    inputs = COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2]
+    turned = COMPLIANCE[np.ix_(order, order)], FREQUENCIES[:2], SHAPES[order, :2]
+    a, b = (equivalent_masses(*x, normalise=normalise).values for x in (inputs, turned))
+    np.testing.assert_allclose(a[order], b, rtol=1e-10)
+    a, b = (equivalent_masses(*x).values for x in (inputs, turned))
+    assert np.abs(a[order] / b - 1).max() > 1e-4
+
+
+def test_relative_rows_serve_the_second_frequency_and_equal_rows_the_first():
+    errors = {}
+    for rows in ("equal", "relative"):
+        found = equivalent_masses(COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2], normalise="length", rows=rows)
+        omega, _ = natural_frequencies(COMPLIANCE, found.values)
+        errors[rows] = np.abs(omega / FREQUENCIES - 1)
+    assert errors["relative"][1] < errors["equal"][1]
+    assert errors["relative"][0] > errors["equal"][0]
+
+
+def test_own_weights_are_factors_of_the_rows():
+    inputs = COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2]
+    factors = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    B, D = design(*inputs)
+    by_hand = np.linalg.lstsq(B * factors.T.ravel()[:, None] * 1e8, D * factors.T.ravel() * 1e8, rcond=None)[
+        0
+    ]
+    np.testing.assert_allclose(equivalent_masses(*inputs, rows=factors).values, by_hand, rtol=1e-10)
+    relative = equivalent_masses(*inputs, rows=FREQUENCIES[None, :2] ** 2).values
+    np.testing.assert_allclose(equivalent_masses(*inputs, rows="relative").values, relative, rtol=1e-10)
+    first = equivalent_masses(*inputs, rows=[1.0, 0.0])
+    np.testing.assert_allclose(
+        first.values, equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
+    )
+    assert first.dof == 0, "rows that are left out are no degrees of freedom"
+    assert first.std is None
+
+
+@pytest.mark.parametrize("normalise", NORMALISATIONS)
+@pytest.mark.parametrize("rows", ["equal", "relative", np.arange(1.0, 7.0).reshape(3, 2)])
+def test_many_models_at_once_are_the_models_one_by_one(normalise, rows):
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(20, 3, 3))
+    alpha, U = A @ np.swapaxes(A, 1, 2), rng.normal(size=(20, 3, 2))
+    options = {"seal_stiffness": [0.1, 0.2, 0.3], "normalise": normalise, "rows": rows}
+    U[7, 0, 1] = 0.0
+    B, D = design(alpha, [1.0, 2.0], U, **options)
+    assert B.shape == (20, 6, 3)
+    assert D.shape == (20, 6)
+    for i in range(20):
+        if i == 7 and normalise == "first":
+            assert np.isnan(B[i, 3:]).all(), "a node at the first mass"
+            continue
+        b, d = design(alpha[i], [1.0, 2.0], U[i], **options)
+        np.testing.assert_array_equal(B[i], b)
+        np.testing.assert_array_equal(D[i], d)
+
+
+def test_masses_that_would_be_negative_stand_at_their_bound():
+    # the second mass would be negative; conditions of the minimum below
+    alpha, U = np.array([[4.0, 3.0], [3.0, 4.0]]) * 1e-8, np.array([[1.0], [1.2]])
+    free = equivalent_masses(alpha, [1000.0], [[1.0], [0.5]])
+    assert (free.values < 0).any()
+    found = equivalent_masses(alpha, [1000.0], [[1.0], [0.5]], nonnegative=True)
+    assert isinstance(found, BoundedEstimate)
+    B, D = design(alpha, [1000.0], [[1.0], [0.5]])
+    pull = B.T @ (D - B @ found.values)
+    held = found.values == 0
+    assert held.any()
+    assert (pull[held] < 0).all()
+    np.testing.assert_allclose(pull[~held] / np.abs(pull).max(), 0.0, atol=1e-10)
+    names = tuple(np.array(found.names)[held])
+    assert found.at_bounds == names
+    assert np.isnan(found.std[held]).all()
+    assert np.isfinite(found.std[~held]).all()
+    assert equivalent_masses(alpha, [1000.0], U, nonnegative=True).at_bounds == ()
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), n=st.integers(1, 4), k=st.integers(1, 3))
+def test_nonnegative_masses_meet_the_conditions_of_a_minimum(seed, n, k):
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(n, n))
+    inputs = (A @ A.T + np.eye(n)) * 1e-8, rng.uniform(100, 1000, k), rng.normal(size=(n, k))
+    found = equivalent_masses(*inputs, nonnegative=True, normalise="length", rows="relative")
+    B, D = design(*inputs, normalise="length", rows="relative")
+    assert (found.solution >= 0).all()
+    pull = (B / np.linalg.norm(B, axis=0)).T @ (D - B @ found.solution) / np.linalg.norm(D)
+    assert (pull <= 1e-9).all()
+    np.testing.assert_allclose(pull[found.solution > 0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.residuals, D - B @ found.solution, atol=1e-12)
+
+
+@pytest.mark.parametrize("nonnegative", [False, True])
+def test_masses_that_are_not_determined_are_named(nonnegative):
+    alpha = np.ones((3, 3)) * 1e-8
+    alpha[2, 2] = 2e-8
+    found = equivalent_masses(alpha, [100.0], [[1.0], [1.0], [0.9]], nonnegative=nonnegative)
+    assert found.undetermined == ("m1", "m2")
+    assert "only m3 and m1 + m2 are determined" in found.describe_rank()
+    assert found.answer.found.count("not determined") == 2
+    # a mass that no mode moves
+    still = equivalent_masses(COMPLIANCE, [100.0], [[1.0], [1.0], [0.0]], nonnegative=nonnegative)
+    assert still.undetermined == ("m3",)
+
+
+@each_of(
+    ("change", "message"),
+    [
+        ({"normalise": "last"}, "normalise must be"),
+        ({"rows": "heavy"}, "rows must be"),
+        ({"rows": np.ones((2, 2))}, "shape"),
+        ({"rows": -np.ones((3, 2))}, "not negative"),
+        ({"rows": np.zeros((3, 2))}, "not all zero"),
+        ({"rows": np.full((3, 2), np.nan)}, "finite"),
+        ({"seal_stiffness": [1.0, 2.0]}, "one per mass"),
+        ({"seal_stiffness": np.nan}, "seal_stiffness must be finite"),
+        ({"compliance": np.full((3, 3), np.nan)}, "compliance must be finite"),
+        ({"compliance": COMPLIANCE + np.triu(np.full((3, 3), 1e-9), 1)}, "symmetric"),
+        ({"compliance": COMPLIANCE[:2]}, "compliance must be"),
+        ({"frequencies": [100.0, np.inf]}, "positive and finite"),
+        ({"frequencies": [100.0, -1.0]}, "positive and finite"),
+        ({"shapes": np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]])}, "node at the first mass"),
+        ({"shapes": np.zeros((3, 2)), "normalise": "length"}, "no displacement"),
+        ({"shapes": np.ones((4, 3, 2))}, "one model at a time"),
+    ],
+)
+def test_impossible_inputs_are_refused(change, message):
+    inputs = {"compliance": COMPLIANCE, "frequencies": FREQUENCIES[:2], "shapes": SHAPES[:, :2], **change}
+    with pytest.raises(ValueError, match=message):
+        equivalent_masses(**inputs)

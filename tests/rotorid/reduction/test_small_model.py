@@ -1,0 +1,351 @@
+"""The small model against the rotor itself where that is a few masses, and against formula (50)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import each_of
+from exact_solutions import exactly, frequency_response, whirl_exactly
+from fem_rotors import rotor23
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fem
+from fem import state_space
+from rotorid.reduction import reduce, small_model
+
+NODES = (7, 12, 18)
+
+
+@pytest.fixture(scope="module")
+def rotor():
+    return rotor23()
+
+
+@pytest.fixture(scope="module")
+def reduction(rotor):
+    return reduce(rotor, NODES, 2)
+
+
+def eigenvalues(small, speed=0.0):
+    """All finite eigenvalues at a speed, 1/s, by rising frequency."""
+    return state_space(small.motion(speed), inputs=(), outputs=()).eigenvalues
+
+
+@st.composite
+def lumped_rotors(draw):
+    """Discs on a massless shaft; bearings of any kind, some of them at a disc, some on pedestals."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n = int(rng.integers(4, 10))
+    nodes = np.arange(1, n + 2)
+    discs = sorted(int(node) for node in rng.choice(nodes, size=int(rng.integers(1, 4)), replace=False))
+    bearings = sorted(int(node) for node in rng.choice(nodes, size=int(rng.integers(2, 4)), replace=False))
+
+    def matrix(size):
+        a, b = rng.uniform(-0.3, 0.3, 2) * size
+        return ((size, a), (b, size * rng.uniform(0.5, 2.0)))
+
+    supports = []
+    for node in bearings:
+        k, c = 10 ** rng.uniform(6.5, 8), 10 ** rng.uniform(2, 3.5)
+        kind = int(rng.integers(4))
+        stand = None
+        if rng.random() < 0.5:
+            mass = float(rng.uniform(1, 20)) if rng.random() < 0.5 else 0.0
+            stand = fem.Pedestal(
+                mass, (float(k), 3.0 * k), (float(c), 2.0 * c) if rng.random() < 0.5 else 0.0
+            )
+        if kind == 0:
+            support = fem.Support(node, k, 0.0, pedestal=stand)
+        elif kind == 1:
+            support = fem.Support(node, matrix(k), 0.0, pedestal=stand)
+        elif kind == 2:
+            support = fem.Support(node, matrix(k), matrix(c), pedestal=stand)
+        else:
+            both = ([matrix(k), matrix(2 * k)], [matrix(c), matrix(0.5 * c)])
+            support = fem.Support(node, *both, speeds=(0.0, 1000.0), pedestal=stand)
+        supports.append(support)
+    return fem.Rotor(
+        rng.uniform(0.05, 0.2, n),
+        rng.uniform(0.04, 0.1, n),
+        density=0.0,
+        discs=[fem.Disc(node, float(rng.uniform(5, 50))) for node in discs],
+        supports=supports,
+        material_damping=draw(st.sampled_from([0.0, 1e-5])),
+        model=fem.Model(shear=draw(st.booleans())),
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(lumped_rotors(), st.sampled_from([0.0, 130.0, 900.0]))
+def test_a_rotor_that_is_a_few_masses_is_its_own_small_model(rotor, speed):
+    nodes = [disc.node for disc in rotor.discs]
+    small = small_model(rotor, nodes, [disc.mass for disc in rotor.discs])
+    mine = eigenvalues(small, speed)
+    # the finite element model as plain matrices, every eigenvalue; and the program's own whirl solver
+    theirs = state_space(fem.equations_of_motion(rotor, speed=speed), inputs=(), outputs=()).eigenvalues
+    # material damping without mass beside it decays with 1/β = 1e5 1/s: of the nodes left out only
+    limit = min(1e3 * np.abs(mine).min(), 3e4)
+    for some, others in ((mine, theirs), (theirs, mine)):
+        for value in some[np.abs(some) < limit]:
+            assert np.abs(others - value).min() < 1e-8 * abs(value)
+    omega = np.array([speed + 40.0])
+    W = small.response(omega)[:, : len(nodes)]
+    full = exactly(fem.influence, rotor, nodes, nodes, omega).W
+    np.testing.assert_allclose(W, full, rtol=0, atol=1e-8 * np.abs(full).max())
+
+
+def full_machine(**changes):
+    """Two discs on a massless shaft with all that supports can be."""
+    stand = fem.Pedestal(20.0, (3e8, 1e8), (1e3, 2e3))
+    rotor = fem.Rotor(
+        [0.1] * 10,
+        0.06,
+        density=0.0,
+        discs=[fem.Disc(4, 30.0), fem.Disc(8, 20.0)],
+        supports=[
+            fem.Support(1, ((2e7, 3e6), (-2e6, 5e7)), ((2e3, 1e2), (50.0, 3e3)), name="A"),
+            fem.Support(
+                11, [1e7, ((3e7, 1e6), (0, 2e7))], [1e3, 2e3], speeds=(0.0, 500.0), pedestal=stand, name="B"
+            ),
+        ],
+        material_damping=2e-6,
+        stations={"wheel": 8},
+        model=fem.Model(shear=True),
+    )
+    return replace(rotor, **changes)
+
+
+@pytest.mark.parametrize("speed", [0.0, 50.0, 300.0, 499.0])
+def test_whirl_modes_of_bearings_pedestals_and_material_damping(speed):
+    rotor = full_machine()
+    small = small_model(rotor, (4, "wheel"), (30.0, 20.0))
+    mine, whirl = eigenvalues(small, speed), whirl_exactly(rotor, speed, 6)
+    for value in whirl.eigenvalues:
+        assert np.abs(mine - value).min() < 1e-10 * abs(value)
+    assert small.massive == (4, 8)
+    assert small.nodes == (4, 8, 1, 11)
+
+
+def test_static_slopes_make_gyroscopic_terms_right_to_first_order_in_speed():
+    """The slopes at the discs follow the moments, too: an error that grows with the square of the speed."""
+    discs = [fem.Disc(4, 30.0, polar_inertia=0.6), fem.Disc(8, 20.0, polar_inertia=0.4)]
+    rotor = full_machine(discs=discs, model=fem.Model(gyroscopic=True))
+    small = small_model(rotor, (4, 8), (30.0, 20.0))
+    still = small_model(full_machine(model=fem.Model()), (4, 8), (30.0, 20.0))
+
+    def error(model, speed):
+        mine, theirs = eigenvalues(model, speed), whirl_exactly(rotor, speed, 4).eigenvalues
+        return np.array([np.abs(mine - value).min() / abs(value) for value in theirs])
+
+    slow, fast = error(small, 60.0), error(small, 120.0)
+    np.testing.assert_allclose(fast / slow, 4.0, rtol=0.08)
+    assert fast.max() < 2.5e-4  # at 120 rad/s, a third of the first natural frequency
+    assert error(small, 480.0).max() < 4e-3
+    assert (error(still, 120.0) > 20 * fast).all()  # without gyroscopic terms
+    assert any("slopes that follow" in text for text in small.warnings)
+
+
+def test_gyroscopic_split_has_the_rotor_s_sense(rotor):
+    """On isotropic supports forward whirl rises and backward whirl falls; forward is x before y."""
+    discs = [fem.Disc(d.node, d.mass, 0.05 * d.mass, 0.025 * d.mass) for d in rotor.discs]
+    turning = replace(rotor, discs=discs, model=fem.Model(rotary_inertia=True, gyroscopic=True))
+    small = small_model(turning, NODES, (134.2, 196.6, 157.1))
+    speed = 500.0
+    motion = small.motion(speed, condensed=True)
+    model = state_space(motion)
+    values, vectors = np.linalg.eig(model.A)
+    rest = np.sort(eigenvalues(small, 0.0).imag)[-6::2]
+    for k, omega in enumerate(rest):
+        pair = [i for i in np.argsort(np.abs(values.imag - omega)) if values[i].imag > 0][:2]
+        for i in pair:
+            x, y = vectors[:3, i], vectors[3:6, i]
+            strongest = int(np.argmax(np.abs(x)))
+            forward = -np.imag(np.conj(x[strongest]) * y[strongest]) > 0
+            assert forward == (values[i].imag > omega), k
+    assert any("no moment of inertia is added" in text for text in small.warnings)
+
+
+def test_condensed_supports_are_formula_50(rotor, reduction):
+    for nodes in (NODES, (2, 12, 22), (2, 9), (1, 5, 14, 24)):
+        small = small_model(rotor, nodes, np.full(len(nodes), 100.0))
+        K = small.motion(plane="x", condensed=True).K
+        np.testing.assert_allclose(np.linalg.inv(K), fem.compliance(rotor, nodes), rtol=1e-10, atol=1e-19)
+    small = small_model(rotor, NODES, reduction.masses.solution)
+    mine, theirs = small.motion(plane="x", condensed=True), reduction.equations_of_motion
+    assert mine.coordinates == theirs.coordinates == ("x7", "x12", "x18")
+    np.testing.assert_allclose(mine.K, theirs.K, rtol=1e-9)
+    np.testing.assert_array_equal(mine.M, theirs.M)
+    np.testing.assert_allclose(np.sort(eigenvalues(small).imag)[-6::2], reduction.frequencies, rtol=1e-10)
+
+
+def test_unknowns_and_their_order():
+    small = small_model(full_machine(), (8, 4), (20.0, 30.0))
+    names = ("x8", "x4", "x1", "x11", "y8", "y4", "y1", "y11", "foot_x2", "foot_y2")
+    assert small.coordinates == names
+    motion = small.motion(100.0)
+    assert motion.coordinates == names
+    assert motion.speed == 100.0
+    np.testing.assert_array_equal(np.diag(motion.M), [20, 30, 0, 0, 20, 30, 0, 0, 20, 20])
+    # the pedestal: bearing B between node 11 and its foot, at 100 rad/s a fifth up its table
+    k = 0.8 * 1e7 + 0.2 * 3e7
+    assert motion.K[motion.index("x11"), motion.index("foot_x2")] == pytest.approx(-k)
+    assert motion.K[motion.index("foot_x2"), motion.index("foot_x2")] == pytest.approx(3e8 + k)
+    assert motion.C[motion.index("x1"), motion.index("y1")] == pytest.approx(1e2, rel=1e-6)
+    shaft = small.stiffness
+    rigid = np.column_stack((np.ones(4), full_machine().positions[np.array(small.nodes) - 1]))
+    np.testing.assert_allclose(shaft @ rigid, 0.0, atol=1e-9 * np.abs(shaft).max())
+
+
+def test_circulatory_force_of_material_damping_drives_forward_whirl():
+    """Above the natural frequency material damping drives forward whirl: signs as in the whole rotor."""
+    bearings = [fem.Support(1, 1e8), fem.Support(11, 1e8)]
+    rotor = full_machine(supports=bearings, material_damping=1e-4, model=fem.Model())
+    small = small_model(rotor, (4, 8), (30.0, 20.0))
+    first = np.sort(eigenvalues(small, 0.0).imag[eigenvalues(small, 0.0).imag > 0])[0]
+    assert eigenvalues(small, 0.9 * first).real.max() < 0
+    assert eigenvalues(small, 1.1 * first).real.max() > 0
+
+
+def test_modal_damping_has_its_ratios_in_both_planes(rotor, reduction):
+    ratios = (0.02, 0.05)
+    small = small_model(rotor, NODES, reduction.masses.solution, modal_damping=ratios)
+    omega = reduction.frequencies
+    zeta = np.array([*ratios, 0.0])
+    expected = np.repeat(-zeta * omega + 1j * omega * np.sqrt(1 - zeta**2), 2)
+    for speed in (0.0, 700.0):  # it does not turn
+        found = eigenvalues(small, speed)
+        upper = found[found.imag > 0]
+        np.testing.assert_allclose(upper, expected, rtol=1e-8, atol=1e-8)
+
+
+def test_modal_damping_has_the_ratios_of_the_plane_x():
+    """On bearings that differ the same matrix acts in y; without masses of pedestals."""
+    stand = fem.Pedestal(0.0, (3e7, 6e7))
+    supports = [fem.Support(1, ((2e7, 0.0), (0.0, 4e7))), fem.Support(11, 3e7, pedestal=stand)]
+    rotor = full_machine(supports=supports, material_damping=0.0)
+    plain, damped = (
+        state_space(small_model(rotor, (4, 8), (30.0, 20.0), **how).motion(plane="x")).eigenvalues
+        for how in ({}, {"modal_damping": (0.03, 0.03)})
+    )
+    omega = plain.imag[plain.imag > 0]
+    assert len(omega) == 2
+    np.testing.assert_allclose(np.sort(np.abs(damped))[::2], np.sort(omega), rtol=1e-9)
+    np.testing.assert_allclose(damped.real / np.abs(damped), -0.03, rtol=1e-9)
+
+
+def test_state_space_has_the_same_eigenvalues_and_response():
+    discs = [fem.Disc(4, 30.0, 0.6, 0.3), fem.Disc(8, 20.0, 0.4, 0.2)]
+    rotor = full_machine(discs=discs, model=fem.Model(True, True, True))
+    small = small_model(rotor, (4, 8), (30.0, 20.0), modal_damping=(0.01,))
+    for speed in (0.0, 250.0):
+        model = small.state_space(speed)
+        assert model.inputs == ("f_x4", "f_x8", "f_y4", "f_y8")
+        assert model.outputs == ("x4", "x8", "y4", "y8")
+        motion = small.motion(speed)
+        for value in eigenvalues(small, speed):
+            D = value**2 * motion.M + value * motion.C + motion.K
+            sigma = np.linalg.svd(D, compute_uv=False)
+            assert sigma[-1] < 1e-10 * sigma[0]
+        np.testing.assert_allclose(model.eigenvalues, eigenvalues(small, speed), rtol=1e-10)
+    # unbalance U: f_x = Re(U Ω² e^{iΩt}), f_y = Im: f_y is −i times f_x
+    H = frequency_response(small.state_space(250.0), 250.0)[0]
+    expected = 250.0**2 * (H[:2, :2] - 1j * H[:2, 2:])
+    np.testing.assert_allclose(small.response(250.0)[0, :2], expected, rtol=1e-9)
+    bearing = small.state_space(250.0, inputs=["f_x1"], outputs=["x1", "v_x4"])
+    assert frequency_response(bearing, 250.0).shape == (1, 2, 1)
+
+
+def test_one_plane_alone(rotor, reduction):
+    small = small_model(rotor, NODES, reduction.masses.solution)
+    model = state_space(small.motion(plane="x"))
+    np.testing.assert_allclose(model.eigenvalues.imag[1::2], reduction.frequencies, rtol=1e-10)
+    coupled = small_model(full_machine(), (4, 8), (30.0, 20.0))
+    with pytest.raises(ValueError, match="coupled: take both"):
+        coupled.motion(plane="x")
+
+
+def test_gyroscopic_moments_at_supports_follow_statically_when_condensed(rotor):
+    discs = [fem.Disc(d.node, d.mass, 0.02 * d.mass, 0.01 * d.mass) for d in rotor.discs]
+    turning = replace(rotor, discs=discs, model=fem.Model(rotary_inertia=True, gyroscopic=True))
+    small = small_model(turning, NODES, (134.2, 196.6, 157.1))
+    few = state_space(small.motion(300.0, condensed=True)).eigenvalues
+    kept = eigenvalues(small, 300.0)
+    assert len(few) == 12
+    assert len(kept) == 16
+    assert np.abs(kept[12:]).min() > 100 * np.abs(kept[:12]).max()  # far above: of the massless supports
+    for value in few:
+        assert np.abs(kept - value).min() < 5e-6 * abs(value)
+    assert np.abs(kept[:12].real).max() < 1e-8  # nothing takes energy out or brings it in
+
+
+def test_damped_supports_cannot_be_condensed():
+    small = small_model(full_machine(), (4, 8), (30.0, 20.0))
+    with pytest.raises(ValueError, match="damping acts on 'x1', which has no mass"):
+        small.motion(100.0, condensed=True)
+    at_bearings = small_model(full_machine(), (1, 6, 11), (5.0, 30.0, 5.0))
+    motion = at_bearings.motion(100.0, condensed=True)
+    assert motion.coordinates == at_bearings.coordinates  # nothing is massless
+
+
+@each_of(
+    ("nodes", "masses", "options", "message"),
+    [
+        ((), (), {}, "different nodes"),
+        ((4, 4), (1.0, 1.0), {}, "different nodes"),
+        ((4, 12), (1.0, 1.0), {}, "node 12 does not exist"),
+        (("fan",), (1.0,), {}, "no station is called 'fan'"),
+        ((4, 8), (1.0,), {}, "as many masses"),
+        ((4, 8), ("a", 1.0), {}, "numbers in kg"),
+        ((4, 8), (1.0, -2.0), {}, "node 8 is -2 kg, not positive: a physical model needs positive masses"),
+        ((4, 8), (1.0, 0.0), {}, "positive masses"),
+        ((4, 8), (np.nan, 1.0), {}, "positive masses"),
+        ((4, 8), (1.0, 1.0), {"modal_damping": (1.2,)}, "below 1"),
+        ((4, 8), (1.0, 1.0), {"modal_damping": (np.nan,)}, "below 1"),
+        ((4, 8), (1.0, 1.0), {"modal_damping": 0.02}, "list of damping ratios"),
+        ((4, 8), (1.0, 1.0), {"modal_damping": (0.01,) * 4}, "each plane has 2 modes"),
+    ],
+)
+def test_bad_input_is_refused(nodes, masses, options, message):
+    with pytest.raises(ValueError, match=message):
+        small_model(full_machine(), nodes, masses, **options)
+
+
+def test_a_shaft_that_nothing_holds_is_refused_in_words():
+    one = full_machine(supports=[fem.Support(4, 1e7)])
+    with pytest.raises(ValueError, match="can turn about it"):
+        small_model(one, (4,), (30.0,))
+    held = full_machine(supports=[fem.Support(4, 1e7, tilting_stiffness=1e5)], material_damping=0.0)
+    assert eigenvalues(small_model(held, (4,), (30.0,))).imag.max() == pytest.approx(np.sqrt(1e7 / 30.0))
+    free = full_machine(supports=[fem.Support(1), fem.Support(11)], material_damping=0.0)
+    with pytest.raises(ValueError, match="can move without force"):
+        small_model(free, (4,), (30.0,)).motion(condensed=True)
+    with pytest.raises(ValueError, match="no damping ratios exist"):
+        small_model(free, (4,), (30.0,), modal_damping=(0.01,))
+    with pytest.raises(ValueError, match="held neither"):
+        eigenvalues(small_model(free, (4,), (30.0,)))
+    pushed = full_machine(supports=[*full_machine().supports, fem.Support(6, -1e8, kind="seal")])
+    with pytest.raises(ValueError, match="negative stiffness"):
+        small_model(pushed, (4, 8), (30.0, 20.0), modal_damping=(0.01,))
+
+
+def test_speeds_are_checked(rotor):
+    small = small_model(full_machine(), (4, 8), (30.0, 20.0))
+    with pytest.raises(ValueError, match="its table holds 0 to 500"):
+        eigenvalues(small, 600.0)
+    for bad in (-1.0, np.inf, "fast"):
+        with pytest.raises(ValueError, match="speeds must be"):
+            small.response(bad)
+    with pytest.raises(ValueError, match="it is"):
+        small.motion(plane="z")
+    jeffcott = fem.Rotor(
+        [0.5, 0.5],
+        0.05,
+        density=0.0,
+        discs=[fem.Disc(1, 1.0)],
+        supports=[fem.Support(1, 1e4), fem.Support(3, 1e4)],
+    )
+    with pytest.raises(ValueError, match="exactly at a critical speed"):
+        small_model(jeffcott, (1, 3), (1.0, 1.0)).response(100.0)
