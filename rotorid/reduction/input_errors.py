@@ -162,7 +162,8 @@ class Inputs:
                 "some of the drawn inputs give masses that are not positive, and then no "
                 f"{modes[0]}: these errors do not determine {', '.join(modes)}"
             )
-        if (wild := np.flatnonzero(~(masses < np.abs(exact[0])))).size:
+        wild = np.flatnonzero(np.logical_not(masses < np.abs(exact[0])))
+        if wild.size:
             names = ", ".join(f"m{i + 1}" for i in wild)
             warnings.append(f"a standard deviation is as large as the mass: {names} cannot be relied on")
         return MassErrors(masses, frequencies, tuple(warnings))
@@ -219,7 +220,13 @@ class MassErrors(Answered):
 
 @dataclass(frozen=True, eq=False)
 class Shift(Answered):
-    """What given changes of the inputs do: changes of masses, kg, and frequencies, rad/s, shape (n,) each."""
+    """What given changes of the inputs do.
+
+    Attributes
+    ----------
+    masses, frequencies
+        Changes, kg and rad/s, shape (n,) each.
+    """
 
     masses: FloatArray
     frequencies: FloatArray

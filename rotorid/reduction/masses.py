@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.regression import Estimate, least_squares
 
 Normalisation = Literal["first", "largest", "length"]
