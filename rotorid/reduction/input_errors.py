@@ -153,7 +153,7 @@ class Inputs:
         changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
         draws = self.recomputed(np.concatenate((np.zeros((1, sigma.size)), changes)))
         exact, draws = draws[0], draws[1:]
-        lost = np.isnan(draws).any(axis=0)
+        lost = np.asarray(np.isnan(draws).any(axis=0))
         low, high = np.quantile(np.where(np.isnan(draws), 0.0, draws), (0.15866, 0.84134), axis=0)
         masses, frequencies = np.where(lost, np.nan, (high - low) / 2)
         warnings = []
