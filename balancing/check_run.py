@@ -290,7 +290,7 @@ def compare_check(
     chi_square = probability = explained = change = None
     if part.known_errors:
         local = replace(check, planes=part.planes, weights=T, speeds=part.speeds)
-        noise = part.difference_noise(local, predicted)
+        noise = part.difference_noise(local)
         V = noise.covariance(part.errors.sizes)
         R, S, C = difference.shape
         covariance = np.einsum("scrarb->rscab", V.reshape(S, C, R, 2, R, 2))
@@ -344,7 +344,7 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
         effects = [np.broadcast_to(z * part.W[..., p], difference.shape) for p in planes for z in (1, 1j)]
         change = np.zeros(P, dtype=complex)
         for _ in range(2):  # errors depend on what is mounted
-            noise = part.difference_noise(replace(check, weights=check.weights + change), check.mean)
+            noise = part.difference_noise(replace(check, weights=check.weights + change))
             target, *columns, drawn = _white(part, noise, difference, *effects)
             A = np.column_stack(columns)
             change[planes] = unstretch(solution(A, target, rcond=1e-10))

@@ -391,7 +391,7 @@ def run_errors(
         share = OWN_SHARES[: 4 if spare else 3, None]
         sizes = np.sqrt(np.hstack((share * (relative + floor), (1 - share) * (relative, 0.0, floor))))
         evenly = floor / ((relative + floor) or 1.0)
-        if not sizes.any() or not spare or tail(spare, sizes, evenly) > 1 - CONTRADICTION:
+        if not spare or tail(spare, sizes, evenly) > 1 - CONTRADICTION:
             return RunErrors(sizes, _posterior(all_, sizes, evenly), "stated", level, evenly)
     if spare:
         return _estimated(all_, level)

@@ -181,22 +181,19 @@ class Influence:
         run = Trials(*names, readings[None], weights[None], placement=placement)
         return (error[..., 0] for error in self.noise_draws(self._of_runs(run, np.eye(1)), count, seed))
 
-    def difference_noise(self, check: Trials, predicted: ComplexArray) -> Noise:
+    def difference_noise(self, check: Trials) -> Noise:
         """How readings of runs err against Y₀ + W T: `own` (2, S, C, 2R, 2R), `columns` (M, S, C, R).
 
         Parameters
         ----------
         check
             R runs with the speeds, sensors and planes of the coefficients.
-        predicted
-            Y₀ + W T, (R, S, C), of which errors are so many percent.
         """
         R = len(check.runs)
         reading = reading_of(check)
         reading = self.reading if reading.source == "assumed" and self.reading.errors is not None else reading
-        expected = replace(check, readings=np.where(np.isnan(check.readings), np.nan, predicted))
         change = np.column_stack((np.ones(R), check.weights)).astype(complex)
-        return self.errors.noise.changed(change).plus(self._of_runs(expected, np.eye(R), reading))
+        return self.errors.noise.changed(change).plus(self._of_runs(check, np.eye(R), reading))
 
     def _of_runs(self, runs: Trials, G: FloatArray, reading: Reading | None = None) -> Noise:
         """Errors of combinations (n, R) of further runs; of a reading as those of the coefficients."""

@@ -13,7 +13,8 @@ has half the gradient Σ w² Ŵᵀ Σ⁻¹ r, with Ŵ the W part of ẑ, stretch
 w L⁻¹ r and rows w L⁻¹ Ŵ, Σ = L Lᵀ. Its matrix M = Σ w² Ŵᵀ Σ⁻¹ Ŵ contains the squares of errors e that Ŵ has
 itself, of covariance K = C − C Bᵀ Σ⁻¹ B C; the honest information about D is A = M − Σ w² E[eᵀ Σ⁻¹ e], and
 one step from D, −A⁻¹ (gradient), solves the problem for redrawn data. Source: W. A. Fuller, *Measurement
-Error Models* (1987), chapters 2 and 3.
+Error Models* (1987), chapters 2 and 3. The gradient has the errors dY + dW D of the true D; each draw takes
+that of another draw for it, for with the estimate regions of uncertain weights are too small.
 
 Unbalance outside the planes leaves residuals that no error of a reading explains; large weights would excuse
 them by the errors of W. Where χ² is beyond what errors explain (95 %), every reading of Y therefore gets a
@@ -462,16 +463,16 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
     at = wide.at(D)
     inverse, rng, model_error = wide.inverse(at), np.random.default_rng(1), float(np.sqrt(share * variance))
     root = np.linalg.cholesky(np.linalg.inv(inverse)).T
-    weighing, moved = np.swapaxes(at.white, 1, 2) @ at.white, (at.A @ at.white)[:, 2:]
-    left = (errors.Y + errors.W @ D).view(np.float64).reshape(-1, 2, 1)
-    adjusted = errors.W - unstretch((moved @ left)[..., 0])
+    rows = at.rows.reshape(len(at.white), 2, -1)
+    gradient = np.moveaxis(wide.w[:, None, None] * (np.swapaxes(at.white, 1, 2) @ rows), -1, 0)
+    gain = inverse @ gradient.reshape(len(inverse), -1)
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
         further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
-        r = ((Y + further)[:, on] + W[:, on] @ D).view(np.float64).reshape(len(W), -1, 2, 1)
-        u = unstretch((weighing @ r)[..., 0])[..., 0]
-        gradient = np.einsum("n,np,bn->bp", wide.w**2, adjusted.conj(), u)
-        drawn = D - unstretch(gradient.view(np.float64) @ inverse)
+        step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ gain.T
+        others = np.roll(step - step.mean(axis=0), 1, axis=0)[..., None]
+        others = others * np.minimum(1.0, np.linalg.norm(D) / np.linalg.norm(others, axis=1, keepdims=True))
+        drawn = D + unstretch(step - (gain @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
 

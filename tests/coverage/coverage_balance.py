@@ -106,7 +106,7 @@ def draw(
     floor = np.sqrt(np.mean(np.sum(np.abs(effect) ** 2, axis=-1)))
     scatter = RunScatter(0.0, run / told * floor) if kind == KINDS[-1] else RunScatter(run / told)
     a, b = rng.standard_normal((2, 3 if "repeats" in source else 1, *Y.shape))
-    stated, between = "stated" in source, source in ("stated", "stated, spare runs") and run > 0
+    stated, between = "stated" in source, source in ("stated", "stated, spare runs")
     trials = Trials(
         runs=tuple(f"run {r + 1}" for r in range(len(T))),
         speeds=100.0 * np.arange(1, S + 1),

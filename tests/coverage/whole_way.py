@@ -239,7 +239,7 @@ def mistake(rng: np.random.Generator, kind: str) -> Mistaken:
     assert found.left is not None
     known, effect = found.influence, machine.W @ (wrong - pieces.weights)
     as_read = replace(check, planes=known.planes, weights=pieces.weights[None])
-    noise = known.difference_noise(as_read, found.check.predicted)
+    noise = known.difference_noise(as_read)
     distance = float(np.sqrt(Whitening(noise, known.errors.sizes).chi_square(effect[..., None])))
     change = found.check.change
     named = change is not None and bool((np.abs(np.delete(change, p)) < 0.1 * abs(change[p])).all())
