@@ -310,7 +310,9 @@ def compare_methods(
             M, K, T, frequencies, shapes, reason = method.function(condensed)
         except ValueError as failure:
             lost = np.full(n, np.nan)
-            table.append(Method(name, None, None, None, lost, np.full((n, n), np.nan), lost, lost, f"{failure}"))
+            table.append(
+                Method(name, None, None, None, lost, np.full((n, n), np.nan), lost, lost, f"{failure}")
+            )
             continue
         error = frequencies / full.frequencies - 1
         agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, condensed.shapes)), np.nan)
