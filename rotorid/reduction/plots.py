@@ -84,7 +84,11 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
         for k in range(shown):
             axes.plot(x, measured[:, k] / scale[k], MARKERS[k], color=COLORS[k], mfc="white", ms=14)
         axes.set_xticks(x, [f"{node}\n{words}" for node, words in zip(reduction.nodes, labels, strict=True)])
-        axes.set(xlabel="place of the mass", ylabel="mode shape, largest measured = 1 (hollow: measured)")
+        axes.set(
+            xlim=(-0.4, n - 0.6),
+            xlabel="place of the mass",
+            ylabel="mode shape, largest measured = 1 (hollow: measured)",
+        )
     lowest = 1.12
     for k, (f, error) in enumerate(
         zip(reduction.frequencies[:shown], reduction.relative_error, strict=False)

@@ -149,7 +149,6 @@ def test_growing_is_said():
     q = 1e6
     small = lumped([*BEARINGS["damped"], fem.Support(4, ((0, q), (-q, 0)), kind="seal")])
     cost = compare_response(small, [50.0, 100.0])
-    assert any("small model has no steady response from 50" in text for text in cost.warnings)
     assert any("the steady response does not exist" in text for text in cost.warnings)
 
 
