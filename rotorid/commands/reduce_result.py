@@ -14,7 +14,6 @@ from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.commands.outcome import Parts
-from rotorid.commands.quantities import one_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,34 +93,18 @@ class ReducedRotor(Parts):
         """The ranking where it was asked for, else masses and modes."""
         return self.result.to_frame() if self.placement is None else self.placement.to_frame()
 
-    def figure(self, view: str | None = None) -> Figure:
-        """Shapes, or what was asked for beside them; by default the first of it in the order of the parts.
-
-        Raises
-        ------
-        ValueError
-            For a view of what was not computed.
-        """
+    def figure(self) -> Figure:
+        """The last of what was asked for: stability, response, methods, places, or the shapes."""
         from rotorid.base.plot_style import new_figure
         from rotorid.plots import plot
 
-        parts = {
-            "stability": self.stability,
-            "response": self.response,
-            "methods": self.methods,
-            "placement": self.placement,
-            "shapes": self.result,
-        }
-        name = view or next(name for name, part in parts.items() if part is not None)
-        if parts[one_of(name, "view", [*parts])] is None:
-            option = {"placement": "--rank"}.get(name, f"--{name}")
-            raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
-        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
-        figure = new_figure(6.2 if heights else 5.0)
-        if heights:
-            plot(parts[name], [*figure.subplots(2, sharex=True, height_ratios=heights)])
-        else:
-            plot(parts[name], figure.add_subplot())
+        parts = (self.stability, self.response, self.methods, self.placement, self.result)
+        part: Any = next(part for part in parts if part is not None)
+        ratios = (1, 1) if part is self.methods else (3, 2)
+        two = part is self.methods or part is self.response
+        figure = new_figure(6.2 if two else 5.0)
+        pair = [*figure.subplots(2, sharex=True, height_ratios=ratios)] if two else figure.add_subplot()
+        plot(part, pair)
         return figure
 
     def sheet(self) -> bytes:
@@ -156,6 +139,8 @@ class ReducedRotor(Parts):
 
         For `fit` dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
         """
+        import numpy as np
+
         from rotorid.tables.models.model_writing import ode_model_bytes
         from rotorid.tables.models.small_model_file import small_model_bytes
 
@@ -172,29 +157,31 @@ class ReducedRotor(Parts):
         motion = self._motion()
         masses = [f"{axis}{node}" for axis in "xy" for node in self.result.nodes]
         masses = [name for name in masses if name in motion.coordinates]
-        critical = {
-            x: 2 * math.sqrt(motion.M[i, i] * motion.K[i, i]) for x in masses for i in [motion.index(x)]
+        stiff, heavy = np.diag(motion.K), np.diag(motion.M)
+        dampers = {
+            x: float(f"{0.04 * math.sqrt(heavy[i] * stiff[i]):.3g}")
+            for x in masses
+            for i in [motion.index(x)]
         }
-        inputs = [f"f_x{node}" for node in self.forces]
-        if lost := [name for name in inputs if name.removeprefix("f_") not in masses]:
+        if lost := [node for node in self.forces if f"x{node}" not in masses]:
             raise ValueError(
-                f"--force: no mass of the model stands at {lost[0].removeprefix('f_x')}; masses stand at "
+                f"--force: no mass of the model stands at {lost[0]}; masses stand at "
                 f"{', '.join(map(str, self.result.nodes))}"
             )
-        which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
-        said = [
+        which = "the plane x" if masses[-1].startswith("x") else "both planes"
+        comments = [
             f"{made}, {which} at {motion.speed:.6g} rad/s, SI",
             "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
         ]
-        if motion.M.any(axis=0).all() and not inputs:
-            said.append("Put forces of time into [force].")
-        elif not inputs:
-            said.append("Measured forces: write the file with --force NODES.")
+        if not self.forces:
+            massive = motion.M.any(axis=0).all()
+            with_time = "Put forces of time into [force]."
+            comments.append(with_time if massive else "Measured forces: write the file with --force NODES.")
         return ode_model_bytes(
             motion,
-            {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
-            comments=said,
-            inputs=inputs,
+            dampers,
+            comments=comments,
+            inputs=[f"f_x{node}" for node in self.forces],
             outputs=None if set(masses) == set(motion.coordinates) else masses,
         )
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.suggestions import did_you_mean
@@ -172,7 +172,7 @@ class Inputs:
 
         Ordinates at the first mass are exact, and all inputs independent.
         """
-        used = np.asarray(self.deviations(InputErrors(compliance=0.5, shapes=0.5)) > 0)
+        used: BoolArray = np.not_equal(self.deviations(InputErrors(compliance=0.5, shapes=0.5)), 0.0)
         n, k = self.U.shape
         used[n * (n + 1) // 2 + k : n * (n + 1) // 2 + 2 * k] = False
         steps = STEP * np.eye(used.size)[used]

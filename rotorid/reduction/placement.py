@@ -107,7 +107,7 @@ class Placement(Answered):
     @property
     def check(self) -> int:
         """How many modes are compared: as many as there are masses."""
-        return self.nodes.shape[1]
+        return int(self.nodes.shape[1])
 
     @property
     def considered(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,8 +45,8 @@ SMALLEST_ERROR, SAME_SHAPE = 1e-4, 1e-6
 HATCHES = ("", "////", "....", "xxxx")
 """Bars that differ without colour."""
 DARK, LINE = "#2f3640", "#6b7480"
-FULL = {"color": BLUE, "linewidth": 2.4}
-SMALL = {"color": VERMILION, "linewidth": 1.7, "linestyle": (0, (4, 2))}
+FULL: dict[str, Any] = {"color": BLUE, "linewidth": 2.4}
+SMALL: dict[str, Any] = {"color": VERMILION, "linewidth": 1.7, "linestyle": (0, (4, 2))}
 """The full rotor and its small model where both are curves."""
 
 
@@ -98,7 +98,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
         text = text if np.isfinite(f) else f"mode {k + 1}: does not vibrate"
         points = shapes[:, k] / scale[k] if np.isfinite(f) else np.full(n, np.nan)
         lowest = max(lowest, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
-        style = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
+        style: dict[str, Any] = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
         axes.plot(x, points, MARKERS[k], **style, label=text)
     axes.axhline(0.0, color=LINE, linewidth=0.8, zorder=3)
     axes.set_ylim(-lowest, lowest)
@@ -186,7 +186,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     plain_numbers(bar.ax)
     plain_numbers(axes)
     front = placement.pareto
-    line = {"color": COLORS[1], "linewidth": 1.4, "zorder": 3}
+    line: dict[str, Any] = {"color": COLORS[1], "linewidth": 1.4, "zorder": 3}
     axes.step(
         x[front],
         y[front],
@@ -207,7 +207,12 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
         same = [(name, marker, color) for name, other, marker, color in names if other == row]
         nodes = ", ".join(map(str, placement.nodes[row]))
         text = f"{' and '.join(name for name, *_ in same)}: {nodes}, {100 * placement.error[row]:.3g} %"
-        style = {"markeredgecolor": "black", "markeredgewidth": 1.2, "zorder": 6, "color": same[0][2]}
+        style: dict[str, Any] = {
+            "markeredgecolor": "black",
+            "markeredgewidth": 1.2,
+            "zorder": 6,
+            "color": same[0][2],
+        }
         size = 17 if same[0][1] == "*" else 10
         label = f"{text}, MAC {placement.mac[row]:.4f}"
         axes.plot(x[row], y[row], same[0][1], **style, markersize=size, label=label)
@@ -236,7 +241,7 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
         plain(panel)
         words = f"left out, ±{100 * running.bands:.3g} % of a critical speed"
         for k, (a, b) in enumerate(running.left_out):
-            shade = {"color": "black", "alpha": 0.1, "linewidth": 0}
+            shade: dict[str, Any] = {"color": "black", "alpha": 0.1, "linewidth": 0}
             panel.axvspan(a * RPM, b * RPM, **shade, label=None if k else words)
         panel.set_xlim(speeds[0], speeds[-1])
     rad_s_above(above)
