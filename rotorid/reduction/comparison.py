@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,6 @@ from fem import (
     checked_number,
     critical_speeds_below,
     label,
-    polar,
     runs_away,
     solve_whirl,
 )
@@ -28,12 +27,9 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import counted, sentence
 from rotorid.reduction.small_model import SmallModel
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 CLOSE = 0.08
 """Largest difference, relative to the largest entry, up to which the small model follows the rotor well."""
@@ -129,20 +125,6 @@ class ResponseCost(Answered):
             tables=("\n".join(fill(sentence(text), COLUMNS, subsequent_indent="  ") for text in details),),
             more="where the response differs most",
         )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed, sensor and plane."""
-        S, C, P = self.full.shape
-        columns = (
-            Column("speed_rad_s", np.repeat(self.speeds, C * P)),
-            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.nodes] * S),
-            Column("plane", list(self.nodes) * (S * C)),
-            *polar("full_m_per_kg_m", "full_phase_deg", self.full),
-            *polar("small_m_per_kg_m", "small_phase_deg", self.small),
-            Column("relative_difference", self.relative_difference.ravel()),
-            Column("excluded", np.repeat(self.excluded, C * P)),
-        )
-        return frame(Table("responses", columns))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: sizes over all speeds, and the worst of each as relative difference."""
@@ -361,23 +343,16 @@ class StabilityCost(Answered):
         disagree = "" if self.full.status == self.small.status else "the models disagree: "
         return f"{disagree}the full rotor {full}, the small model {small}{percent}"
 
-    def _curves(self) -> dict[str, FloatArray]:
-        names = ("full_log_decrement", "small_log_decrement", "full_frequency_rad_s", "small_frequency_rad_s")
-        values = (self.full_decrement, self.small_decrement, self.full_frequency, self.small_frequency)
-        return dict(zip(names, values, strict=True))
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed: smallest logarithmic decrement and its whirl frequency in both models."""
-        curves = {"speed_rad_s": self.speeds, **self._curves()}
-        return frame(Table("stability", tuple(Column(name, values) for name, values in curves.items())))
-
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""
         return plain(
             {
                 "nodes": self.nodes,
                 "speeds_rad_s": self.speeds,
-                **self._curves(),
+                "full_log_decrement": self.full_decrement,
+                "small_log_decrement": self.small_decrement,
+                "full_frequency_rad_s": self.full_frequency,
+                "small_frequency_rad_s": self.small_frequency,
                 "full": self.full.to_dict(),
                 "small": self.small.to_dict(),
                 "relative_difference_of_threshold": self.relative_difference,

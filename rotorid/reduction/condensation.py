@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, text
+from rotorid.base.result import Column, text
 from rotorid.base.text import counted, listing, percent
 from rotorid.reduction.masses import (
     Normalisation,
@@ -45,9 +45,6 @@ from rotorid.reduction.masses import (
     natural_frequencies,
     plane_at_rest,
 )
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MASSLESS = 1e-12
 """Of the largest eigenvalue of Guyan's mass matrix: below, some motion of the masters moves no mass."""
@@ -153,10 +150,6 @@ class Methods(Answered):
                 return row
         raise ValueError(f"no method {name!r}: there are {', '.join(row.name for row in self.rows)}")
 
-    def to_frame(self) -> pd.DataFrame:
-        """A row per method and mode."""
-        return frame(self._columns())
-
     def _columns(self) -> tuple[Column, ...]:
         n, several = len(self.nodes), len(self.rows)
         frequency, share = "{:.4f}".format, "{:+.3%}".format
@@ -171,7 +164,6 @@ class Methods(Answered):
             Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several), frequency, "rotor"),
             Column("relative_error", each("relative_error"), share, "error"),
             Column("mac", each("mac"), "{:.5f}".format, "MAC"),
-            Column("diagonal", np.repeat([row.diagonal for row in self.rows], n)),
         )
 
     def to_dict(self) -> dict[str, Any]:

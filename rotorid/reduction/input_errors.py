@@ -37,7 +37,7 @@ class InputErrors:
     Attributes
     ----------
     compliance
-        Scalar or (n, n), symmetric: α_ij and α_ji are one input.
+        Scalar, or of α_11, α_12 … α_1n, α_22 …, shape (n (n + 1) / 2,).
     frequencies
         Scalar or (k,).
     shapes
@@ -127,21 +127,20 @@ class Inputs:
     def deviations(self, errors: InputErrors) -> FloatArray:
         """Relative standard deviation of every input, (P,)."""
         n, k = self.U.shape
-        shapes = {"compliance": (n, n), "frequencies": (k,), "shapes": (n, k), "seal_stiffness": (n,)}
+        sizes = {
+            "compliance": (n * (n + 1) // 2,),
+            "frequencies": (k,),
+            "shapes": (n, k),
+            "seal_stiffness": (n,),
+        }
         parts = []
-        for name, shape in shapes.items():
+        for name, shape in sizes.items():
             given = np.asarray(getattr(errors, name))
             if given.shape not in ((), shape):
                 raise ValueError(
                     f"errors of {name} must be one number or have shape {shape}; got {given.shape}"
                 )
             full = np.array(np.broadcast_to(given, shape))
-            if name == "compliance":
-                if not (full == full.T).all():
-                    raise ValueError(
-                        "errors of the compliance must be symmetric: α_ij and α_ji are one input"
-                    )
-                full = full[np.triu_indices(n)]
             if name == "shapes" and given.ndim == 0 and self.normalise == "first":
                 full[0] = 0.0
             parts.append(full.ravel())
@@ -153,7 +152,7 @@ class Inputs:
         changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
         draws = self.recomputed(np.concatenate((np.zeros((1, sigma.size)), changes)))
         exact, draws = draws[0], draws[1:]
-        lost = np.isnan(draws).any(axis=0)
+        lost = np.asarray(np.isnan(draws).any(axis=0))
         low, high = np.quantile(np.where(np.isnan(draws), 0.0, draws), (0.15866, 0.84134), axis=0)
         masses, frequencies = np.where(lost, np.nan, (high - low) / 2)
         warnings = []

@@ -169,14 +169,7 @@ def test_outputs():
     assert back["largest"] == cost.sizes["largest"]
     assert back["relative_difference"][0] is None
     assert back["where"]["plane"] == cost.where[2]
-    frame = cost.to_frame()
-    assert len(frame) == 26 * 9
-    row = frame[(frame.speed_rad_s == cost.where[0]) & (frame.plane == cost.where[2])]
-    assert row.relative_difference.max() == cost.sizes["largest"]
-    k = int(np.flatnonzero(cost.speeds == 20.0)[0])
-    at = frame[frame.speed_rad_s == 20.0]
-    Z = at.small_m_per_kg_m * np.exp(1j * np.radians(at.small_phase_deg))
-    assert Z.to_numpy() == pytest.approx(cost.small[k].ravel())
+    assert len(back["relative_difference"]) == 26
 
 
 @each_of(
