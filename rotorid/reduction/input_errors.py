@@ -218,7 +218,13 @@ class MassErrors(Answered):
 
 @dataclass(frozen=True, eq=False)
 class Shift(Answered):
-    """What given changes of the inputs do: changes of masses, kg, and frequencies, rad/s, shape (n,) each."""
+    """What given changes of the inputs do.
+
+    Attributes
+    ----------
+    masses, frequencies
+        Their changes, kg and rad/s, shape (n,) each.
+    """
 
     masses: FloatArray
     frequencies: FloatArray

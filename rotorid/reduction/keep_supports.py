@@ -26,7 +26,17 @@ RIGID = 1e7
 
 
 def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
-    """Nodes of its bearings that have a stiffness, journal bearings and squeeze films, ascending."""
+    """Nodes of its bearings that have a stiffness, journal bearings and squeeze films.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+
+    Returns
+    -------
+    Different numbers, ascending.
+    """
     films = {force.node for force in rotor.forces if isinstance(force, (JournalBearing, SqueezeFilm))}
     springs = {s.node for s in rotor.supports if s.kind == "bearing" and s.at(s.speeds or 0.0)[0].any()}
     return tuple(sorted(films | springs))
@@ -35,7 +45,21 @@ def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
 def held_rigidly(rotor: fem.Rotor, stiffness: float = RIGID) -> fem.Rotor:
     """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
 
-    `stiffness` of a support is by that of the shaft, 48 E I / l³. ValueError if these are fewer than two.
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+    stiffness
+        Of a support, by that of the shaft, 48 E I / l³.
+
+    Returns
+    -------
+    A linear rotor; tilting stiffness stays.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two nodes to hold.
     """
     nodes = held_nodes(rotor)
     if len(nodes) < 2:
@@ -54,7 +78,20 @@ def held_rigidly(rotor: fem.Rotor, stiffness: float = RIGID) -> fem.Rotor:
 
 
 def check_free(held: Sequence[int], nodes: Sequence[int]) -> None:
-    """Refuse masses where the shaft is held."""
+    """Refuse masses where the shaft is held.
+
+    Parameters
+    ----------
+    held
+        As `held_nodes` gives them.
+    nodes
+        Where masses are to stand.
+
+    Raises
+    ------
+    ValueError
+        For a mass at a node that is held.
+    """
     if both := [node for node in nodes if node in held]:
         raise ValueError(
             f"node {both[0]} is held rigidly while the masses are found, so none can be found there: leave "
