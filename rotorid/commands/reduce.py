@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.logs import workflows as log
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 from rotorid.commands.input_checks import rotor_source
 from rotorid.commands.outcome import command, provenance
@@ -30,7 +28,6 @@ from rotorid.commands.quantities import (
 
 if TYPE_CHECKING:
     from fem import Rotor
-    from rotorid.base.registry import Method
     from rotorid.commands.reduce_result import ReducedRotor
     from rotorid.reduction import InputErrors, Placement, Reduction
     from rotorid.tables.data.modes_table import MeasuredModes
@@ -41,16 +38,7 @@ Normalise = Literal["first", "largest", "length"]
 """How shapes are scaled."""
 Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
-View = Literal["shapes", "methods", "placement", "response", "stability"]
-"""What a picture shows."""
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
-
-
-def choices() -> dict[str, Sequence[Method[Any]]]:
-    """What `methods` compares."""
-    from rotorid.reduction.condensation import METHODS
-
-    return {"methods": METHODS}
 
 
 @dataclass(frozen=True)
@@ -179,28 +167,29 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
     computed = ("rank", "place", "methods", "response", "stability")
+    given = [name for name, value in vars(options).items() if value is not None and value is not False]
     of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed", "keep_supports")
-    asked = {name: getattr(options, name) for name in of_rotor}
-    given = [name for name, value in asked.items() if value is not None and value is not False]
-    if not has_rotor and given:
-        raise ValueError(f"{option_name(given[0])} needs a rotor: give ROTOR instead of --compliance")
     on_supports = ("measured", "supports_apart", "speed", "response", "stability", "both_planes", "force")
-    for name in on_supports if options.keep_supports else ():
-        if getattr(options, name) not in (None, False):
-            raise ValueError(
-                f"{option_name(name)} asks for the rotor on its supports; with --keep-supports the "
-                "masses are found on rigid ones: leave out one of them"
-            )
-    if has_rotor and (options.compliance is not None or options.seals is not None):
-        raise ValueError("--compliance and --seals take the place of a rotor: give them, or ROTOR, not both")
-    for name in ("masses", "candidates"):
-        if getattr(options, name) is not None and not options.rank and options.place is None:
-            raise ValueError(f"--{name} does nothing without --rank or --place")
-    if options.measured is not None and given and given[0] in computed:
-        raise ValueError(
-            f"{option_name(given[0])} compares with the computed rotor, not with the measured modes: "
-            f"leave out {option_name(given[0])} or --measured"
-        )
+    ranks = options.rank or options.place is not None
+    wrong = (
+        (not has_rotor, of_rotor, "needs a rotor: give ROTOR instead of --compliance"),
+        (has_rotor, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both"),
+        (not ranks, ("masses", "candidates"), "does nothing without --rank or --place"),
+        (
+            options.keep_supports,
+            on_supports,
+            "asks for the rotor on its supports; with --keep-supports the masses are found on rigid ones: "
+            "leave out one of them",
+        ),
+        (
+            options.measured is not None,
+            computed,
+            "compares with the computed rotor, not with the measured modes: leave out one of them",
+        ),
+    )
+    for case, names, words in wrong:
+        if case and (first := next((name for name in names if name in given), None)):
+            raise ValueError(f"{option_name(first)} {words}")
 
 
 def _forces(options: ReduceOptions) -> list[str | int]:
@@ -210,12 +199,12 @@ def _forces(options: ReduceOptions) -> list[str | int]:
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
     """The masses of a rotor, and what is asked for beside them."""
     from rotorid.commands.reduce_result import ReducedRotor
-    from rotorid.reduction import check_free, held_nodes, held_rigidly, keep_supports, rank_nodes
+    from rotorid.reduction import check_free, held_nodes, held_rigidly, keep_supports
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
 
-    machine, files = rotor_source(rotor)
-    whole, held = machine, held_nodes(machine) if options.keep_supports else ()
+    whole, files = rotor_source(rotor)
+    machine, held = whole, held_nodes(whole) if options.keep_supports else ()
     if options.keep_supports:
         machine = held_rigidly(whole)
     elif whole.forces:
@@ -225,22 +214,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         )
     at = None if options.speed is None else one_speed(options.speed, "--speed")
     data = None if options.measured is None else read_modes(options.measured, machine)
-    placement = None
-    if options.rank or options.place is not None:
-        masses = 3 if options.masses is None else options.masses
-        candidates = None if options.candidates is None else nodes(options.candidates, "--candidates")
-        if held and candidates is None:
-            candidates = [node for node in range(1, machine.n_nodes + 1) if node not in held]
-        placement = rank_nodes(
-            machine,
-            masses,
-            min(2, masses) if options.modes is None else options.modes,
-            candidates=candidates,
-            speed=at,
-            normalise=options.normalise,
-            rows=options.rows,
-        )
-    places = _places(machine, options, placement, data, at)
+    placement, places = _places(machine, options, data, at, held)
     check_free(held, places)
     used = min(2, len(places)) if options.modes is None else options.modes
     if data is not None and options.measured is not None:
@@ -253,7 +227,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         speed=at,
         supports_apart=options.supports_apart,
         measured=None if data is None else (data.frequencies, data.shapes),
-        errors=input_errors(options.errors, data, used, len(places)),
+        errors=input_errors(options.errors, data, used),
         **how,
     )
     tables = [support.speeds[0] for support in machine.supports if support.speeds]
@@ -275,34 +249,44 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
 def _places(
     rotor: Rotor,
     options: ReduceOptions,
-    placement: Placement | None,
     data: MeasuredModes | None,
     speed: float | None,
-) -> list[int]:
-    """Nodes of the masses: as given, by the rule asked for, or those of the measured shapes."""
+    held: Sequence[int],
+) -> tuple[Placement | None, list[int]]:
+    """The ranking if it is needed, and nodes of the masses: as given, by rule, or of the measured shapes."""
+    from rotorid.reduction import book_nodes, rank_nodes
+
     if options.nodes is not None and options.place is not None:
         raise ValueError("--nodes and --place are two ways to the same end: choose one")
+    masses, placement = 3 if options.masses is None else options.masses, None
+    if options.rank or options.place not in (None, "book"):
+        candidates: Sequence[int | str] = [n for n in range(1, rotor.n_nodes + 1) if n not in held]
+        placement = rank_nodes(
+            rotor,
+            masses,
+            min(2, masses) if options.modes is None else options.modes,
+            candidates=candidates
+            if options.candidates is None
+            else nodes(options.candidates, "--candidates"),
+            speed=speed,
+            normalise=options.normalise,
+            rows=options.rows,
+        )
     if options.nodes is not None:
-        return [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
-    masses = 3 if options.masses is None else options.masses
+        return placement, [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
     if options.place == "book":
-        from rotorid.reduction import book_nodes
-
-        return list(book_nodes(rotor, masses, speed=speed))
+        return placement, list(book_nodes(rotor, masses, speed=speed))
     if placement is not None:
-        which = {
-            "mac": placement.best_by_mac,
-            "compromise": placement.compromise,
-            "best": placement.best_by_frequency,
-        }[one_of(options.place or "compromise", "--place", get_args(Place))]
+        bests = {"mac": placement.best_by_mac, "best": placement.best_by_frequency}
+        which = bests.get(options.place or "", placement.compromise)
         if which is None:
             raise ValueError(
                 f"no choice of {counted(masses, 'node')} gives positive masses with "
                 f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
             )
-        return [int(node) for node in placement.nodes[which]]
+        return placement, placement.nodes[which].tolist()
     if data is not None:
-        return [rotor.node(node) for node in data.nodes]
+        return None, [rotor.node(node) for node in data.nodes]
     raise ValueError(
         "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
     )
@@ -338,7 +322,7 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
         used,
         nodes=wanted,
         seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
-        errors=input_errors(options.errors, data, used, len(wanted)),
+        errors=input_errors(options.errors, data, used),
         **how,
     )
     return result, (Path(options.compliance), Path(options.measured))
@@ -384,12 +368,9 @@ def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: 
 
 
 def input_errors(
-    given: str | Mapping[str, float] | None, data: MeasuredModes | None, modes: int, n: int
+    given: str | Mapping[str, float] | None, data: MeasuredModes | None, modes: int
 ) -> InputErrors | None:
-    """Read "compliance=1.3,shapes=1" or "alpha12=1.3" in percent for n masses.
-
-    What the table of modes states counts where nothing else is given.
-    """
+    """Read "compliance=1.3,shapes=1" in percent; what the table of modes states counts elsewhere."""
     from rotorid.reduction import InputErrors
 
     stated: dict[str, Any] = {}
@@ -397,38 +378,13 @@ def input_errors(
         stated["frequencies"] = data.frequency_std[:modes]
     if data is not None and data.shape_std is not None:
         stated["shapes"] = data.shape_std[:, :modes]
-    for name, value in shares({} if given is None else given, "--errors", "compliance=1.3,shapes=1").items():
+    for name, value in shares(given or {}, "--errors", "compliance=1.3,shapes=1").items():
         if not 0 <= value < 1:
             raise ValueError(
                 f"--errors: {name}={100 * value:g} is no standard deviation from 0 to 100 percent"
             )
-        _state(stated, name, value, n, modes)
+        stated[one_of(name, "--errors", ERRORS)] = value
     return InputErrors(**stated) if stated else None
-
-
-def _state(stated: dict[str, Any], name: str, value: float, n: int, modes: int) -> None:
-    """Note the error of a kind of input, or of one: alpha12, U31, omega1, c2."""
-    import numpy as np
-
-    if name in ERRORS:
-        stated[name] = value
-        return
-    shapes = {"alpha": (n, n), "U": (n, modes), "omega": (modes,), "c": (n,)}
-    kinds = dict(zip(shapes, ("compliance", "shapes", "frequencies", "seal_stiffness"), strict=True))
-    found = re.fullmatch(r"(alpha|U)(\d)(\d)|(omega|c)(\d)", name)
-    stem = (found.group(1) or found.group(4)) if found else ""
-    at = tuple(int(d) - 1 for d in found.group(2, 3, 5) if d) if found else ()
-    if not found or any(not 0 <= i < size for i, size in zip(at, shapes[stem], strict=True)):
-        raise ValueError(
-            f"--errors: {name!r} is not known{did_you_mean(name, ERRORS)}; known are {', '.join(ERRORS)}, or "
-            f"one input of {counted(n, 'mass', 'masses')} and {counted(modes, 'mode')}: "
-            f"alpha11 to alpha{n}{n}, U11 to U{n}{modes}, omega1 to omega{modes}, c1 to c{n}"
-        )
-    table = np.array(np.broadcast_to(stated.get(kinds[stem], 0.0), shapes[stem]))
-    table[at] = value
-    if stem == "alpha":
-        table[at[::-1]] = value
-    stated[kinds[stem]] = table
 
 
 def shares(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:

@@ -15,7 +15,6 @@ from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.commands.outcome import Parts
-from rotorid.commands.quantities import one_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,34 +93,18 @@ class ReducedRotor(Parts):
         """The ranking where it was asked for, else masses and modes."""
         return self.result.to_frame() if self.placement is None else self.placement.to_frame()
 
-    def figure(self, view: str | None = None) -> Figure:
-        """Shapes, or what was asked for beside them; by default the first of it in the order of the parts.
-
-        Raises
-        ------
-        ValueError
-            For a view of what was not computed.
-        """
+    def figure(self) -> Figure:
+        """The last of what was asked for: stability, response, methods, places, or the shapes."""
         from rotorid.base.plot_style import new_figure
         from rotorid.plots import plot
 
-        parts = {
-            "stability": self.stability,
-            "response": self.response,
-            "methods": self.methods,
-            "placement": self.placement,
-            "shapes": self.result,
-        }
-        name = view or next(name for name, part in parts.items() if part is not None)
-        if parts[one_of(name, "view", [*parts])] is None:
-            option = {"placement": "--rank"}.get(name, f"--{name}")
-            raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
-        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
-        figure = new_figure(6.2 if heights else 5.0)
-        if heights:
-            plot(parts[name], [*figure.subplots(2, sharex=True, height_ratios=heights)])
-        else:
-            plot(parts[name], figure.add_subplot())
+        parts = (self.stability, self.response, self.methods, self.placement, self.result)
+        part: Any = next(part for part in parts if part is not None)
+        ratios = (1, 1) if part is self.methods else (3, 2)
+        two = part is self.methods or part is self.response
+        figure = new_figure(6.2 if two else 5.0)
+        pair = [*figure.subplots(2, sharex=True, height_ratios=ratios)] if two else figure.add_subplot()
+        plot(part, pair)
         return figure
 
     def sheet(self) -> bytes:

@@ -7,7 +7,7 @@ from rotorid.reduction.comparison import (
     compare_stability,
     stability_threshold,
 )
-from rotorid.reduction.condensation import Method, Methods, compare_methods, reduce_by
+from rotorid.reduction.condensation import Method, Methods, compare_methods
 from rotorid.reduction.input_errors import InputErrors, MassErrors, Shift
 from rotorid.reduction.keep_supports import check_free, held_nodes, held_rigidly, keep_supports
 from rotorid.reduction.masses import (
@@ -49,7 +49,6 @@ __all__ = [
     "natural_frequencies",
     "rank_nodes",
     "reduce",
-    "reduce_by",
     "reduce_measured",
     "separate",
     "small_model",

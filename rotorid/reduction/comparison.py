@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,6 @@ from fem import (
     checked_number,
     critical_speeds_below,
     label,
-    polar,
     runs_away,
     solve_whirl,
 )
@@ -28,19 +27,16 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.tables import Column, Table, frame, terminal
+from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import counted, sentence
 from rotorid.reduction.small_model import SmallModel
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 CLOSE = 0.08
 """Largest difference, relative to the largest entry, up to which the small model follows the rotor well."""
 POINTS, STEPS = 400, 40
 """Speeds of a response that are compared where none are given, and steps of a range for stability."""
-APART, FAR = 0.2, 0.3
-"""Relative differences that are named: of whirl frequencies at the thresholds, of smallest decrements."""
+APART = 0.2
+"""Relative difference of whirl frequencies at the thresholds that is named."""
 UNDAMPED = 1e-8
 """A logarithmic decrement below this is rounding."""
 
@@ -114,17 +110,12 @@ class ResponseCost(Answered):
         """What the reduction costs, in words."""
         used, size = self.speeds[~self.excluded], self.sizes
         speed, sensor, plane = self.where
-        left_out = "no critical speed of the full rotor lies near the range; no band is left out"
-        if self.criticals.size:
-            bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
-            left_out = (
-                f"left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
-                f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands} rpm)"
-            )
+        bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
         details = (
             "the difference is in percent of the largest influence coefficient at the same speed",
             f"worst at {rpm_text(speed)}: reading at node {label(sensor)}, unbalance at node {plane}",
-            left_out,
+            f"left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
+            f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands or 'none'}, rpm)",
         )
         return Answer(
             f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
@@ -134,20 +125,6 @@ class ResponseCost(Answered):
             tables=("\n".join(fill(sentence(text), COLUMNS, subsequent_indent="  ") for text in details),),
             more="where the response differs most",
         )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed, sensor and plane."""
-        S, C, P = self.full.shape
-        columns = (
-            Column("speed_rad_s", np.repeat(self.speeds, C * P)),
-            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.nodes] * S),
-            Column("plane", list(self.nodes) * (S * C)),
-            *polar("full_m_per_kg_m", "full_phase_deg", self.full),
-            *polar("small_m_per_kg_m", "small_phase_deg", self.small),
-            Column("relative_difference", self.relative_difference.ravel()),
-            Column("excluded", np.repeat(self.excluded, C * P)),
-        )
-        return frame(Table("responses", columns))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: sizes over all speeds, and the worst of each as relative difference."""
@@ -223,14 +200,6 @@ def compare_response(
             "of the full rotor: give other speeds, or narrower bands"
         )
     remarks += [f"full rotor: {warning}" for warning in full.warnings]
-    if omega.size > 1:
-        growth = stability_threshold(small, float(omega[-1]), lowest=float(omega[0]), steps=12)
-        if growth.status != "stable":
-            at = growth.threshold if growth.threshold is not None else growth.lowest
-            remarks.append(
-                f"the small model has no steady response from {at:.6g} rad/s on: a motion grows there; "
-                "amplitudes computed there are never reached"
-            )
     cost = ResponseCost(omega, full.W, response, nodes, sensors, criticals, float(bands), excluded)
     largest = cost.sizes["largest"]
     if not largest <= CLOSE:
@@ -243,10 +212,9 @@ def compare_response(
 
 def _undamped(small: SmallModel) -> tuple[SmallModel, list[str]]:
     """The model without damping of the surroundings, and what to say of it."""
-    if not small.damping.any():
-        return small, []
     remark = "the modal damping of the small model is left out of this comparison: the full rotor has none"
-    return replace(small, damping=np.zeros_like(small.damping)), [remark]
+    damped = bool(small.damping.any())
+    return replace(small, damping=np.zeros_like(small.damping)), [remark] * damped
 
 
 def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:
@@ -333,21 +301,14 @@ class StabilityCost(Answered):
     @property
     def answer(self) -> Answer:
         """What the reduction costs, in words and a table."""
-        both = (self.full, self.small)
-        number = "{:.6g}".format
-        rows = (
-            ("status", [each.status for each in both]),
-            ("threshold, rpm", [each.threshold and number(each.threshold * RPM) for each in both]),
-            ("whirl frequency, rpm", [each.frequency and number(each.frequency * RPM) for each in both]),
-            ("whirl by running speed", [each.whirl_ratio and number(each.whirl_ratio) for each in both]),
-            ("direction", [_way(each.direction) for each in both]),
-            ("smallest log decrement", ["" if np.isnan(s.margin) else f"{s.margin:.4g}" for s in both]),
-            ("modes watched", [str(self.n_full), str(self.n_small)]),
-        )
-        names = ("", "full rotor", counted(len(self.nodes), "mass", "masses"))
-        cells = zip(*((words, *values) for words, values in rows), strict=True)
         table = Table(
-            "stability", tuple(Column(name, values) for name, values in zip(names, cells, strict=True))
+            "stability",
+            (
+                Column("model", ("full rotor", counted(len(self.nodes), "mass", "masses"))),
+                *(Column(*column, "{:.6g}".format) for column in self._both()),
+                Column("direction", [_way(each.direction) for each in (self.full, self.small)]),
+                Column("modes watched", (self.n_full, self.n_small)),
+            ),
         )
         return Answer(
             sentence(self._verdict()),
@@ -356,39 +317,31 @@ class StabilityCost(Answered):
             more="both thresholds of stability",
         )
 
+    def _both(self) -> list[tuple[str, list[float | None]]]:
+        both = (self.full, self.small)
+        return [
+            ("threshold, rpm", [each.threshold and each.threshold * RPM for each in both]),
+            ("whirl there, rpm", [each.frequency and each.frequency * RPM for each in both]),
+            ("by speed", [each.whirl_ratio for each in both]),
+            ("least log decrement", [each.margin for each in both]),
+        ]
+
     def _verdict(self) -> str:
-        where = f"from {range_text(self.speeds[0], self.speeds[-1])}"
-        begin = rpm_text(self.speeds[0])
-        difference = self.relative_difference
-        if difference is not None:
-            small, full = (rpm_text(each.threshold or 0.0) for each in (self.small, self.full))
-            return (
-                f"the small model loses stability at {small}, the full rotor at {full}: "
-                f"{100 * difference:+.3g} %"
-            )
-        if self.full.status == self.small.status == "stable":
-            decrements = [a[np.isfinite(a)] for a in (self.full_decrement, self.small_decrement)]
-            if all(np.abs(a).max(initial=0.0) < UNDAMPED for a in decrements):
+        where, begin = f"from {range_text(self.speeds[0], self.speeds[-1])}", rpm_text(self.speeds[0])
+        if self.relative_difference is None and self.full.status == self.small.status == "stable":
+            decrements = np.concatenate((self.full_decrement, self.small_decrement))
+            if np.nan_to_num(np.abs(decrements)).max() < UNDAMPED:
                 return f"no damping acts on either model {where}: no motion grows, and none decays"
             return f"both models are stable {where}"
-        if self.full.status == self.small.status:
-            return f"both models are unstable already at {begin}"
         words = {"stable": f"is stable {where}", "unstable": f"is unstable already at {begin}"}
         full, small = (
             words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
             for each in (self.full, self.small)
         )
-        return f"the models disagree: the full rotor {full}, the small model {small}"
-
-    def _curves(self) -> dict[str, FloatArray]:
-        names = ("full_log_decrement", "small_log_decrement", "full_frequency_rad_s", "small_frequency_rad_s")
-        values = (self.full_decrement, self.small_decrement, self.full_frequency, self.small_frequency)
-        return dict(zip(names, values, strict=True))
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed: smallest logarithmic decrement and its whirl frequency in both models."""
-        curves = {"speed_rad_s": self.speeds, **self._curves()}
-        return frame(Table("stability", tuple(Column(name, values) for name, values in curves.items())))
+        apart = self.relative_difference
+        percent = "" if apart is None else f": {100 * apart:+.3g} %"
+        disagree = "" if self.full.status == self.small.status else "the models disagree: "
+        return f"{disagree}the full rotor {full}, the small model {small}{percent}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""
@@ -396,7 +349,10 @@ class StabilityCost(Answered):
             {
                 "nodes": self.nodes,
                 "speeds_rad_s": self.speeds,
-                **self._curves(),
+                "full_log_decrement": self.full_decrement,
+                "small_log_decrement": self.small_decrement,
+                "full_frequency_rad_s": self.full_frequency,
+                "small_frequency_rad_s": self.small_frequency,
                 "full": self.full.to_dict(),
                 "small": self.small.to_dict(),
                 "relative_difference_of_threshold": self.relative_difference,
@@ -444,12 +400,11 @@ def compare_stability(
     of_small = fem.threshold_of(whirl)
     full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
     small_decrement, small_frequency = _least_damped(whirl)
-    remarks += _doubts(full, of_small)
-    if far := _furthest(full_decrement, small_decrement):
-        k, a, b = far
+    a, b = full.frequency, of_small.frequency
+    if a and b and abs(b / a - 1) > APART:
         remarks.append(
-            f"the damping differs: at {speeds[k]:.6g} rad/s the smallest logarithmic decrement is {a:.3g} "
-            f"of the full rotor, {b:.3g} of the small model; take more masses or other nodes"
+            f"the full rotor loses stability with whirl at {a:.6g} rad/s, the small model with {b:.6g} "
+            "rad/s: not the same mode; use other nodes or more masses"
         )
     return StabilityCost(
         speeds=speeds,
@@ -476,37 +431,6 @@ def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
     away = np.array(runs_away(whirl))
     frequency = np.abs(whirl.values.imag)[rows, k]
     return np.where(away, -np.inf, decrements[rows, k]), np.where(away, np.nan, frequency)
-
-
-def _doubts(full: fem.Stability, small: fem.Stability) -> list[str]:
-    """What makes a comparison of the two thresholds doubtful."""
-    if full.frequency is None or small.frequency is None:
-        return []
-    remarks = []
-    if abs(small.frequency / full.frequency - 1) > APART:
-        remarks.append(
-            f"the full rotor loses stability with whirl at {full.frequency:.6g} rad/s, the small model with "
-            f"{small.frequency:.6g} rad/s: not the same mode; use other nodes or more masses"
-        )
-    if small.direction != full.direction:
-        remarks.append(
-            f"where stability is lost the full rotor whirls {_way(full.direction)}, the small model "
-            f"{_way(small.direction)}"
-        )
-    return remarks
-
-
-def _furthest(full: FloatArray, small: FloatArray) -> tuple[int, float, float] | None:
-    """Where the two smallest decrements are furthest apart, and both, if that is far."""
-    both = np.isfinite(full) & np.isfinite(small)
-    if not both.any():
-        return None
-    apart = np.full(full.shape, -1.0)
-    apart[both] = np.abs(full[both] - small[both])
-    k = int(np.argmax(apart))
-    if apart[k] <= max(FAR * float(np.abs(full[both]).max()), UNDAMPED):
-        return None
-    return k, float(full[k]), float(small[k])
 
 
 def _way(direction: float | None) -> str:

@@ -1,4 +1,4 @@
-"""Guyan reduction, IRS and SEREP of a rotor beside formula (50), all at the same masters.
+"""Guyan reduction and IRS of a rotor beside formula (50), all at the same masters.
 
 K and M are those of the rotor's plane x at rest, with all its unknowns: deflections and slopes, shear angles,
 pedestals. Split into masters d (deflections of the chosen nodes) and the others o, each method but the
@@ -9,32 +9,30 @@ regression writes the whole rotor as x = T x_d and keeps Tᵀ K T and Tᵀ M T:
 - IRS (O'Callahan's improved reduced system): the inertia forces of Guyan's model bend the others further.
   In a mode of it M_G x″ = −K_G x, so that M T x″ = −M T M_G⁻¹ K_G x; the reaction of this force on the others
   adds K_oo⁻¹ (M T M_G⁻¹ K_G)_o to the rows of T. The sign is that of a load −M x″, which K_oo carries.
-- SEREP: T = Φ Φ_d⁻¹ with the first n modes Φ: exact frequencies and shapes, by construction.
 
-The frequencies of all three are those of a Ritz method, never below the rotor's of the same number. Formula
+The frequencies of both are those of a Ritz method, never below the rotor's of the same number. Formula
 (50) is another thing: Guyan's stiffness, and masses one can point at.
 
-Sources: R. J. Guyan, AIAA J. 3 (1965) 380; J. O'Callahan, Proc. 7th IMAC (1989) 17; J. O'Callahan,
-P. Avitabile, R. Riemer, Proc. 7th IMAC (1989) 29.
+Sources: R. J. Guyan, AIAA J. 3 (1965) 380; J. O'Callahan, Proc. 7th IMAC (1989) 17.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import fem
-from fem import Pencil, Spectrum, lowest_modes, whole_rotor
+from fem import Pencil, whole_rotor
 from fem.assembly import assemble, ignored_inertia, multiply
 from rotorid.base import registry
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, text
+from rotorid.base.result import Column, text
 from rotorid.base.text import counted, listing, percent
 from rotorid.reduction.masses import (
     Normalisation,
@@ -49,13 +47,6 @@ from rotorid.reduction.masses import (
     plane_at_rest,
 )
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-DEPENDENT = 1e-6
-"""Shapes whose smallest combination at the masters is below this share of their largest entries are one."""
-NEARLY = 1e-2
-"""Below this share SEREP says that errors of the shapes are magnified."""
 MASSLESS = 1e-12
 """Of the largest eigenvalue of Guyan's mass matrix: below, some motion of the masters moves no mass."""
 
@@ -81,8 +72,6 @@ class Method:
         Of each frequency against the rotor's of the same number, shape (n,).
     mac
         Of each shape with the rotor's of the same number, at the masters, shape (n,).
-    diagonal
-        Whether the mass matrix is diagonal: only then does a mass stand at a node.
     reason
         Why there is no model, or what to know about it; empty where nothing is to be said.
     """
@@ -95,8 +84,12 @@ class Method:
     shapes: FloatArray
     relative_error: FloatArray
     mac: FloatArray
-    diagonal: bool
     reason: str = ""
+
+    @property
+    def diagonal(self) -> bool:
+        """Whether the mass matrix is diagonal: only then does a mass stand at a node."""
+        return self.T is None and self.M is not None
 
     @property
     def masses(self) -> FloatArray | None:
@@ -158,10 +151,6 @@ class Methods(Answered):
                 return row
         raise ValueError(f"no method {name!r}: there are {', '.join(row.name for row in self.rows)}")
 
-    def to_frame(self) -> pd.DataFrame:
-        """A row per method and mode."""
-        return frame(self._columns())
-
     def _columns(self) -> tuple[Column, ...]:
         n, several = len(self.nodes), len(self.rows)
         frequency, share = "{:.4f}".format, "{:+.3%}".format
@@ -176,7 +165,6 @@ class Methods(Answered):
             Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several), frequency, "rotor"),
             Column("relative_error", each("relative_error"), share, "error"),
             Column("mac", each("mac"), "{:.5f}".format, "MAC"),
-            Column("diagonal", np.repeat([row.diagonal for row in self.rows], n)),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -211,10 +199,6 @@ class Methods(Answered):
         )
 
 
-class _NoModelError(ValueError):
-    """A method that fails at masters where others work."""
-
-
 @dataclass(frozen=True, eq=False)
 class _Condensed:
     """What the methods share: the plane at rest, and its static shapes T on masters that are held.
@@ -223,24 +207,23 @@ class _Condensed:
     """
 
     nodes: tuple[int, ...]
-    remarks: tuple[str, ...]
     plane: fem.Rotor
     pencil: Pencil
     masters: IndexArray
     modes: fem.Modes
-    spectrum: Spectrum
     factor: FloatArray
-    T: FloatArray
+    modes_used: int
+    weights: Mapping[str, Any]
 
     @property
     def shapes(self) -> FloatArray:
         """Of the rotor's modes at the masters, (n, n)."""
         return np.asarray(self.modes.shapes[np.array(self.nodes) - 1])
 
-    def mass(self, T: FloatArray) -> FloatArray:
-        """Tᵀ M T."""
+    def matrices(self, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Tᵀ M T, and Tᵀ K T from strains, which keep their digits on fine meshes."""
         M = T.T @ multiply(self.pencil.mass, np.asfortranarray(T))
-        return np.asarray((M + M.T) / 2)
+        return (M + M.T) / 2, np.asarray(self.pencil.energy(T))
 
     def carried(self, force: FloatArray) -> FloatArray:
         """K_oo⁻¹ of forces on the others, masters held."""
@@ -248,44 +231,6 @@ class _Condensed:
 
         force[self.masters] = 0.0
         return np.asarray(dpbtrs(self.factor, force)[0])
-
-
-def reduce_by(
-    rotor: fem.Rotor, nodes: Sequence[str | int], method: str = "guyan", *, speed: float | None = None
-) -> Method:
-    """Reduce a rotor to the deflections of some nodes by one of `METHODS`.
-
-    Parameters
-    ----------
-    rotor
-        On supports; its plane x at rest is reduced.
-    nodes
-        Masters: different nodes, as numbers from 1 or names of stations.
-    method
-        "guyan", "irs", "serep", or "regression" over one mode.
-    speed
-        Where tables of supports are read, rad/s; by default their lowest common speed.
-
-    Raises
-    ------
-    ValueError
-        For nodes that do not exist or repeat, more masters than the rotor has modes, a rotor that is free
-        to move, a speed outside a table, an unknown method; for "irs" where Guyan's mass matrix is singular;
-        for "serep" where the modes' shapes at the masters depend on one another.
-
-    Examples
-    --------
-    >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
-    >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
-    >>> model = reduce_by(shaft, [3])
-    >>> model.M.round(2), model.relative_error.round(4)
-    (array([[7.5]]), array([0.0075]))
-    """
-    chosen = registry.find(METHODS, method, "method")
-    condensed = _condense(rotor, nodes, speed)
-    if chosen.function is None:
-        return _regression(condensed, 1, "first", "equal")
-    return _projected(chosen.title, condensed, *chosen.function(condensed))
 
 
 def compare_methods(
@@ -297,171 +242,143 @@ def compare_methods(
     normalise: Normalisation = "first",
     rows: RowWeights = "equal",
 ) -> Methods:
-    """Reduce a rotor to the same nodes by all `METHODS`.
+    """Reduce a rotor to the deflections of the same nodes by all `METHODS`.
 
     Parameters
     ----------
-    rotor, nodes, speed
-        As in `reduce_by`.
+    rotor
+        On supports; its plane x at rest is reduced.
+    nodes
+        Masters: different nodes, as numbers from 1 or names of stations.
     modes
         How many modes the regression uses, 1 … n.
+    speed
+        Where tables of supports are read, rad/s; by default their lowest common speed.
     normalise, rows
         Scaling of shapes and weights of rows of the regression, as in `equivalent_masses`.
 
     Returns
     -------
-    A row per method. A method that fails at these nodes has no matrices, NaN as frequencies, and its reason
-    among the warnings.
+    A row per method. A method that fails at these nodes (IRS where Guyan's mass matrix is singular) has no
+    matrices, NaN as frequencies, and its reason among the warnings.
 
     Raises
     ------
     ValueError
-        As for `reduce_by`, or for a number of modes out of range.
+        For nodes that do not exist or repeat, more masters than the rotor has modes, a rotor that is free
+        to move, a speed outside a table, or a number of modes out of range.
+
+    Examples
+    --------
+    >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
+    >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
+    >>> model = compare_methods(shaft, [3], modes=1).row("Guyan")
+    >>> model.M.round(2), model.relative_error.round(4)
+    (array([[7.5]]), array([0.0075]))
     """
-    condensed = _condense(rotor, nodes, speed)
-    n, modes = len(condensed.nodes), whole(modes, "the number of modes")
-    if not 1 <= modes <= n:
-        raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
-    design(np.eye(n), np.ones(modes), np.ones((n, modes)), normalise=normalise, rows=rows)  # wrong choices
-    table = []
-    for method in METHODS:
-        if method.function is None:
-            table.append(_regression(condensed, modes, normalise, rows))
-            continue
-        try:
-            table.append(_projected(method.title, condensed, *method.function(condensed)))
-        except _NoModelError as failure:
-            table.append(_without(method.title, n, str(failure)))
-    ours = ignored_inertia(condensed.plane)
-    warnings = (
-        *condensed.remarks,
-        *ignored_inertia(rotor),
-        *(warning for warning in condensed.modes.warnings if warning not in ours),
-        *(f"{row.name}: {row.reason}" for row in table if row.reason),
-    )
-    return Methods(rotor, condensed.nodes, condensed.modes.frequencies, tuple(table), warnings)
-
-
-def _condense(rotor: fem.Rotor, nodes: Sequence[str | int], speed: float | None) -> _Condensed:
     from scipy.linalg.lapack import dpbtrf
 
     places = mass_nodes(rotor, nodes)
+    n, modes = len(places), whole(modes, "the number of modes")
+    if not 1 <= modes <= n:
+        raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
+    weights: dict[str, Any] = {"normalise": normalise, "rows": rows}
+    design(np.eye(n), np.ones(modes), np.ones((n, modes)), **weights)  # refuses wrong choices
     plane, remarks = plane_at_rest(rotor, speed)
     fem.compliance(plane, places)  # refuses a rotor that is free, or a mesh lost in float64
-    modes = fem.critical_speeds(plane, len(places))
-    A = assemble(plane)
-    pencil = whole_rotor(plane, A)
-    spectrum = lowest_modes(plane, A, len(places), pencil)
+    full = fem.critical_speeds(plane, n)
+    pencil = whole_rotor(plane, assemble(plane))
     masters = pencil.waves[0][np.array(places) - 1]
-    unit = np.zeros((pencil.size, len(places)), order="F")
-    unit[masters, np.arange(len(places))] = 1.0
     factor, info = dpbtrf(held(pencil.stiffness, masters))
     if info != 0:
         raise ValueError(
             "the rotor held at the masters is statically unstable: a support has negative stiffness; check "
             "its sign and size"
         )
-    still = _Condensed(places, tuple(remarks), plane, pencil, masters, modes, spectrum, factor, unit)
-    T = unit + still.carried(-multiply(pencil.stiffness, unit))
-    return _Condensed(places, tuple(remarks), plane, pencil, masters, modes, spectrum, factor, T)
+    condensed = _Condensed(places, plane, pencil, masters, full, factor, modes, weights)
+    table = []
+    for method in METHODS:
+        name = method.title + ("" if method.function is not _regression else f", {counted(modes, 'mode')}")
+        try:
+            M, K, T, frequencies, shapes, reason = method.function(condensed)
+        except ValueError as failure:
+            lost = np.full(n, np.nan)
+            table.append(
+                Method(name, None, None, None, lost, np.full((n, n), np.nan), lost, lost, f"{failure}")
+            )
+            continue
+        error = frequencies / full.frequencies - 1
+        agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, condensed.shapes)), np.nan)
+        scaled = like(shapes, condensed.shapes)
+        table.append(Method(name, M, K, T, frequencies, scaled, error, agreement, reason))
+    ours = ignored_inertia(plane)
+    warnings = (
+        *remarks,
+        *ignored_inertia(rotor),
+        *(warning for warning in full.warnings if warning not in ours),
+        *(f"{row.name}: {row.reason}" for row in table if row.reason),
+    )
+    return Methods(rotor, places, full.frequencies, tuple(table), warnings)
 
 
-def _guyan(condensed: _Condensed) -> tuple[FloatArray, str]:
-    return condensed.T, ""
+_Model = tuple[FloatArray, FloatArray, FloatArray | None, FloatArray, FloatArray, str]
+"""M, K, T, frequencies and shapes of a method, and what to know about it."""
 
 
-def _irs(condensed: _Condensed) -> tuple[FloatArray, str]:
-    T = condensed.T
-    M, K = condensed.mass(T), np.asarray(condensed.pencil.energy(T))
+def _static(condensed: _Condensed) -> FloatArray:
+    """Guyan's T."""
+    n = len(condensed.nodes)
+    unit = np.zeros((condensed.pencil.size, n), order="F")
+    unit[condensed.masters, np.arange(n)] = 1.0
+    return unit + condensed.carried(-multiply(condensed.pencil.stiffness, unit))
+
+
+def _guyan(condensed: _Condensed) -> _Model:
+    return _projected(condensed, _static(condensed))
+
+
+def _irs(condensed: _Condensed) -> _Model:
+    T = _static(condensed)
+    M, K = condensed.matrices(T)
     least, most = np.linalg.eigvalsh(M)[[0, -1]]
     if least <= MASSLESS * most:
-        raise _NoModelError(
+        raise ValueError(
             "Guyan's mass matrix is singular at these nodes, and IRS needs its inverse: some motion of the "
             "masters moves no mass; choose nodes with mass or fewer of them"
         )
     inertia = multiply(condensed.pencil.mass, np.asfortranarray(T @ np.linalg.solve(M, K)))
-    return T + condensed.carried(inertia), ""
+    return _projected(condensed, T + condensed.carried(inertia))
 
 
-def _serep(condensed: _Condensed) -> tuple[FloatArray, str]:
-    vectors = condensed.spectrum.vectors
-    vectors = vectors / np.abs(vectors[condensed.pencil.waves[0]]).max(axis=0)
-    at_masters = vectors[condensed.masters]
-    smallest = float(np.linalg.svd(at_masters, compute_uv=False)[-1])
-    nodes = condensed.nodes
-    if not smallest > DEPENDENT:
-        raise _NoModelError(
-            f"the rotor's first {len(nodes)} shapes depend on one another at the nodes {list(nodes)}"
-            if len(nodes) > 1
-            else f"node {nodes[0]} is a node of the rotor's first mode"
-        )
-    reason = (
-        f"at these nodes the shapes nearly depend on one another (smallest combination {smallest:.1e} of "
-        "their largest deflection): small errors of the model change its matrices much"
-    )
-    return np.linalg.solve(at_masters.T, vectors.T).T, reason if smallest < NEARLY else ""
-
-
-def _projected(name: str, condensed: _Condensed, T: FloatArray, reason: str) -> Method:
+def _projected(condensed: _Condensed, T: FloatArray) -> _Model:
     from scipy.linalg import eigh
 
-    # K from strains, which keep their digits on fine meshes
-    M, K = condensed.mass(T), np.asarray(condensed.pencil.energy(T))
+    M, K = condensed.matrices(T)
     mu, shapes = eigh(M, K)  # μ = 1/ω²: the inverse form keeps the digits of the low modes
     mu, shapes = mu[::-1], shapes[:, ::-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         frequencies = np.where(mu > 1e-15 * mu[0], 1 / np.sqrt(mu), np.nan)
-    return _judged(name, condensed, M, K, T[condensed.pencil.waves[0]], frequencies, shapes, reason)
+    return M, K, T[condensed.pencil.waves[0]], frequencies, shapes, ""
 
 
-def _regression(condensed: _Condensed, modes: int, normalise: Normalisation, rows: RowWeights) -> Method:
+def _regression(condensed: _Condensed) -> _Model:
     """Formula (50) at the masters."""
-    name, nodes = f"regression, {counted(modes, 'mode')}", condensed.nodes
+    nodes, k = condensed.nodes, condensed.modes_used
     alpha = fem.compliance(condensed.plane, nodes)
-    used = condensed.modes.frequencies[:modes], condensed.shapes[:, :modes]
-    try:
-        estimate = equivalent_masses(alpha, *used, normalise=normalise, rows=rows)
-    except ValueError as failure:
-        return _without(name, len(nodes), str(failure))
+    used = condensed.modes.frequencies[:k], condensed.shapes[:, :k]
+    estimate = equivalent_masses(alpha, *used, **condensed.weights)
     if not estimate.full_rank:
-        why = f"these modes do not determine the masses: {estimate.describe_rank()}"
-        return _without(name, len(nodes), why)
+        raise ValueError(f"these modes do not determine the masses: {estimate.describe_rank()}")
     masses = estimate.solution
-    omega, shapes = natural_frequencies(alpha, masses)
     bad = [node for node, m in zip(nodes, masses, strict=True) if m <= 0]
-    reason = ""
-    if bad:
-        reason = f"the mass at node {bad[0]} is not positive: no physical model; use other nodes or modes"
+    words = "the mass at node {} is not positive: no physical model; use other nodes or modes"
     K = np.linalg.inv(alpha)
-    return _judged(name, condensed, np.diag(masses), (K + K.T) / 2, None, omega, shapes, reason)
+    frequencies, shapes = natural_frequencies(alpha, masses)
+    return np.diag(masses), (K + K.T) / 2, None, frequencies, shapes, words.format(bad[0]) if bad else ""
 
 
-METHODS: tuple[registry.Method[Callable[[_Condensed], tuple[FloatArray, str]] | None], ...] = (
+METHODS: tuple[registry.Method[Callable[[_Condensed], _Model]], ...] = (
     registry.Method("guyan", "the shaft bent as at rest", _guyan, "Guyan"),
     registry.Method("irs", "Guyan's shapes bent further by their inertia forces", _irs, "IRS"),
-    registry.Method("serep", "the rotor's first modes, exact for these", _serep, "SEREP"),
-    registry.Method("regression", "masses that stand at the nodes, formula (50)", None, "regression"),
+    registry.Method("regression", "masses that stand at the nodes, formula (50)", _regression, "regression"),
 )
-
-
-def _judged(
-    name: str,
-    condensed: _Condensed,
-    M: FloatArray,
-    K: FloatArray,
-    T: FloatArray | None,
-    frequencies: FloatArray,
-    shapes: FloatArray,
-    reason: str,
-) -> Method:
-    reference = condensed.shapes
-    error = frequencies / condensed.modes.frequencies - 1
-    agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, reference)), np.nan)
-    return Method(
-        name, M, K, T, frequencies, like(shapes, reference), error, agreement, T is None, reason
-    )  # fmt: skip
-
-
-def _without(name: str, n: int, reason: str) -> Method:
-    unknown = np.full(n, np.nan)
-    return Method(name, None, None, None, unknown, np.full((n, n), np.nan), unknown, unknown, False, reason)

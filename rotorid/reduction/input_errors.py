@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.suggestions import did_you_mean
@@ -37,7 +37,7 @@ class InputErrors:
     Attributes
     ----------
     compliance
-        Scalar or (n, n), symmetric: α_ij and α_ji are one input.
+        Scalar, or of α_11, α_12 … α_1n, α_22 …, shape (n (n + 1) / 2,).
     frequencies
         Scalar or (k,).
     shapes
@@ -127,21 +127,20 @@ class Inputs:
     def deviations(self, errors: InputErrors) -> FloatArray:
         """Relative standard deviation of every input, (P,)."""
         n, k = self.U.shape
-        shapes = {"compliance": (n, n), "frequencies": (k,), "shapes": (n, k), "seal_stiffness": (n,)}
+        sizes = {
+            "compliance": (n * (n + 1) // 2,),
+            "frequencies": (k,),
+            "shapes": (n, k),
+            "seal_stiffness": (n,),
+        }
         parts = []
-        for name, shape in shapes.items():
+        for name, shape in sizes.items():
             given = np.asarray(getattr(errors, name))
             if given.shape not in ((), shape):
                 raise ValueError(
                     f"errors of {name} must be one number or have shape {shape}; got {given.shape}"
                 )
             full = np.array(np.broadcast_to(given, shape))
-            if name == "compliance":
-                if not (full == full.T).all():
-                    raise ValueError(
-                        "errors of the compliance must be symmetric: α_ij and α_ji are one input"
-                    )
-                full = full[np.triu_indices(n)]
             if name == "shapes" and given.ndim == 0 and self.normalise == "first":
                 full[0] = 0.0
             parts.append(full.ravel())
@@ -173,7 +172,7 @@ class Inputs:
 
         Ordinates at the first mass are exact, and all inputs independent.
         """
-        used = self.deviations(InputErrors(compliance=0.5, shapes=0.5)).astype(bool)
+        used: BoolArray = np.not_equal(self.deviations(InputErrors(compliance=0.5, shapes=0.5)), 0.0)
         n, k = self.U.shape
         used[n * (n + 1) // 2 + k : n * (n + 1) // 2 + 2 * k] = False
         steps = STEP * np.eye(used.size)[used]

@@ -18,13 +18,11 @@ import numpy as np
 import fem
 from fem import GRAVITY, JournalBearing, SqueezeFilm
 from rotorid.base.arrays import FloatArray
-from rotorid.base.text import listing, percent
+from rotorid.base.text import listing
 from rotorid.reduction.small_model import SmallModel, small_model
 
 RIGID = 1e7
 """Stiffness of a rigid support by that of a shaft on two of them."""
-NEAR = 0.05
-"""Of a natural frequency on springs: what a model that keeps its supports is off by, if it is named."""
 
 
 def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
@@ -173,28 +171,9 @@ def _of_masses(rotor: fem.Rotor, model: SmallModel) -> list[str]:
             "the masses are too large to leave some for the supports: together "
             f"{model.masses.sum():.1f} kg of the rotor's {total:.1f} kg; use other nodes or more modes"
         )
-    if (off := _on_springs(rotor, model)) > NEAR:
-        remarks.append(
-            "on springs as stiff as the shaft, in place of the rigid supports, its first two natural "
-            f"frequencies are off by {percent(off)} %: use other nodes or more masses"
-        )
     if bare := [str(node) for node, mass in zip(model.nodes, model.masses, strict=True) if mass == 0]:
         remarks.append(
             f"no mass stands at node {listing(bare, 'and')}, where supports or forces act: the shaft follows "
             "there without inertia; better let a mass stand there, with --nodes"
         )
     return remarks
-
-
-def _on_springs(rotor: fem.Rotor, model: SmallModel) -> float:
-    """Largest relative error of the first two natural frequencies on springs as stiff as the shaft."""
-    from scipy.linalg import eigh
-
-    sprung = held_rigidly(rotor, 1.0)
-    still = replace(sprung, model=replace(rotor.model, gyroscopic=False))
-    K = model.stiffness.copy()
-    for support in sprung.supports:
-        i = model.nodes.index(support.node)
-        K[i, i] += support.stiffness
-    periods = eigh(np.diag(model.masses), K, eigvals_only=True)[:-3:-1]
-    return float(np.abs(periods**-0.5 / fem.critical_speeds(still, 2).frequencies - 1).max())

@@ -29,8 +29,8 @@ from rotorid.regression import Estimate, least_squares
 
 Normalisation = Literal["first", "largest", "length"]
 """Each shape scaled to 1 at the first mass, to 1 at its largest entry, or to unit length."""
-RowWeights = Literal["equal", "relative"] | ArrayLike
-"""Rows as they stand, rows of mode k divided by λ_k, or factors of shape (n, k)."""
+RowWeights = Literal["equal", "relative"]
+"""Rows as they stand, or rows of mode k divided by λ_k."""
 ZERO_AT_FIRST = 1e-9
 """A shape smaller than this share of its largest entry at the first mass has a node there."""
 ASYMMETRY = 1e-4
@@ -67,8 +67,7 @@ def design(
         "equal": rows as they stand, as in the book; those of the first mode are largest (by λ_1/λ_k) and
         dominate, so that the first frequency fits best. "relative": rows of mode k divided by
         λ_k = 1/ω_k², so that every mode counts the same; prefer it where the upper frequencies matter as
-        much as the first. An array (n, k), or one that broadcasts to it: factors ≥ 0 of the rows (not
-        squared; 0 leaves a row out), such as the inverse of their errors.
+        much as the first.
 
     Returns
     -------
@@ -79,17 +78,19 @@ def design(
     ------
     ValueError
         For shapes that do not fit, NaN or infinite entries, frequencies that are not positive, a compliance
-        that is not symmetric, unknown choices, negative weights; without leading dimensions also for a mode
+        that is not symmetric, unknown choices; without leading dimensions also for a mode
         with a node at the first mass (scaled to 1 there) or without any displacement.
     """
     alpha, omega, U, springs = _checked(compliance, frequencies, shapes, seal_stiffness)
     n, k = U.shape[-2:]
     batch = np.broadcast_shapes(alpha.shape[:-2], omega.shape[:-1], U.shape[:-2], springs.shape[:-1])
     U = _normalised(U, normalise, quiet=len(batch) > 0)
-    factors = _row_factors(rows, omega, n)
+    if rows not in ("equal", "relative"):
+        raise ValueError(f'rows must be "equal" or "relative", not {rows!r}')
+    factors = omega**2 if rows == "relative" else np.ones_like(omega)
     B = np.swapaxes(U, -1, -2)[..., :, None, :] * alpha[..., None, :, :]  # (…, k, i, j)
-    B = B * np.swapaxes(factors, -1, -2)[..., None]
-    D = np.swapaxes(factors * (U + alpha @ (springs[..., :, None] * U)) / omega[..., None, :] ** 2, -1, -2)
+    B = B * factors[..., :, None, None]
+    D = np.swapaxes(U + alpha @ (springs[..., :, None] * U), -1, -2) * (factors / omega**2)[..., None]
     return (
         np.ascontiguousarray(np.broadcast_to(B, (*batch, k, n, n))).reshape(*batch, k * n, n),
         np.ascontiguousarray(np.broadcast_to(D, (*batch, k, n))).reshape(*batch, k * n),
@@ -117,21 +118,6 @@ def _normalised(shapes: FloatArray, normalise: Normalisation, *, quiet: bool = F
             'or normalise="largest"'
         )
     return np.asarray(shapes / np.where(bad, np.nan, scale))
-
-
-def _row_factors(rows: RowWeights, omega: FloatArray, n: int) -> FloatArray:
-    """What the rows of (50) are multiplied by: (…, n, k) or what broadcasts to it."""
-    k = omega.shape[-1]
-    if isinstance(rows, str):
-        if rows not in ("equal", "relative"):
-            raise ValueError(f'rows must be "equal", "relative" or an array of weights (n, k), not {rows!r}')
-        return np.ones((n, k)) if rows == "equal" else np.asarray(omega[..., None, :] ** 2)
-    factors = np.asarray(rows, dtype=float)
-    if factors.ndim > 2 or any(a not in (1, b) for a, b in zip(factors.shape[::-1], (k, n), strict=False)):
-        raise ValueError(f"row weights must have shape (n, k) = ({n}, {k}); got {factors.shape}")
-    if not np.isfinite(factors).all() or (factors < 0).any() or not factors.any():
-        raise ValueError("row weights must be finite, not negative, and not all zero")
-    return np.broadcast_to(factors, (n, k))
 
 
 def _checked(

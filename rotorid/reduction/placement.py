@@ -57,9 +57,9 @@ class Placement(Answered):
     masses
         kg, shape (T, n); NaN where they are not determined.
     frequencies
-        Of the n-mass models, their first `check` modes, rad/s, shape (T, check).
+        Of the n-mass models, rad/s, shape (T, n).
     error
-        Largest |relative frequency error| over these modes, shape (T,).
+        Largest |relative frequency error| over the n modes, shape (T,).
     mac
         Smallest MAC over these modes, mode k of the model with mode k of the rotor, shape (T,).
     worst_mode
@@ -70,19 +70,16 @@ class Placement(Answered):
     ranked, unphysical, undetermined, at_node
         How many choices: ranked; with masses that are not positive; of deficient rank; that cannot be scaled,
         because a mode has a node at the first mass or at all. Together T.
-    modes, check, normalise, rows
-        What the regression used: number of modes, modes checked, scale of the shapes, weights of the rows
-        ("own" where they were given as an array).
+    modes, normalise, rows
+        What the regression used: number of modes, scale of the shapes, weights of the rows.
     rotor_frequencies
-        The rotor's first `check` frequencies, rad/s.
+        The rotor's first n frequencies, rad/s.
     candidates
         Node numbers that could be chosen.
     book
         Row of the choice of `book_nodes`, None where the rule gives none or not among the candidates.
     book_note
         Why there is none, else "".
-    rotor
-        The rotor itself.
     warnings
         What a user should know before choosing.
     """
@@ -99,15 +96,18 @@ class Placement(Answered):
     undetermined: int
     at_node: int
     modes: int
-    check: int
     normalise: str
     rows: str
     rotor_frequencies: FloatArray
     candidates: tuple[int, ...]
     book: int | None
     book_note: str
-    rotor: fem.Rotor
     warnings: tuple[str, ...]
+
+    @property
+    def check(self) -> int:
+        """How many modes are compared: as many as there are masses."""
+        return int(self.nodes.shape[1])
 
     @property
     def considered(self) -> int:
@@ -155,9 +155,7 @@ class Placement(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per choice, in rank order: nodes, masses, frequencies, error, MAC, condition number."""
-        import pandas as pd
-
-        rank = [*range(1, self.ranked + 1)] + [pd.NA] * (self.considered - self.ranked)
+        rank = [*range(1, self.ranked + 1)] + [None] * (self.considered - self.ranked)
         on_front = np.zeros(self.considered, dtype=bool)
         on_front[self.pareto] = True
         table = frame(
@@ -218,8 +216,7 @@ class Placement(Answered):
     @property
     def answer(self) -> Answer:
         """The compromise beside the best by frequency, by MAC and the book's rule; behind it the best ten."""
-        n = self.nodes.shape[1]
-        asked = f"Of {self.considered} choices of {n} of {len(self.candidates)} nodes"
+        asked = f"Of {self.considered} choices of {self.check} of {len(self.candidates)} nodes"
         if not self.ranked:
             said = f"{asked} no choice gives a physical model; use other candidates or more modes."
             return Answer(said, warnings=self.warnings)
@@ -263,17 +260,16 @@ class Placement(Answered):
         return text(columns, width=COLUMNS)
 
     def _trap(self) -> str:
-        if self.nodes.shape[1] == 1:
+        if self.check == 1:
             return "One mass has no shape to compare, and every place gives its one frequency exactly"
         traps = self.traps()
-        said = "frequencies alone are a trap: a model can match them and still move unlike the rotor. "
-        if not traps.size:
-            return f"{said}Here no choice matches within {100 * CLOSE:g} % with a MAC below {ALIKE:g}"
-        i = int(traps[0])
+        first = "".join(
+            f", first nodes {', '.join(map(str, self.nodes[i]))} (MAC {self.mac[i]:.2f})" for i in traps[:1]
+        )
         return (
-            f"{said}Here {traps.size} of the choices match all checked frequencies within {100 * CLOSE:g} % "
-            f"with a MAC below {ALIKE:g}, first nodes {', '.join(map(str, self.nodes[i]))} (rank "
-            f"{i + 1}, MAC {self.mac[i]:.2f} in mode {self.worst_mode[i]}). Choose by both columns"
+            "frequencies alone are a trap, a model can match them and still move unlike the rotor: here "
+            f"{traps.size} of the choices match all within {100 * CLOSE:g} % with a MAC below {ALIKE:g}"
+            f"{first}"
         )
 
 
@@ -283,7 +279,6 @@ def rank_nodes(
     modes: int = 2,
     *,
     candidates: Sequence[int | str] | None = None,
-    check: int | None = None,
     normalise: Normalisation = "first",
     rows: RowWeights = "equal",
     speed: float | None = None,
@@ -304,8 +299,6 @@ def rank_nodes(
         How many modes the regression uses, 1 … n.
     candidates
         Node numbers or names of stations to choose from; default all nodes.
-    check
-        How many of the first modes are compared, 1 … n; default n.
     normalise, rows
         As in `rotorid.reduction.equivalent_masses`. With "first" the first mass is the leftmost one.
     speed
@@ -332,14 +325,13 @@ def rank_nodes(
     places = _candidates(rotor, candidates)
     n = _number(n, len(places), "the number of masses", f"{len(places)} candidates hold")
     modes = _number(modes, n, "the number of modes", f"{n} masses can use")
-    check = n if check is None else _number(check, n, "the number of modes to check", f"{n} masses have")
     total = comb(len(places), n)
     if total > MOST:
         raise ValueError(
             f"{n} of {len(places)} nodes can be chosen in {total} ways, more than {MOST}: give fewer nodes "
             "as candidates, such as every second one, or antinodes of the first modes and those beside them"
         )
-    full = fem.critical_speeds(plane, max(modes, check))
+    full = fem.critical_speeds(plane, n)
     alpha = fem.compliance(plane, places)
     shapes = full.shapes[np.array(places) - 1]
     omega = full.frequencies
@@ -348,7 +340,7 @@ def rank_nodes(
         A = alpha[tuples[:, :, None], tuples[:, None, :]]
         U = shapes[tuples]
         masses, condition = _masses(A, omega[:modes], U[..., :modes], normalise, rows)
-        parts.append((tuples, masses, condition, *_compared(A, masses, omega[:check], U[..., :check])))
+        parts.append((tuples, masses, condition, *_compared(A, masses, omega, U)))
     tuples, masses, condition, frequencies, error, mac, worst = (
         np.concatenate(p) for p in zip(*parts, strict=True)
     )
@@ -362,7 +354,7 @@ def rank_nodes(
     # rounded: differences of 1e-10 are float64's, and then the order of the nodes decides
     order = np.lexsort((*np.round(keys, 10), group))
     nodes = np.array(places, dtype=np.int32)[tuples[order]]
-    book, note = _book(nodes, plane, n)
+    book, note = _book(nodes, rotor, n, speed)
     result = Placement(
         nodes=nodes,
         masses=masses[order],
@@ -376,14 +368,12 @@ def rank_nodes(
         undetermined=int(np.isinf(condition).sum()),
         at_node=int(np.isnan(condition).sum()),
         modes=modes,
-        check=check,
         normalise=normalise,
-        rows=rows if isinstance(rows, str) else "own",
-        rotor_frequencies=omega[:check],
+        rows=rows,
+        rotor_frequencies=omega,
         candidates=places,
         book=book,
         book_note=note,
-        rotor=rotor,
         warnings=(*said, *full.warnings),
     )
     return dataclasses.replace(result, warnings=(*result.warnings, *_warnings(result)))
@@ -418,10 +408,6 @@ def book_nodes(rotor: fem.Rotor, n: int = 3, *, speed: float | None = None) -> t
     """
     plane, _ = plane_at_rest(rotor, speed)
     n = _number(n, rotor.n_nodes, "the number of masses", f"{rotor.n_nodes} nodes hold")
-    return _antinodes(plane, n)
-
-
-def _antinodes(plane: fem.Rotor, n: int) -> tuple[int, ...]:
     upper = n if n % 2 == 0 else (n + 1) // 2
     needed = [upper] if n % 2 == 0 or n == 1 else [upper, upper - 1]
     full = fem.critical_speeds(plane, upper)
@@ -446,10 +432,10 @@ def _antinodes(plane: fem.Rotor, n: int) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def _book(nodes: NDArray[np.int32], plane: fem.Rotor, n: int) -> tuple[int | None, str]:
+def _book(nodes: NDArray[np.int32], rotor: fem.Rotor, n: int, speed: float | None) -> tuple[int | None, str]:
     """Row of the book's rule among the choices, or why there is none."""
     try:
-        wanted = _antinodes(plane, n)
+        wanted = book_nodes(rotor, n, speed=speed)
     except ValueError as problem:
         return None, str(problem)
     found = np.flatnonzero((nodes == wanted).all(axis=1))
@@ -495,8 +481,6 @@ def _masses(
     t, n = B.shape[0], B.shape[-1]
     masses, condition = np.full((t, n), np.nan), np.full(t, np.nan)
     usable = np.flatnonzero(np.isfinite(B).all(axis=(1, 2)) & np.isfinite(D).all(axis=1))
-    if not usable.size:
-        return masses, condition
     B, D = B[usable], D[usable]
     scale = np.linalg.norm(B, axis=1)
     scale[scale == 0] = 1.0
@@ -513,21 +497,18 @@ def _masses(
 def _compared(
     A: FloatArray, masses: FloatArray, omega: FloatArray, U: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int32]]:
-    """Frequencies (t, check), largest error, smallest MAC and its mode (t,) of the n-mass models.
+    """Frequencies (t, n), largest error, smallest MAC and its mode (t,) of the n-mass models.
 
     NaN, and mode 0, where the masses are not all positive or the model does not vibrate in n modes.
     """
-    t, check = len(masses), len(omega)
-    frequencies, error, mac = np.full((t, check), np.nan), np.full(t, np.nan), np.full(t, np.nan)
+    t = len(masses)
+    frequencies, error, mac = np.full_like(masses, np.nan), np.full(t, np.nan), np.full(t, np.nan)
     worst = np.zeros(t, dtype=np.int32)
     positive = np.flatnonzero((masses > 0).all(axis=1))  # False for NaN
     root = np.sqrt(masses[positive])
     lam, V = np.linalg.eigh(root[:, :, None] * A[positive] * root[:, None, :])
     vibrates = lam[:, 0] > 1e-15 * lam[:, -1]
-    positive, root = positive[vibrates], root[vibrates]
-    lam, V = lam[vibrates, ::-1][:, :check], V[vibrates, :, ::-1][:, :, :check]
-    if not positive.size:
-        return frequencies, error, mac, worst
+    positive, root, lam, V = positive[vibrates], root[vibrates], lam[vibrates, ::-1], V[vibrates, :, ::-1]
     frequencies[positive] = 1.0 / np.sqrt(lam)
     error[positive] = np.abs(frequencies[positive] / omega - 1.0).max(axis=1)
     model, reference = V / root[:, :, None], U[positive]
@@ -551,11 +532,6 @@ def _warnings(result: Placement) -> list[str]:
         )
     if not result.ranked:
         return [*out, "no choice gives a physical model: use other candidates, more modes or fewer masses"]
-    if result.nodes.shape[1] == 1:
-        out.append(
-            "one mass has the rotor's first frequency at any node, and one reading any shape: frequency and "
-            "MAC say nothing here, and the lightest mass stands first, where the mode is largest"
-        )
     top = result.condition[: min(_TOP, result.ranked)]
     bad = int((top > BADLY).sum())
     if bad:
@@ -563,10 +539,5 @@ def _warnings(result: Placement) -> list[str]:
             f"{bad} of the best {len(top)} by frequency are badly conditioned (condition number up to "
             f"{top.max():.3g}): errors of 1 % in compliances and shapes can move their masses by up to that "
             "many percent; use more modes or prefer a choice with a smaller number"
-        )
-    if result.mac[0] < ALIKE:
-        out.append(
-            "the best choice by frequency has a shape that is not the rotor's (MAC "
-            f"{result.mac[0]:.2f} in mode {result.worst_mode[0]}): do not choose by frequency alone"
         )
     return out

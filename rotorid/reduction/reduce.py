@@ -18,6 +18,8 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, text
 from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column as Cells
+from rotorid.base.tables import Table, frame
 from rotorid.base.text import counted, error_figures, percent
 from rotorid.reduction.input_errors import InputErrors, Inputs, MassErrors, Shift
 from rotorid.reduction.masses import (
@@ -66,18 +68,12 @@ class Choices:
     rows: RowWeights
     nonnegative: bool
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
-        rows = self.rows if isinstance(self.rows, str) else "own"
-        return {**vars(self), "rows": rows}
-
     def words(self, modes: int) -> str:
         """Such as "the first 2 measured modes, rows relative"."""
         kind = "measured " if self.source == "measured" else ""
         parts = [f"the first {kind}mode" if modes == 1 else f"the first {modes} {kind}modes"]
         parts += [] if self.normalise == "first" else [f"shapes scaled by {self.normalise}"]
-        rows = self.to_dict()["rows"]
-        parts += [] if rows == "equal" else [f"rows {rows}"]
+        parts += [] if self.rows == "equal" else [f"rows {self.rows}"]
         parts += ["masses not negative"] if self.nonnegative else []
         return ", ".join(parts)
 
@@ -145,14 +141,9 @@ class Reduction(Answered):
         return np.asarray(self.frequencies / self._padded(self.rotor_frequencies) - 1.0)
 
     @property
-    def mac_matrix(self) -> FloatArray:
-        """MAC of the model's modes (rows) with the rotor's (columns) at the masses, (n, j)."""
-        return mac(self.shapes, self.rotor_shapes)
-
-    @property
     def mac(self) -> FloatArray:
         """MAC of each mode with the rotor's mode of the same number, shape (n,); NaN where unknown."""
-        return self._padded(np.diag(self.mac_matrix))
+        return self._padded(np.diag(mac(self.shapes, self.rotor_shapes)))
 
     @property
     def inputs(self) -> Inputs:
@@ -197,7 +188,7 @@ class Reduction(Answered):
             "nodes": self.nodes,
             "positions_m": self.positions,
             "modes": self.modes,
-            **self.choices.to_dict(),
+            **vars(self.choices),
             "masses_kg": self.masses.solution,
             "masses_std_kg": self.masses.std,
             "mass_sensitivity": self.sensitivity,
@@ -229,27 +220,25 @@ class Reduction(Answered):
         Masses have node, position and mass; modes have number, frequencies, error and MAC. Cells of the other
         kind are blank.
         """
-        import pandas as pd
-
         n = len(self.nodes)
-        masses = pd.DataFrame({"node": self.nodes, "mass_kg": self.masses.solution})
-        if self.positions is not None:
-            masses.insert(1, "position_m", self.positions)
-        modes = pd.DataFrame(
-            {
-                "mode": np.arange(1, n + 1),
-                "frequency_rad_s": self.frequencies,
-                "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
-                "relative_error": self.relative_error,
-                "mac": self.mac,
-            }
+        blank = [None] * n
+        at = () if self.positions is None else (Cells("position_m", [*self.positions, *blank]),)
+        modes = {
+            "mode": range(1, n + 1),
+            "frequency_rad_s": self.frequencies,
+            "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
+            "relative_error": self.relative_error,
+            "mac": self.mac,
+        }
+        columns = (
+            Cells("table", ["masses"] * n + ["modes"] * n),
+            Cells("node", [*self.nodes, *blank]),
+            *at,
+            Cells("mass_kg", [*self.masses.solution, *blank]),
+            *(Cells(name, [*blank, *values]) for name, values in modes.items()),
         )
-        modes.index += n
-        frame = pd.concat((masses, modes), axis=1).astype({"mode": "Int64"})
-        if self.rotor is not None:
-            frame = frame.astype({"node": "Int64"})
-        frame.insert(0, "table", ["masses"] * n + ["modes"] * n)
-        return frame
+        whole = {"mode": "Int64"} if self.rotor is None else {"mode": "Int64", "node": "Int64"}
+        return frame(Table("masses and modes", columns)).astype(whole)
 
     @property
     def answer(self) -> Answer:
@@ -523,19 +512,13 @@ def _bounded(estimate: Estimate) -> tuple[str, ...]:
 
 def _at_bounds(estimate: Estimate, errors: InputErrors | None) -> list[str]:
     """What to say of masses at the bound 0."""
-    names = _bounded(estimate)
-    if not names:
+    if not (names := _bounded(estimate)):
         return []
-    one = len(names) == 1
-    warnings = [
-        f"{', '.join(names)} {'stands at its bound' if one else 'stand at their bounds'} 0 (the "
-        "modes ask for less than nothing there): no standard deviation is given, and those of the others "
-        f"hold {'it' if one else 'them'} fixed; leave {'this place' if one else 'these places'} out, or "
-        "choose others"
+    more = "" if errors is None else ", and what the stated errors do was not computed"
+    return [
+        f"at the bound 0, the modes ask for less than nothing there: {', '.join(names)}; no standard "
+        f"deviation is given, those of the others hold this fixed{more}; leave these places out"
     ]
-    if errors is not None:
-        warnings.append("what the stated errors do was not computed: masses at a bound do not follow them")
-    return warnings
 
 
 def _of_regression(result: Reduction) -> list[str]:
@@ -585,23 +568,18 @@ def _other_modes(
         if abs(f / g - 1) > APART
     ]
     agreement = mac(measured, computed)
-    for k in range(min(agreement.shape)):
-        if agreement[k, k] >= ALIKE:
-            continue
-        which, value = k + 1, agreement[k, k]
-        words = (
-            f"the shape of measured mode {which} is not that of the rotor's mode {which} (MAC {value:.2f})"
-        )
-        best = int(np.argmax(agreement[k]))
-        if agreement[k, best] >= ALIKE:
-            other = f"its mode {best + 1} (MAC {agreement[k, best]:.2f})"
-            remarks.append(f"{words} but of {other}: is a mode missing?")
-            continue
+    for k in np.flatnonzero(np.diag(agreement) < ALIKE):
+        best, hint = int(np.argmax(agreement[k])), ""
         flips = 1.0 - 2.0 * np.eye(len(measured))
         turned = mac(flips * measured[:, k : k + 1], computed[:, k : k + 1])[:, 0]
-        at = int(np.argmax(turned))
-        hint = f": is its sign at node {places[at]} right?" if turned[at] >= ALIKE else ""
-        remarks.append(words + hint)
+        if agreement[k, best] >= ALIKE:
+            hint = f" but of its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing?"
+        elif turned.max() >= ALIKE:
+            hint = f": is its sign at node {places[int(np.argmax(turned))]} right?"
+        remarks.append(
+            f"the shape of measured mode {k + 1} is not that of the rotor's mode {k + 1} (MAC "
+            f"{agreement[k, k]:.2f}){hint}"
+        )
     return remarks
 
 

@@ -38,7 +38,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray, read_only
 from rotorid.base.checks import checked_speeds, number
 from rotorid.base.text import counted, listing
-from rotorid.reduction.masses import held, mass_nodes
+from rotorid.reduction.masses import held, mass_nodes, plane_at_rest
 
 LOST = 1e-3
 """Relative rounding error of a static shape."""
@@ -404,7 +404,8 @@ def small_model(
         warnings=tuple(remarks),
     )
     ratios = _ratios(modal_damping)
-    return replace(model, damping=_modal(model, ratios)) if any(ratios) else model
+    at_rest = plane_at_rest(rotor, None)[0].supports
+    return replace(model, damping=_modal(model, at_rest, ratios)) if any(ratios) else model
 
 
 def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
@@ -453,37 +454,19 @@ def _ratios(modal_damping: Sequence[float]) -> tuple[float, ...]:
     return ratios
 
 
-def _modal(model: SmallModel, ratios: tuple[float, ...]) -> FloatArray:
-    """Damping matrix (k, k) of given ratios of the first modes of the plane x at rest on its springs."""
+def _modal(model: SmallModel, at_rest: Sequence[fem.Support], ratios: tuple[float, ...]) -> FloatArray:
+    """Damping matrix (k, k) of given ratios of the first modes of the plane x on these springs."""
     from scipy.linalg import eigh
 
-    K = model.stiffness.copy()
-    zero = np.zeros(1)
-    for support in model.supports:
-        i = model.nodes.index(support.node)
-        at_rest = replace(
-            support, speeds=(), stiffness=float(support.at(_lowest(model))[0][0, 0]), damping=0.0
-        )
-        if support.pedestal is not None:
-            pedestal = fem.Pedestal(0.0, support.pedestal.xy("stiffness")[0])
-            at_rest = replace(at_rest, pedestal=pedestal)
-        K[i, i] += at_rest.dynamic_stiffness(zero)[0, 0, 0].real
-    massive = model.masses > 0
-    on, off = np.flatnonzero(massive), np.flatnonzero(~massive)
+    on = np.flatnonzero(model.masses)
     if len(ratios) > on.size:
         raise ValueError(
             f"{len(ratios)} damping ratios are given, but each plane has {on.size} modes: leave some out"
         )
-    Kmm = K[np.ix_(on, on)]
-    if off.size:
-        Kss, Ksm = K[np.ix_(off, off)], K[np.ix_(off, on)]
-        if np.linalg.cond(Kss) > 1 / NONE:
-            raise ValueError(
-                "the plane x at rest can move without moving mass: no damping ratios exist; give its "
-                "supports stiffness"
-            )
-        Kmm = Kmm - Ksm.T @ np.linalg.solve(Kss, Ksm)
-    squares, shapes = eigh((Kmm + Kmm.T) / 2, np.diag(model.masses[on]))
+    springs = [replace(support, tilting_stiffness=0.0) for support in at_rest]
+    still = replace(model, supports=springs, material_damping=_zero(), gyroscopic=_zero())
+    K = still.motion(0.0, "x", condensed=True).K
+    squares, shapes = eigh((K + K.T) / 2, np.diag(model.masses[on]))
     if squares[0] < -1e-9 * np.abs(squares).max():
         raise ValueError(
             "the plane x at rest is pushed aside by a negative stiffness: no damping ratios exist"
@@ -491,14 +474,9 @@ def _modal(model: SmallModel, ratios: tuple[float, ...]) -> FloatArray:
     first = slice(len(ratios))
     omega = np.sqrt(np.maximum(squares[first], 0.0))
     momentum = model.masses[on][:, None] * shapes[:, first]  # shapes have φᵀ M φ = 1
-    C = np.zeros_like(K)
+    C = np.zeros_like(model.stiffness)
     C[np.ix_(on, on)] = (momentum * (2 * np.array(ratios) * omega)) @ momentum.T
     return C
-
-
-def _lowest(model: SmallModel) -> float:
-    """Lowest common speed of the tables of supports, rad/s."""
-    return float(max((support.speeds[0] for support in model.supports if support.speeds), default=0.0))
 
 
 def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:

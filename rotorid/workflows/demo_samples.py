@@ -138,7 +138,7 @@ SAMPLES = {
             ),
             Step(
                 "reduce",
-                "The book's places, beside Guyan, IRS and SEREP",
+                "The book's places, beside Guyan and IRS",
                 "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --methods --model "
                 "{}/three_masses.toml --plot {}/reduction.png",
             ),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.commands.app import OUTPUT, STATE_SPACES, Destination, command
+from rotorid.commands.app import STATE_SPACES, Destination, command
 from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
-from rotorid.commands.reduce import ReduceOptions, View
+from rotorid.commands.reduce import ReduceOptions
 from rotorid.commands.reduce import reduce as work
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
         "Method": "rank place masses candidates methods",
         "Errors": "errors what_if",
         "Small model": "response stability model state_space damping force both_planes keep_supports",
-        OUTPUT: "view",
         "Expert": "normalise rows nonnegative supports_apart",
     },
     to=(*WITH_REPORT, *EQUATIONS),
@@ -54,10 +53,6 @@ def reduce(
             "--state-space", metavar="FILE", help="Write A, B, C, D in both planes: .json, .npz or .mat."
         ),
     ] = None,
-    view: Annotated[
-        View | None,
-        typer.Option("--view", metavar="WHAT", help=f"What --plot draws: {', '.join(get_args(View))}."),
-    ] = None,
     to: Destination,
 ) -> None:
     """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
@@ -74,7 +69,6 @@ def reduce(
         "--damping": (options.damping, model or state_space, "--model or --state-space"),
         "--both-planes": (options.both_planes, model, "--model"),
         "--force": (options.force, model, "--model"),
-        "--view": (view, to.plot, "--plot"),
     }
     for option, (given, of_use, needed) in used.items():
         if given and not of_use:
@@ -90,7 +84,6 @@ def reduce(
     to.deliver(
         "reduction",
         work_of,
-        draw=lambda reduced: reduced.figure(view),
         more=(
             (
                 model,

@@ -1,4 +1,4 @@
-"""Guyan, IRS and SEREP against dense textbook algebra, known numbers and the theorems they must obey."""
+"""Guyan and IRS against dense textbook algebra, known numbers and the theorems they must obey."""
 
 import json
 
@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from cases import each_of
 from fem_rotors import machines, refined, rotor23, rotors, uniform
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 import fem
 from rotorid.reduction import reduce
-from rotorid.reduction.condensation import compare_methods, reduce_by
+from rotorid.reduction.condensation import compare_methods
 from rotorid.reduction.masses import plane_at_rest
 
 MASTERS = (7, 12, 18)
@@ -27,7 +27,6 @@ def test_the_known_frequencies_of_the_reference_rotor(methods):
     known = {
         "Guyan": ("135.2973", "545.3615", "1250.853"),
         "IRS": ("135.2404", "540.7360", "1176.319"),
-        "SEREP": ("135.2404", "540.7329", "1163.805"),
         "regression, 2 modes": ("135.2358", "539.0517", "1069.258"),
     }
     assert [row.name for row in methods.rows] == list(known)
@@ -35,7 +34,6 @@ def test_the_known_frequencies_of_the_reference_rotor(methods):
         assert (f"{row.frequencies[0]:.4f}", f"{row.frequencies[1]:.4f}", f"{row.frequencies[2]:.3f}") == (
             known[row.name]
         )
-    np.testing.assert_allclose(methods.row("SEREP").frequencies, methods.rotor_frequencies, rtol=1e-12)
     assert methods.warnings == ()
 
 
@@ -54,10 +52,8 @@ def textbook(rotor, nodes):
     S[np.ix_(o, o)] = np.linalg.inv(K[np.ix_(o, o)])
     M_G, K_G = (static.T @ A @ static for A in (M, K))
     improved = static + S @ M @ static @ np.linalg.solve(M_G, K_G)
-    mu, vectors = eigh(M, K)
-    modes = vectors[:, ::-1][:, :n]
-    expansion = modes @ np.linalg.inv(modes[d])
-    return motion, {"Guyan": static, "IRS": improved, "SEREP": expansion}, 1 / np.sqrt(mu[::-1][:n])
+    mu = eigh(M, K, eigvals_only=True)
+    return motion, {"Guyan": static, "IRS": improved}, 1 / np.sqrt(mu[::-1][:n])
 
 
 def close(a, b, tolerance):
@@ -112,9 +108,6 @@ def test_textbook_algebra_with_shear_tilting_springs_and_two_pedestals_at_one_no
 def test_any_machine_agrees_with_textbook_algebra(rotor, seed):
     rng = np.random.default_rng(seed)
     nodes = rng.choice(np.arange(1, rotor.n_nodes + 1), size=2, replace=False).tolist()
-    _, transformations, _ = textbook(rotor, nodes)
-    # magnified errors of the modes are for another test
-    assume(np.abs(transformations["SEREP"]).max() < 50)
     check_against_textbook(rotor, nodes, 1e-5)
 
 
@@ -125,10 +118,6 @@ def test_ritz_frequencies_are_never_below_the_rotors(rotor, n, seed):
     result = compare_methods(rotor, nodes.tolist(), modes=1, normalise="largest")
     for name in ("Guyan", "IRS"):
         assert (result.row(name).relative_error > -1e-7).all()  # neighbouring masters cost digits
-    exact = result.row("SEREP")
-    if exact.M is not None and not exact.reason:
-        np.testing.assert_allclose(exact.frequencies, result.rotor_frequencies, rtol=1e-7)
-        np.testing.assert_allclose(exact.mac, 1.0, rtol=1e-9)
     # the order of the masters only orders the unknowns
     turned = compare_methods(rotor, nodes[::-1].tolist(), modes=1, normalise="largest")
     close(turned.row("IRS").M[::-1, ::-1], result.row("IRS").M, 1e-7)
@@ -150,7 +139,7 @@ def test_a_massless_shaft_with_discs_at_the_masters_is_exact_for_every_method():
         np.testing.assert_allclose(row.frequencies, result.rotor_frequencies, rtol=1e-9)
         np.testing.assert_allclose(row.mac, 1.0, rtol=1e-9)
         np.testing.assert_allclose(row.K, np.linalg.inv(fem.compliance(rotor, (3, 6))), rtol=1e-7)
-    assert [row.diagonal for row in result.rows] == [False, False, False, True]
+    assert [row.diagonal for row in result.rows] == [False, False, True]
     np.testing.assert_allclose(result.row("regression").masses, masses, rtol=1e-7)
     assert result.row("Guyan").masses is None
 
@@ -184,36 +173,6 @@ def test_400_elements_give_the_same_model():
     for a, b in zip(result.rows, coarse.rows, strict=True):
         # the mesh itself changes the third frequency by 8e-5
         np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=2e-4)
-    np.testing.assert_allclose(result.row("SEREP").frequencies, result.rotor_frequencies, rtol=1e-9)
-
-
-def test_single_methods_are_those_of_the_comparison(methods):
-    for name in ("Guyan", "IRS", "SEREP"):
-        one = reduce_by(rotor23(), MASTERS, name.lower())
-        np.testing.assert_array_equal(one.frequencies, methods.row(name).frequencies)
-    with pytest.raises(ValueError, match="ritz"):
-        reduce_by(rotor23(), MASTERS, "ritz")
-
-
-def overhung(stiffness=1e16):
-    """Two supports that hardly move: a master at one of them knows nothing of the modes."""
-    return uniform(8, supports=[fem.Support(1, stiffness), fem.Support(9, stiffness)])
-
-
-def test_shapes_that_depend_on_one_another_are_said():
-    result = compare_methods(overhung(), (1, 5))
-    row = result.row("SEREP")
-    assert row.M is None
-    assert np.isnan(row.frequencies).all()
-    assert any(text.startswith("SEREP: the rotor's first 2 shapes depend") for text in result.warnings)
-    assert result.row("Guyan").M is not None
-    assert "no model" in result.summary()
-    with pytest.raises(ValueError, match=r"depend on one another at the nodes \[1, 5\]"):
-        reduce_by(overhung(), (1, 5), "serep")
-    with pytest.raises(ValueError, match="node 1 is a node of the rotor's first mode"):
-        reduce_by(overhung(), [1], "serep")
-    soft = compare_methods(overhung(1e12), (1, 5))
-    assert any("nearly depend" in text for text in soft.warnings)
 
 
 def test_a_singular_mass_matrix_is_said():
@@ -228,8 +187,10 @@ def test_a_singular_mass_matrix_is_said():
     result = compare_methods(rotor, (3, 6), modes=1)
     assert result.row("IRS").M is None
     assert any(text.startswith("IRS: Guyan's mass matrix is singular") for text in result.warnings)
-    with pytest.raises(ValueError, match="mass matrix is singular"):
-        reduce_by(rotor, (3, 6), "irs")
+    document = json.loads(json.dumps(result.to_dict(), allow_nan=False))["methods"][1]
+    assert document["natural_frequencies_rad_s"] == [None, None]
+    assert "singular" in document["reason"]
+    assert "no model" in result.summary()
     guess = result.row("Guyan")
     assert guess.relative_error[0] == pytest.approx(0.0, abs=1e-9)
     assert np.isnan(guess.frequencies[1])
@@ -284,17 +245,11 @@ def test_the_plane_at_rest_is_said():
     np.testing.assert_allclose(a.row("IRS").M, b.row("IRS").M, rtol=1e-9)
 
 
-def test_document_frame_and_text(methods):
+def test_document(methods):
     document = json.loads(json.dumps(methods.to_dict(), allow_nan=False))
     assert document["nodes"] == [7, 12, 18]
     assert [row["method"] for row in document["methods"]] == [row.name for row in methods.rows]
-    assert [row["masses_kg"] is None for row in document["methods"]] == [True, True, True, False]
+    assert [row["masses_kg"] is None for row in document["methods"]] == [True, True, False]
     np.testing.assert_allclose(document["methods"][1]["mass_matrix_kg"], methods.row("IRS").M)
-    failed = json.loads(json.dumps(compare_methods(overhung(), (1, 5)).to_dict(), allow_nan=False))
-    assert failed["methods"][2]["natural_frequencies_rad_s"] == [None, None]
-    assert "depend" in failed["methods"][2]["reason"]
-    frame = methods.to_frame()
-    assert len(frame) == 12
-    third = frame[(frame["method"] == "IRS") & (frame["mode"] == 3)].iloc[0]
-    assert third["frequency_rad_s"] == methods.row("IRS").frequencies[2]
-    assert third["relative_error"] == pytest.approx(1176.319 / 1163.805 - 1, abs=2e-6)
+    third = document["methods"][1]
+    assert third["relative_error"][2] == pytest.approx(1176.319 / 1163.805 - 1, abs=2e-6)

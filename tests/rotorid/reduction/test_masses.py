@@ -59,7 +59,7 @@ def test_a_true_model_gets_its_masses_back_whatever_is_chosen(seed, n, k, normal
 def test_one_mode_gives_the_same_masses_whatever_is_chosen():
     book = equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
     for normalise in NORMALISATIONS:
-        for rows in ("equal", "relative", [[2.0], [1.0], [0.5]]):
+        for rows in ("equal", "relative"):
             other = equivalent_masses(
                 COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1], normalise=normalise, rows=rows
             ).values
@@ -87,26 +87,8 @@ def test_relative_rows_serve_the_second_frequency_and_equal_rows_the_first():
     assert errors["relative"][0] > errors["equal"][0]
 
 
-def test_own_weights_are_factors_of_the_rows():
-    inputs = COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2]
-    factors = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
-    B, D = design(*inputs)
-    by_hand = np.linalg.lstsq(B * factors.T.ravel()[:, None] * 1e8, D * factors.T.ravel() * 1e8, rcond=None)[
-        0
-    ]
-    np.testing.assert_allclose(equivalent_masses(*inputs, rows=factors).values, by_hand, rtol=1e-10)
-    relative = equivalent_masses(*inputs, rows=FREQUENCIES[None, :2] ** 2).values
-    np.testing.assert_allclose(equivalent_masses(*inputs, rows="relative").values, relative, rtol=1e-10)
-    first = equivalent_masses(*inputs, rows=[1.0, 0.0])
-    np.testing.assert_allclose(
-        first.values, equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
-    )
-    assert first.dof == 0, "rows that are left out are no degrees of freedom"
-    assert first.std is None
-
-
 @pytest.mark.parametrize("normalise", NORMALISATIONS)
-@pytest.mark.parametrize("rows", ["equal", "relative", np.arange(1.0, 7.0).reshape(3, 2)])
+@pytest.mark.parametrize("rows", ["equal", "relative"])
 def test_many_models_at_once_are_the_models_one_by_one(normalise, rows):
     rng = np.random.default_rng(3)
     A = rng.normal(size=(20, 3, 3))
@@ -178,10 +160,6 @@ def test_masses_that_are_not_determined_are_named(nonnegative):
     [
         ({"normalise": "last"}, "normalise must be"),
         ({"rows": "heavy"}, "rows must be"),
-        ({"rows": np.ones((2, 2))}, "shape"),
-        ({"rows": -np.ones((3, 2))}, "not negative"),
-        ({"rows": np.zeros((3, 2))}, "not all zero"),
-        ({"rows": np.full((3, 2), np.nan)}, "finite"),
         ({"seal_stiffness": [1.0, 2.0]}, "one per mass"),
         ({"seal_stiffness": np.nan}, "seal_stiffness must be finite"),
         ({"compliance": np.full((3, 3), np.nan)}, "compliance must be finite"),

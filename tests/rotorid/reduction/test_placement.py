@@ -52,7 +52,6 @@ def test_all_triples_of_the_reference_rotor(triples):
 def test_the_best_frequencies_are_a_trap_and_the_report_says_so(triples):
     assert triples.mac[0] < 0.1
     assert triples.worst_mode[0] == 3
-    assert any("do not choose by frequency alone" in text for text in triples.warnings)
     answer, text = triples.answer, triples.summary()
     assert "frequencies alone are a trap" in text
     named = {"best by MAC": triples.best_by_mac, "compromise": triples.compromise, "the book's": triples.book}
@@ -69,7 +68,7 @@ def test_the_best_frequencies_are_a_trap_and_the_report_says_so(triples):
         assert float(mac) == pytest.approx(triples.mac[i], abs=5.1e-5)
         assert float(condition) == pytest.approx(triples.condition[i], rel=5.1e-3)
         assert [float(m) for m in rest[3:]] == pytest.approx(triples.masses[i], abs=0.051)
-    assert "first nodes 3, 11, 14 (rank 1, MAC 0.06 in mode 3)" in " ".join(text.split())
+    assert "first nodes 3, 11, 14 (MAC 0.06)" in " ".join(text.split())
     assert 0 in triples.traps()
     good = triples.compromise
     assert triples.error[good] < 0.02
@@ -98,23 +97,22 @@ def test_every_choice_is_that_of_the_one_by_one_reduction(rotor, n, modes):
 
 
 @pytest.mark.parametrize("normalise", ["first", "largest", "length"])
-@pytest.mark.parametrize("rows", ["equal", "relative", [[1.0, 2.0], [0.5, 1.0], [1.0, 0.0]]])
+@pytest.mark.parametrize("rows", ["equal", "relative"])
 def test_scales_and_weights_reach_the_regression(rotor, normalise, rows):
-    result = rank_nodes(
-        rotor, 3, 2, candidates=(4, 7, 12, 14, 18, 20), normalise=normalise, rows=rows, check=2
-    )
-    full = fem.critical_speeds(rotor, 2)
-    assert result.frequencies.shape == (20, 2)
+    result = rank_nodes(rotor, 3, 2, candidates=(4, 7, 12, 14, 18, 20), normalise=normalise, rows=rows)
+    full = fem.critical_speeds(rotor, 3)
+    assert result.frequencies.shape == (20, 3)
     for nodes, masses, error, worst in zip(
         result.nodes, result.masses, result.error, result.mac, strict=True
     ):
         alpha, U = fem.compliance(rotor, nodes.tolist()), full.shapes[nodes - 1]
-        m = equivalent_masses(alpha, full.frequencies, U, normalise=normalise, rows=rows).solution
+        used = full.frequencies[:2], U[:, :2]
+        m = equivalent_masses(alpha, *used, normalise=normalise, rows=rows).solution
         np.testing.assert_allclose(masses, m, rtol=1e-7)
         if (m > 0).all():
             omega, shapes = natural_frequencies(alpha, m)
-            assert error == pytest.approx(np.abs(omega[:2] / full.frequencies - 1).max(), rel=1e-5)
-            assert worst == pytest.approx(np.diag(mac(shapes[:, :2], U)).min(), rel=1e-6)
+            assert error == pytest.approx(np.abs(omega / full.frequencies - 1).max(), rel=1e-5)
+            assert worst == pytest.approx(np.diag(mac(shapes, U)).min(), rel=1e-6)
 
 
 def test_the_order_is_that_of_the_error_and_nothing_is_ranked_by_nan(triples):
@@ -170,9 +168,11 @@ def test_a_first_mass_at_a_node_of_a_mode_is_counted_and_not_ranked(beam):
     assert np.isfinite(other.condition).all()
 
 
-def test_modes_that_determine_no_masses_are_counted_and_not_ranked(beam):
-    result = rank_nodes(beam, 2, 1, rows=[[1.0], [0.0]])
-    assert (result.undetermined, result.ranked) == (300, 0)
+def test_modes_that_determine_no_masses_are_counted_and_not_ranked(beam, monkeypatch):
+    """Here every fit counts as one of deficient rank."""
+    monkeypatch.setattr("rotorid.reduction.placement.RCOND", 1.0)
+    result = rank_nodes(beam, 2, 1)
+    assert (result.undetermined, result.ranked) == (300 - result.at_node, 0)
     assert np.isnan(result.masses).all()
     assert result.best_by_frequency is result.best_by_mac is result.compromise is None
     assert result.pareto.size == 0
@@ -261,7 +261,6 @@ def test_what_the_plane_at_rest_leaves_out_is_said(lumped):
         ({"n": 25}, "24 candidates hold 1 … 24"),
         ({"n": 2, "modes": 3}, "2 masses can use 1 … 2"),
         ({"modes": 0}, "number of modes"),
-        ({"check": 4}, "3 masses have 1 … 3"),
         ({"n": 12}, "ways, more than 2000000: give fewer nodes as candidates"),
         ({"candidates": [4, 4, 7]}, "candidates must be different nodes"),
         ({"candidates": []}, "candidates must be different nodes"),
