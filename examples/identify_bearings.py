@@ -10,8 +10,8 @@ import sys
 import numpy as np
 
 from rotorid import harmonic_model, identify
-from rotorid.harmonic import AmplitudeErrors
-from rotorid.harmonic.experiments import Experiments, experiments
+from rotorid.identify import AmplitudeErrors
+from rotorid.identify.amplitudes import Experiments, experiments
 from rotorid.plots import plot
 
 EQUATIONS = (

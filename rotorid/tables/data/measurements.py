@@ -26,8 +26,8 @@ from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
-    from rotorid.harmonic.operator_model import HarmonicModel
+    from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
+    from rotorid.identify.operator_model import HarmonicModel
 
 
 _SPEED = one_of(units.SPEED)
@@ -73,7 +73,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     TableWarning
         Where an amplitude of the model is nowhere in the table, and where few repeats tell the errors.
     """
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.identify.amplitudes import Experiments
 
     file = model if isinstance(model, HarmonicFile) else None
     equations = model.model if isinstance(model, HarmonicFile) else model
@@ -87,7 +87,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     frequency = _frequency(table)
     read = {name: _amplitude(table, name, unclear=unclear) for name in equations.signals}
     if not unclear:
-        _complain_about_missing(table, equations, read)
+        _complain_about_missing(table, equations, read, file.unmeasured if file else ())
         for name in equations.varying:
             if name not in table:
                 expected = f"a column {name}: the equations multiply amplitudes by it"
@@ -116,7 +116,7 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
 
     Velocities and accelerations, known by their units, become displacements. Repeated readings stay apart.
     """
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.identify.amplitudes import Experiments
 
     problems = Problems()
     grid = problems.need(read_grid(path, "measurements", problems, first=True))
@@ -145,7 +145,7 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
 
 def _free_vibrations(path: str | Path, model: HarmonicModel, file: HarmonicFile | None) -> Experiments:
     """A table of modes, whose nodes are amplitudes of the model."""
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.identify.amplitudes import Experiments
 
     modes, problems = read_modes(path), Problems()
     nodes, k = [str(node) for node in modes.nodes], len(modes.frequencies)
@@ -285,7 +285,9 @@ def _amplitude(table: Table, name: str, *, unclear: bool) -> ComplexArray | None
     return value
 
 
-def _complain_about_missing(table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None]) -> None:
+def _complain_about_missing(
+    table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None], unmeasured: Sequence[str]
+) -> None:
     parts = ("amplitude", "phase", "re", "im")
     absent = [name for name in model.outputs if not any(f"{name}_{part}" in table for part in parts)]
     if len(absent) == len(model.outputs):
@@ -293,9 +295,8 @@ def _complain_about_missing(table: Table, model: HarmonicModel, read: dict[str, 
             [f"{name}_amplitude and {name}_phase_deg, or {name}_re and {name}_im" for name in absent]
         )
         table.in_header(None, f"measured amplitudes: columns {forms}")
-    elif absent and not len(table.problems):
-        lost = listing(absent, "and")
-        message = f"{table.source}: the table has no {lost}: eliminated from the equations, or predicted"
+    elif (lost := [name for name in absent if name not in unmeasured]) and not len(table.problems):
+        message = f"{table.source}: the table has no {listing(lost, 'and')}: predicted"
         warnings.warn(message, TableWarning, stacklevel=3)
     for name, values in read.items():
         if values is not None and np.isnan(values).all() and not len(table.problems):
