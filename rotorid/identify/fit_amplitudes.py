@@ -112,7 +112,7 @@ def identify(
     _check(model, experiments, options)
     data, copies = experiments.without_copies()
     found = _identified(model, data, options)
-    if data.rounding and not data.stated and found.converged:
+    if data.rounding and not data.stated and found.method == "output-error" and len(found.solutions) == 1:
         found = _by_digits(found, options)
     return replace(found, left_out=(*copies, *found.left_out))
 
@@ -384,20 +384,31 @@ def _without(covariance: FloatArray | None, lost: BoolArray) -> FloatArray | Non
 
 
 def _by_digits(found: Identification, options: Options) -> Identification:
-    """With the digits of the readings as their errors, where these explain what the model leaves."""
+    """With the digits of the readings as their errors, where these explain what is left with 5 % chance.
+
+    What is left widens the intervals, if it is more than the digits make on average.
+    """
+    from scipy.special import chdtrc
+
     data = found.experiments
-    spread = dict(data.rounding)
-    variance = spread.pop("", None)
-    stated = replace(data, covariances=spread, frequency_std=None if variance is None else np.sqrt(variance))
+    spread = {name: each for name, each in data.rounding.items() if name}
+    std = np.sqrt(data.rounding[""]) if data.free.any() else None
+    stated = replace(data, covariances=spread, frequency_std=std)
     try:
         other = _identified(found.model, stated, replace(options, start=_named(found.model, found.theta)))
     except (ValueError, np.linalg.LinAlgError):
         return found
-    if not other.converged or other.method != found.method or any("as large as" in w for w in other.warnings):
+    chi_square, dof = other.estimate.chi_square or 0.0, other.dof
+    explained = dof < 1 or chdtrc(dof, chi_square) > 0.05
+    if other.method != found.method or not (other.converged and explained) or other.covariance is None:
         return found
-    # two solutions that were equal are so still: those of the first fit
+    more = max(1.0, chi_square / max(dof, 1))
+    combinations = tuple(replace(c, std=c.std and c.std * more**0.5) for c in other.combinations)
     note = "no errors are stated: those of the digits in which readings are written are taken"
-    return replace(other, experiments=data, notes=(note, *other.notes)) if found.identifiable else found
+    wide = replace(other, covariance=other.covariance * more, combinations=combinations)
+    return replace(
+        wide, experiments=data, linear=found.linear, notes=(note, *other.notes), warnings=found.warnings
+    )
 
 
 def _negative(found: Identification, options: Options) -> tuple[str, ...]:

@@ -319,7 +319,7 @@ def _weights(system: System) -> FloatArray:
     """Matrix that makes the errors of the combinations independent and of size one (relative if unknown)."""
     if system.covariance is None:
         return np.diag(1.0 / np.where(system.values != 0, np.abs(system.values), 1.0))
-    scale = np.maximum(np.sqrt(np.diag(system.covariance)), 1e-14 * np.abs(system.values) + 1e-150)
+    scale = np.maximum(np.sqrt(np.diag(system.covariance)), 1e-14 * np.abs(system.values) + 1e-100)
     values, vectors = np.linalg.eigh(system.covariance / np.outer(scale, scale))
     return np.asarray((vectors / np.sqrt(np.maximum(values, 1e-12))) @ vectors.T / scale)
 

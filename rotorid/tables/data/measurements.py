@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -106,9 +107,39 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     varying = {name: table.numbers(name) for name in equations.varying}
     axis, shown = _shown(table, signals)
     rows = Experiments(names, frequency, signals, free, errors, varying=varying, axis=axis, units=shown)
+    rows = replace(rows, rounding=_rounding(table, rows, equations.outputs))
     if "repeat" in table:
         rows = merge_repeats(table, rows, equations)
     return rows
+
+
+def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[str, FloatArray]:
+    """Covariances (n, 2, 2) that the digits of readings give, and under "" variances (n,) of frequencies.
+
+    Frequencies of excitation are set, not read; a shape that is 1 everywhere is the reference of the others.
+    Nothing where a cell of a reading is blank, or a natural frequency shows no end of its digits.
+    """
+    found: dict[str, FloatArray] = {}
+    for name in outputs:
+        there = [f"{name}_{part}" for part in ("amplitude", "phase", "re", "im") if f"{name}_{part}" in table]
+        if any(table.is_blank(stem).any() for stem in there):
+            return {}
+        z = rows.signals[name]
+        if not there or (rows.free.all() and (z == 1).all()):
+            found[name] = (1e-12 * np.maximum(np.nan_to_num(np.abs(z)), 1e-12))[:, None, None] ** 2 * np.eye(
+                2
+            )
+            continue
+        first, last = (table.steps(stem) for stem in (there[0], there[-1]))
+        polar = there[0] == f"{name}_amplitude"
+        u = np.exp(1j * np.angle(z)) if polar else np.ones(len(z))
+        turn = np.stack((np.stack((u.real, -u.imag), -1), np.stack((u.imag, u.real), -1)), -2)
+        spread = turn * (np.stack((first, last * np.abs(z) if polar else last), -1) / np.sqrt(12.0))[:, None]
+        found[name] = spread @ np.swapaxes(spread, 1, 2)
+    steps = table.steps(next(stem for stem in FREQUENCIES if stem in table))
+    if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such
+        return {}
+    return {**found, "": np.where(rows.free, steps**2 / 12.0, 0.0)}
 
 
 def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experiments:

@@ -59,6 +59,7 @@ def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel) -> Expe
         signals=signals,
         free=np.array([rows.free[m].all() for m in members]),
         varying={name: np.array([v[m].mean() for m in members]) for name, v in rows.varying.items()},
+        rounding={},
     )
     errors = rows.errors or _scatter(table.source, rows, merged, members, model)
     if errors is None:
