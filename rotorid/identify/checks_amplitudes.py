@@ -119,35 +119,25 @@ def negative(
 def passive_elements(model: HarmonicModel) -> dict[str, int]:
     """Parameters that stand as a mass (2), damper (1) or spring (0): the power of p.
 
-    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite,
-    where the equations are turned so that masses that are known or estimated stand positive.
+    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite.
     """
-    e = len(model.equations)
+    e, found = len(model.equations), {}
     if len(model.outputs) != e:
         return {}
-    equation, signal, power = model.equation, model.column, model.power
-    diagonal = np.zeros((e, 3))
-    own = (signal == equation) & (power >= 0) & (power <= 2)
-    np.add.at(diagonal, (equation[own], power[own]), model.coefficients.sum(axis=1)[own])
-    sign = np.array([next((np.sign(x) for x in row[::-1] if x), 1.0) for row in diagonal])
-    found = {}
     for j, name in enumerate(model.parameters):
-        (monomials,) = np.nonzero(model.exponents[:, j])
-        if (
-            len(monomials) != 1
-            or np.abs(model.exponents[monomials[0]]).sum() != model.exponents[monomials[0], j]
-        ):
+        (m, *others) = np.flatnonzero(model.exponents[:, j])
+        factors = model.coefficients[:, m]
+        used = np.flatnonzero(factors)
+        kind = int(model.power[used[0]])
+        alone = not others and np.abs(model.exponents[m]).sum() == model.exponents[m, j] == 1
+        if not alone or kind not in (0, 1, 2) or (model.power[used] != kind).any():
             continue
-        used = np.flatnonzero(model.coefficients[:, monomials[0]])
-        kinds = {int(k) for k in power[used]}
-        if model.exponents[monomials[0], j] != 1 or len(kinds) != 1 or not kinds <= {0, 1, 2}:
-            continue
+        inside = used[model.column[used] < e]
         S = np.zeros((e, e))
-        inside = used[signal[used] < e]
-        S[equation[inside], signal[inside]] = (sign[equation] * model.coefficients[:, monomials[0]])[inside]
+        S[model.equation[inside], model.column[inside]] = factors[inside]
         passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
         if passive and not any(model.features[f].varying for f in used):
-            found[name] = kinds.pop()
+            found[name] = kind
     return found
 
 

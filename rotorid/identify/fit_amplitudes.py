@@ -24,7 +24,7 @@ from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitude_residuals import Comparison, compare
 from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.checks_amplitudes import misfit, negative, unexplained, what_more_can_tell
+from rotorid.identify.checks_amplitudes import negative, unexplained, what_more_can_tell
 from rotorid.identify.combinations import NAME, only_determined, why_several
 from rotorid.identify.linear_start import LinearFit, build_rows, linear_fit, reasons
 from rotorid.identify.operator_model import HarmonicModel
@@ -43,6 +43,7 @@ REWEIGHTINGS = 2
 ROUNDING = 1e-9
 """Relative errors that are smaller are rounding."""
 MOST_STARTS = 8
+_SEARCHED = "the parameters were found by a search; there may be more solutions than shown"
 WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
 
@@ -153,7 +154,7 @@ def _identified(model: HarmonicModel, experiments: Experiments, options: Options
         rows = build_rows(model, experiments)
     except ValueError as error:  # an amplitude that it needs is missing
         problem = error
-    linear = None if rows is None else linear_fit(model, experiments, options.limits, rows)
+    linear = None if rows is None else linear_fit(model, experiments, rows)
     square = len(model.outputs) == len(model.equations)
     hidden = np.isnan(experiments.table(model.outputs)).all(axis=0)
     if linear is None and (not square or hidden.all() or "input" in str(problem)):
@@ -275,7 +276,7 @@ def _by_output_error(
     lost, more = np.isnan(values).any(), ""
     if (lost and not estimate.full_rank) or (linear and not linear.estimate.full_rank):
         more = what_more_can_tell(model, data, estimate.rank)
-    why = reasons(linear, more) if linear else ()
+    why = reasons(linear, more) if linear and linear.recovery.solutions else ()
     if prior and prior.alone and why:
         prior = replace(prior, alone=why[0])
     if not why and estimate.full_rank:
@@ -285,7 +286,7 @@ def _by_output_error(
         why = only_determined(model.parameters, estimate.undetermined, words), more
     warnings = [*(linear.rows.warnings if linear else ()), *comparison.warnings]
     warnings += [w for w in fit.end_warnings if w != estimate.describe_rank()]
-    warnings += linear.recovery.reasons if linear and not linear.recovery.solutions else ()
+    warnings += [_SEARCHED] if linear and not linear.recovery.complete else []
 
     def refit(others: Experiments) -> Sequence[FloatArray]:
         return linear_fit(model, others).recovery.solutions
@@ -339,9 +340,7 @@ def _by_regression(experiments: Experiments, linear: LinearFit, options: Options
     spread: list[float | None] = [None] * len(system.values)
     if covariance is not None:
         spread = np.sqrt(np.diag(covariance).clip(0)).tolist()
-    warnings = [*linear.rows.warnings, *recovery.warnings, *misfit(estimate)]
-    if not linear.settled:
-        warnings.append("the weights that follow from the stated errors did not settle: no intervals")
+    warnings = [*linear.rows.warnings, *([] if recovery.complete else [_SEARCHED])]
     for name, (low, high) in options.limits.items():
         if not (np.isnan(value := values[model.parameters.index(name)]) or low <= value <= high):
             warnings.append(f"{name} = {value:.6g} lies outside its bounds")
@@ -368,7 +367,7 @@ def _by_regression(experiments: Experiments, linear: LinearFit, options: Options
         unidentifiable=reasons(linear, more) if np.isnan(values).any() else (),
         predicted={},
         left_out=linear.rows.left_out,
-        converged=linear.settled,
+        converged=True,
         warnings=tuple(warnings),
         notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
         normal_matrix=normal_matrix(estimate.names, linear.K),

@@ -1,14 +1,15 @@
 """Equation error, K θ = Y of [S] (9): linear regression of the equations with the measured amplitudes.
 
 Measured amplitudes stand in K, so that their errors bias the estimate: it is where output error starts, and
-the answer only where a model cannot predict. With stated errors a row's error is Σ A_s δZ_s with the
-coefficients A_s at the last estimate, plus that of the frequency; inputs are exact.
+the answer only where a model cannot predict. All rows count alike, as in the lessons. With stated errors a
+row's error is Σ A_s δZ_s with the coefficients A_s at the estimate, plus that of the frequency; inputs are
+exact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -19,17 +20,12 @@ from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.combinations import Polynomial, only_determined, ratio_words, sum_words
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.recovery import Recovery, System, recover
-from rotorid.regression import least_squares
+from rotorid.regression import gain, least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.undetermined_combinations import echelon
 
-REWEIGHTINGS = 60
-SETTLED = 0.01
-"""Weights have settled where the last round moved nothing by more than this share of its deviation."""
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
-COVARIANCE_FLOOR = 1e-10
-"""Smallest variance relative to the mean of an experiment: exact rows must not get infinite weight."""
 ROUNDING = 1e-13
 """A part of a row that is smaller than this share of its terms is what rounding leaves of zero."""
 
@@ -61,9 +57,9 @@ class Rows:
     left_out: tuple[str, ...]
     warnings: tuple[str, ...]
 
-    def real_rows(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Used rows K (m, u), Y (m,) and the experiment of each (m,)."""
-        return self.K[self.used], self.Y[self.used], np.nonzero(self.used)[0]
+    def real_rows(self) -> tuple[FloatArray, FloatArray]:
+        """Used rows K (m, u), Y (m,)."""
+        return self.K[self.used], self.Y[self.used]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +70,8 @@ class LinearFit:
     ----------
     model, rows
         The equations, and their rows.
-    estimate, K, Y, experiment
-        The regression: its unknowns, weighted rows (m, u), (m,) and the experiment of each.
+    estimate, K, Y
+        The regression: its unknowns, rows (m, u) and (m,).
     solution
         Of all unknowns, those that the others are given relative to included (as 1).
     fixed
@@ -89,8 +85,6 @@ class LinearFit:
     values, gain
         Parameters (n,), NaN where undetermined, and their change per change of the combinations (n, q); what
         stands alone in the equations is known without a real solution, too.
-    settled
-        Whether the weights fit the estimate.
     """
 
     model: HarmonicModel
@@ -98,7 +92,6 @@ class LinearFit:
     estimate: Estimate
     K: FloatArray
     Y: FloatArray
-    experiment: IntArray
     solution: FloatArray
     fixed: FloatArray
     picks: FloatArray
@@ -108,13 +101,11 @@ class LinearFit:
     recovery: Recovery
     values: FloatArray
     gain: FloatArray
-    settled: bool
 
 
 def linear_fit(
     model: HarmonicModel,
     experiments: Experiments,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
     rows: Rows | None = None,
 ) -> LinearFit:
     """Regression of the equations, and the parameters that follow.
@@ -128,7 +119,8 @@ def linear_fit(
     groups = _groups(model, rows)
     fixed = _as_one(rows, groups)
     kept, every = np.flatnonzero(fixed == 0), np.arange(len(fixed))
-    estimate, solution, K, Y, experiment, settled = _regress(model, experiments, rows, fixed)
+    estimate, solution = _regress(model, experiments, rows, fixed)
+    K, Y = rows.real_rows()
     picks = np.eye(len(kept)) if estimate.full_rank else np.array(echelon(estimate.row_space))
     picks = picks.reshape(-1, len(kept))[: 0 if len(groups) and not fixed.any() else None]
     whole = np.zeros((len(picks), len(fixed)))
@@ -136,7 +128,7 @@ def linear_fit(
     below = np.zeros_like(whole)
     for group in groups:
         below[whole[:, group].any(axis=1)] = np.where(np.isin(every, group), fixed, 0.0)
-    spread = estimate.solution_covariance if settled else None
+    spread = estimate.solution_covariance
     covariance = None if spread is None else picks @ spread @ picks.T
     to_monomials = model.combinations.rows
     above, under, values = whole @ to_monomials, below @ to_monomials, whole @ solution
@@ -149,19 +141,18 @@ def linear_fit(
         else sum_words(_polynomial(model, top))
         for pick, top, bottom in zip(whole, above, under, strict=True)
     )
-    recovery = recover(system, bounds)
-    found, gain = recovery.values, recovery.gain
+    recovery = recover(system)
+    found, change = recovery.values, recovery.gain
     for i, name in enumerate(words if not recovery.solutions else ()):
         if name in model.parameters:
             j = model.parameters.index(name)
-            found[j], gain[j] = values[i], np.eye(len(words))[i]
+            found[j], change[j] = values[i], np.eye(len(words))[i]
     return LinearFit(
         model=model,
         rows=rows,
         estimate=estimate,
-        K=K,
-        Y=Y,
-        experiment=experiment,
+        K=K[:, kept],
+        Y=Y - K @ fixed,
         solution=solution,
         fixed=fixed,
         picks=picks,
@@ -170,8 +161,7 @@ def linear_fit(
         words=words,
         recovery=recovery,
         values=found,
-        gain=gain,
-        settled=settled,
+        gain=change,
     )
 
 
@@ -247,52 +237,23 @@ def row_covariance(model: HarmonicModel, experiments: Experiments, rows: Rows, u
     return total
 
 
-def _whitened(rows: Rows, covariance: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Real rows with unit variance, and the experiment of each."""
-    both = np.concatenate((rows.K, rows.Y[:, :, None]), axis=2)
-    parts = []
-    for i in np.flatnonzero(rows.used.any(axis=1)):
-        used = rows.used[i]
-        own = covariance[i][np.ix_(used, used)]
-        typical = float(np.mean(np.diag(own)))
-        if typical == 0:
-            raise ValueError(
-                "an experiment's amplitudes have no stated error; state one (or a floor) for all outputs"
-            )
-        root = np.linalg.cholesky(own + COVARIANCE_FLOOR * typical * np.eye(len(own)))
-        parts.append(np.linalg.solve(root, both[i][used]))
-    whole = np.concatenate(parts)
-    return whole[:, :-1], whole[:, -1], np.nonzero(rows.used)[0]
-
-
 def _regress(
     model: HarmonicModel, experiments: Experiments, rows: Rows, fixed: FloatArray
-) -> tuple[Estimate, FloatArray, FloatArray, FloatArray, IntArray, bool]:
-    """Unweighted, or with stated errors reweighted until the weights fit; some unknowns are fixed."""
+) -> tuple[Estimate, FloatArray]:
+    """The estimate of the unknowns that are not fixed, and the solution of all of them."""
     kept, words = np.flatnonzero(fixed == 0), model.combinations.words
     names = [words[i] if words.count(words[i]) == 1 else f"{words[i]} [{i + 1}]" for i in kept]
-
-    def solve(K: FloatArray, Y: FloatArray, sigma: float | None) -> tuple[Estimate, FloatArray]:
-        estimate = least_squares(K[:, kept], Y - K @ fixed, names=names, sigma=sigma, rcond=RCOND)
-        solution = fixed.copy()
-        solution[kept] = estimate.solution
-        return estimate, solution
-
-    K, Y, experiment = rows.real_rows()
-    estimate, solution = solve(K, Y, None)
-    settled = True
-    if experiments.stated and np.any(Y - K @ fixed):
-        for _ in range(REWEIGHTINGS):
-            before = solution
-            K, Y, experiment = _whitened(rows, row_covariance(model, experiments, rows, before))
-            estimate, solution = solve(K, Y, 1.0)
-            moved = np.abs(solution - before)
-            if np.all(moved <= 1e-12 * np.abs(before)):
-                break
-        spread = estimate.solution_covariance
-        std = np.zeros(len(kept)) if spread is None else np.sqrt(np.diag(spread).clip(0))
-        settled = bool(np.all(moved[kept] <= np.maximum(1e-6 * np.abs(before[kept]), SETTLED * std)))
-    return estimate, solution, K[:, kept], Y - K @ fixed, experiment, settled
+    K, Y = rows.real_rows()
+    estimate = least_squares(K[:, kept], Y - K @ fixed, names=names, rcond=RCOND)
+    solution = fixed.copy()
+    solution[kept] = estimate.solution
+    if experiments.stated:
+        G, place = gain(K[:, kept], rcond=RCOND), np.nonzero(rows.used)
+        errors = row_covariance(model, experiments, rows, solution)
+        same = place[0][:, None] == place[0]
+        spread = G @ np.where(same, errors[place[0][:, None], place[1][:, None], place[1]], 0.0) @ G.T
+        estimate = replace(estimate, solution_covariance=spread, errors_stated=True)
+    return estimate, solution
 
 
 def _groups(model: HarmonicModel, rows: Rows) -> tuple[IntArray, ...]:

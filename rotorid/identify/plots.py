@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.plot_style import MARKERS, QUIET, TEXT, legend_above, look, new_figure, plain, plain_numbers
+from rotorid.base.plot_style import MARKERS, QUIET, legend_above, look, new_figure, plain, plain_numbers
 from rotorid.base.unit_words import Shown
 from rotorid.identify.amplitude_residuals import compare
 from rotorid.regression.interval_plot import ROOM, draw_intervals
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rotorid.identify.result import Identification
 
 CURVE_POINTS = 1000
-MANY, FEW = 12, 4
-"""Outputs that a legend still names; parameters whose correlations are written as numbers."""
+MANY = 12
+"""Outputs that a legend still names."""
 WIDE = 10.0
 """Ratio of amplitudes above which their scale is logarithmic."""
 MODEL_UNIT = Shown("model unit")
@@ -39,8 +39,7 @@ def figure_identification(result: Identification) -> Figure:
         panels = [(2.4, partial(draw_amplitudes, outputs=names)) for names in by_unit.values()]
         panels += [(1.1, draw_deviations)] * bool(result.predicted) + [(1.6, draw_phases)]
     heights, intervals = [height for height, _ in panels], _intervals(result)
-    correlated = result.correlation is not None and np.isfinite(result.correlation).sum() > 1
-    parts = 0.6 + sum(heights), max(ROOM[0] + ROOM[1] * len(intervals), 2.2 if correlated else 0.0)
+    parts = 0.6 + sum(heights), ROOM[0] + ROOM[1] * len(intervals)
     figure = new_figure(sum(parts))
     above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
     axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
@@ -50,10 +49,7 @@ def figure_identification(result: Identification) -> Figure:
     for ax in axes[:-1]:
         ax.set_xlabel("")
     _legend(result, axes[0])
-    last = below.subplots(1, 1 + correlated, width_ratios=(3, 2)[: 1 + correlated], squeeze=False)[0]
-    draw_intervals(last[0], intervals)
-    if correlated:
-        draw_correlations(result, last[1])
+    draw_intervals(below.subplots(), intervals)
     return figure
 
 
@@ -146,23 +142,6 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
     axes.set_xticks(range(len(outputs)), outputs)
     axes.set_ylabel(f"shape, {_unit(result, outputs)}")
     plain(axes)
-
-
-def draw_correlations(result: Identification, axes: Axes) -> None:
-    """Correlation map of the parameters that are determined."""
-    if result.correlation is None:
-        return
-    known = np.flatnonzero(np.isfinite(result.values) & np.isfinite(np.diag(result.correlation)))
-    table, names = result.correlation[np.ix_(known, known)], [result.parameters[i] for i in known]
-    axes.imshow(table, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    ticks = range(0, len(names), 1 + (len(names) - 1) // MANY)  # no more than a reader can tell apart
-    axes.set_xticks(ticks, [names[i] for i in ticks], rotation=90 if len(names) > 3 else 0)
-    axes.set_yticks(ticks, [names[i] for i in ticks])
-    for (i, j), value in np.ndenumerate(np.round(table, 2) + 0.0):
-        color = "white" if abs(value) > 0.6 else "black"
-        text = f"{value:.2g}" if len(names) <= FEW else "" if abs(value) < 0.5 else "+" if value > 0 else "−"
-        axes.text(j, i, text, ha="center", va="center", fontsize=TEXT, color=color)
-    axes.set_title("correlations", fontsize=TEXT)
 
 
 def _intervals(result: Identification) -> list[tuple[str, float, float, str]]:

@@ -8,7 +8,7 @@ may miss solutions. All combinations together then refine each solution, weighte
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cmp_to_key
 from math import comb
@@ -82,8 +82,10 @@ class Recovery:
     gain
         (n, q): change of the parameters per change of the combinations, at the first solution; NaN rows for
         undetermined ones, and without a solution.
-    reasons, warnings
-        In words: why there are several solutions or none; what is doubtful.
+    reasons
+        In words, why there are several solutions or none.
+    complete
+        False: they were searched for, and there may be more.
     """
 
     solutions: tuple[FloatArray, ...]
@@ -91,7 +93,7 @@ class Recovery:
     rank: int
     gain: FloatArray
     reasons: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    complete: bool = True
 
     @property
     def values(self) -> FloatArray:
@@ -108,14 +110,13 @@ def several(solutions: Sequence[FloatArray]) -> BoolArray:
     return np.asarray(np.ptp(table, axis=0) > SAME * np.abs(table).max(axis=0))
 
 
-def recover(system: System, bounds: Mapping[str, tuple[float, float]] | None = None) -> Recovery:
-    """Solve for the parameters; of several solutions those within bounds are kept, where there are any."""
+def recover(system: System) -> Recovery:
+    """Solve for the parameters."""
     n = len(system.names)
     open_, free = _open(system)
     gain = np.full((n, len(system.values)), np.nan)
     if not len(system.values):
         return Recovery((), open_, 0, gain)
-    warnings: list[str] = []
     candidates, complete = _candidates(system, free)
     weight = _weights(system)
     refined = [_refined(system, start, free, weight) for start in candidates]
@@ -126,26 +127,15 @@ def recover(system: System, bounds: Mapping[str, tuple[float, float]] | None = N
         if misfit <= max(1.0, 3 * least) and not any(_larger(theta, s) == 0 for s in solutions):
             solutions.append(theta)
     solutions.sort(key=cmp_to_key(_larger))
-    if np.isfinite(least) and least > 1:
-        warnings.append("the estimated combinations contradict each other by more than their errors")
-    if bounds and len(solutions) > 1:
-        limits = [
-            (j, *bounds[name]) for j, name in enumerate(system.names) if name in bounds and not open_[j]
-        ]
-        solutions = [t for t in solutions if all(a <= t[j] <= b for j, a, b in limits)] or solutions
-    if not complete and len(free):
-        warnings.append("the parameters were found by a search; there may be more solutions than shown")
     if not solutions:
         reason = "no real values of the parameters give the estimated combinations"
-        return Recovery((), open_, len(free), gain, (reason,), tuple(warnings))
+        return Recovery((), open_, len(free), gain, (reason,))
     differ = np.flatnonzero(several(solutions) & ~open_).tolist()
     J = weight @ system.combinations(solutions[0])[1][:, free]
-    if len(free) and not least_squares(J, np.zeros(len(J)), rcond=1e-7).full_rank:
-        warnings.append("two solutions nearly coincide: the parameters are hardly determined there")
     gain[free] = solution(J, weight, rcond=1e-13)
     gain[open_] = np.nan
     reasons = why_several(solutions, system.names, differ)
-    return Recovery(tuple(solutions), open_, len(free), gain, tuple(reasons), tuple(warnings))
+    return Recovery(tuple(solutions), open_, len(free), gain, tuple(reasons), complete or not free)
 
 
 def _open(system: System) -> tuple[BoolArray, list[int]]:
@@ -207,11 +197,17 @@ def _polynomials(system: System, free: list[int]) -> list[Polynomial]:
     for row, value in zip(rows, np.where(cleared, 0.0, system.values), strict=True):
         used = np.flatnonzero(row)
         lowest = exponents[used].min(axis=0, initial=0)  # multiplied so that no exponent is negative
-        polynomial = R.term_new(tuple((-lowest).tolist()), QQ.convert(-float(value)))
+        polynomial = R.term_new(tuple((-lowest).tolist()), _exact(-value))
         for m in used:
-            polynomial += R.term_new(tuple((exponents[m] - lowest).tolist()), QQ.convert(float(row[m])))
+            polynomial += R.term_new(tuple((exponents[m] - lowest).tolist()), _exact(row[m]))
         polynomials.append(_reduced(polynomial))
     return polynomials
+
+
+def _exact(value: float) -> Any:  # noqa: ANN401 - sympy has no types
+    from sympy import QQ
+
+    return QQ(*float(value).as_integer_ratio())
 
 
 def _reduced(polynomial: Polynomial) -> Polynomial:
@@ -291,7 +287,7 @@ def _real_roots(polynomial: Polynomial, j: int) -> list[Any]:
     scale = abs(coefficients[last] / coefficients[0]) ** (1 / last) if last else 1.0
     roots = np.roots(coefficients * scale ** np.arange(degree, -1, -1.0)) * scale
     real = {float(r.real) for r in roots if abs(r.imag) <= NEARLY_REAL * abs(r)}
-    return [QQ.convert(r) for r in sorted(real)]
+    return [_exact(r) for r in sorted(real)]
 
 
 def _searched(system: System, free: list[int]) -> list[FloatArray]:

@@ -22,11 +22,6 @@ from rotorid.timedomain.models.compiled import real, usual
 from rotorid.timedomain.result import Fit
 
 PARTS = ("Re", "Im")
-_WEIGHTED = (
-    "the numbers are after weighting: the rows of an experiment times the inverse Cholesky factor of the "
-    "covariance that the stated errors give them; the symbols are before it"
-)
-
 _START = "θ here is where the search begins: the answer predicts the amplitudes, which bias it less"
 
 
@@ -61,7 +56,6 @@ def _(found: Identification) -> Equations:
     notes = [
         f"{model.combinations.words[i]} = 1: the others are relative to it" for i in fit.fixed.nonzero()[0]
     ]
-    notes += [_WEIGHTED] if tests.stated else []
     notes += [_START] if found.method == "output-error" else []
     rows, solved = _rows_in_symbols(model, tests, fit.fixed.tolist()), fit.estimate
     title = f"K θ = Y, [S] (9): {counted(len(labels), 'real row')}, {counted(len(solved.names), 'unknown')}"

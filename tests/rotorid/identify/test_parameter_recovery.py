@@ -138,14 +138,6 @@ def test_ratios_are_found_although_their_parts_are_open():
     assert np.isnan(found.values[:2]).all()
 
 
-def test_contradicting_combinations_are_reported():
-    covariance = np.diag([1e-8, 1e-8, 1e-8])
-    found = recover(system("xy", [[1, 0], [0, 1], [1, 1]], [2.0, 3.0, 7.0], covariance))
-    assert any("contradict" in w for w in found.warnings)
-    fits = recover(system("xy", [[1, 0], [0, 1], [1, 1]], [2.0, 3.0, 6.0], covariance))
-    assert fits.warnings == ()
-
-
 def test_overdetermined_recovery_weighs_by_the_errors():
     """x and x·y and y with one bad value of large error: the others decide."""
     covariance = np.diag([1e-10, 1e-10, 1.0])
@@ -191,7 +183,7 @@ def test_a_system_that_cannot_be_reduced_is_searched_and_says_so():
     assert any(np.allclose(s, truth, rtol=1e-9) for s in found.solutions)
     for s in found.solutions:
         np.testing.assert_allclose(matrix @ np.prod(s**exponents, axis=1), values, rtol=1e-9)
-    assert any("search" in w for w in found.warnings)
+    assert not found.complete
 
 
 @given(st.integers(0, 100_000), st.integers(1, 4), st.integers(0, 2))

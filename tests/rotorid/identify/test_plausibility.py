@@ -147,7 +147,7 @@ def test_a_force_of_the_other_sign_and_bounds_that_allow_it():
     ("equations", "estimate", "elements"),
     [
         (TWO, ["m1", "b1", "k1", "k2"], {"m1": 2, "b1": 1, "k1": 0, "k2": 0}),
-        ([f"-({TWO[0].split(' =')[0]}) = -F", TWO[1]], ["m1", "k2"], {"m1": 2, "k2": 0}),
+        ([f"-({TWO[0].split(' =')[0]}) = -F", TWO[1]], ["m1", "k2"], {}),
         (["(m*p**2 + c - kn)*X + kc*Y = F", "(m*p**2 + c)*Y - kc*X = 0"], ["c", "kn", "kc"], {"c": 0}),
         (["(T1*T2*p**2 + T1*p + 1)*X = F"], ["T1", "T2"], {}),
         (["(m*p**2 + b*p + c)*X = (b*p + c)*Z"], ["m", "b", "c"], {"m": 2, "b": 1, "c": 0}),
