@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from rotorid.base.registry import Method
     from rotorid.identify import AmplitudeErrors, Experiments, HarmonicModel, Identification
+    from rotorid.identify.structures import StructureTest
     from rotorid.regression.d_optimal import Design
     from rotorid.report.equations import Equations
     from rotorid.tables import HarmonicFile
@@ -44,6 +46,8 @@ class IdentifyOptions:
     ridge : LAMBDA
         Regularise: add λ times the diagonal of the normal matrix at the start, which pulls towards it; no
         intervals.
+    against : OTHER.toml
+        Another model of the same readings: the difference of AIC, and the F test of the further parameters.
     design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose : N from 1
@@ -54,9 +58,10 @@ class IdentifyOptions:
     amplitude_error: float | None = None
     phase_error: float | None = None
     ridge: float | None = None
+    against: Path | None = None
     design: Speeds | None = None
     choose: int | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "loss ridge", "Next test": "design choose"}
+    panels: ClassVar[Mapping[str, str]] = {"Method": "loss ridge against", "Next test": "design choose"}
     to: ClassVar[tuple[str, ...]] = (*WITH_REPORT, *EQUATIONS)
 
 
@@ -75,6 +80,7 @@ class Coefficients(Parts):
     design: Design | None
     model: HarmonicModel
     text: str = ""
+    against: StructureTest | None = None
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -93,7 +99,8 @@ class Coefficients(Parts):
         """As JSON types; without data what these can determine at best."""
         if self.identification is None and self.design is None:
             return {"combinations": list(self.model.combinations.words)}
-        return super().to_dict()
+        more = {} if self.against is None else {"against": dataclasses.asdict(self.against)}
+        return super().to_dict() | more
 
     def to_frame(self) -> pd.DataFrame:
         """The frequencies, or else one row per parameter."""
@@ -156,6 +163,7 @@ def identify(
     """
     from rotorid.identify import Experiments, HarmonicModel
     from rotorid.identify import identify as estimate
+    from rotorid.identify.structures import compare_structures
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
@@ -167,7 +175,7 @@ def identify(
     elif not isinstance(model, HarmonicFile):
         model = read_harmonic_model(file_of(model, "a model"))
     file = replace(model, errors=amplitude_errors(model.errors, options.amplitude_error, options.phase_error))
-    result = None
+    result, source = None, data
     if data is not None:
         if not isinstance(data, Experiments):
             data = read_measurements(file_of(data, "a table of amplitudes"), file)
@@ -182,11 +190,19 @@ def identify(
                 ridge=options.ridge or 0.0,
             )
         log.info("degrees_of_freedom = %s", result.dof)
+    compared = None
+    if options.against is not None and result is not None:
+        other = read_harmonic_model(options.against)
+        rows = read_measurements(file_of(source, "a table of amplitudes"), replace(other, errors=file.errors))
+        compared = compare_structures(result, estimate(other.model, rows, start=other.start or None))
+        result = replace(result, notes=(compared.sentence(str(options.against)), *result.notes))
+        files.append(options.against)
     return Coefficients(
         identification=result,
         design=None if options.design is None else _plan(file, result, options.design, options.choose),
         model=file.model,
         text=text,
+        against=compared,
         provenance=provenance(files, options),
     )
 
@@ -195,7 +211,7 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
     """Refuse names that are not known, and options that do not go together."""
     check_choices(options, choices())
     if not measured:
-        refuse(options, ("loss", "ridge"), "belongs to DATA: nothing is fitted without them")
+        refuse(options, ("loss", "ridge", "against"), "belongs to DATA: nothing is fitted without them")
     if options.design is None:
         refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
 
