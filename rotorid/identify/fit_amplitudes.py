@@ -58,14 +58,6 @@ class Options:
     prior: Known
     ridge: float
 
-    @property
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Bounds as numbers, infinite where there is no limit."""
-        return {
-            name: (-np.inf if low is None else low, np.inf if high is None else high)
-            for name, (low, high) in self.bounds.items()
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class OutputError:
@@ -125,8 +117,8 @@ def _check(model: HarmonicModel, experiments: Experiments, options: Options) -> 
         for name in getattr(options, what):
             if name not in model.parameters:
                 raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
-    for name, (low, high) in options.limits.items():
-        if not low <= high:
+    for name, (low, high) in options.bounds.items():
+        if low is not None and high is not None and not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
     if options.prior and not experiments.stated:
         raise ValueError(
@@ -341,9 +333,6 @@ def _by_regression(experiments: Experiments, linear: LinearFit, options: Options
     if covariance is not None:
         spread = np.sqrt(np.diag(covariance).clip(0)).tolist()
     warnings = [*linear.rows.warnings, *([] if recovery.complete else [_SEARCHED])]
-    for name, (low, high) in options.limits.items():
-        if not (np.isnan(value := values[model.parameters.index(name)]) or low <= value <= high):
-            warnings.append(f"{name} = {value:.6g} lies outside its bounds")
     notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
     more = "" if estimate.full_rank else what_more_can_tell(model, experiments, recovery.rank)
     solutions = [np.where(recovery.undetermined, np.nan, theta) for theta in recovery.solutions]
