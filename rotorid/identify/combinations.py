@@ -30,6 +30,8 @@ P = "p"
 ONE: Monomial = ()
 CONSTANT = ""
 """Signal name of a term without a signal: amplitude 1."""
+LONG = 50
+"""Terms of a sum that is written as it comes."""
 NAME = re.compile(r"[^\W\d]\w*")
 
 
@@ -166,7 +168,8 @@ def _as_an_equation_has_them(
         names = [dict(names) for names, _ in terms.values()]
         shared = tuple((n, -min(one.get(n, 0) for one in names)) for n in set().union(*names))
         sizes = [abs(x) for _, x in terms.values()]
-        unit = min(sizes) if all((x / min(sizes)).denominator == 1 for x in sizes) else Fraction(1)
+        least = min(sizes)
+        unit = least if all((x / least).denominator == 1 for x in sizes) else Fraction(1)
         if sum(x < 0 for _, x in terms.values()) > len(terms) / 2:
             unit = -unit
         return {m: {times(numbers, shared): x / unit} for m, (numbers, x) in terms.items()}
@@ -183,6 +186,12 @@ def sum_words(polynomial: Polynomial) -> str:
     """
     from sympy import factor_terms
 
+    if len(polynomial) > LONG:  # which sympy takes seconds to write
+        products = (
+            (f"{float(x):.6g}", *(n if e == 1 else f"{n}**({e})" for n, e in m))
+            for m, x in polynomial.items()
+        )
+        return " + ".join("*".join(part for part in product if part != "1") for product in products)
     return _written(factor_terms(expression(polynomial)))
 
 

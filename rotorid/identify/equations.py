@@ -154,21 +154,22 @@ def multiplied_out(
         With the reason, for whatever is not rational in other names than those to estimate, and for
         expansions that are too long.
     """
-    from sympy import Dummy, Poly, Symbol, fraction, nan, oo, together, zoo
+    from sympy import QQ, Dummy, Symbol, fraction, nan, oo, ring, together, zoo
 
     def of_known(part: Expression) -> bool:
         plain = part.is_Function or (part.is_Pow and not (part.exp.is_Integer and part.exp > 0))
         alone = part.is_Pow and part.base.is_Symbol and part.exp.is_Integer
         return plain and not alone and all(s.name in known for s in part.free_symbols)
 
-    if expression.has(oo, nan, zoo):
-        raise ValueError("it divides by zero")
     whole = expression.replace(of_known, lambda part: _number(part, known))
     roots = {s: _root(whole, s) for s in whole.free_symbols if s.name in estimate}
     inner = {s: Dummy(s.name, positive=True) if n > 1 else s for s, n in roots.items()}
     whole = whole.subs({s: inner[s] ** n for s, n in roots.items() if n > 1})
     top, bottom = fraction(together(whole))
+    if top.has(oo, nan, zoo) or bottom == 0:
+        raise ValueError("it divides by zero")
     symbols = sorted(top.free_symbols | bottom.free_symbols, key=str)
+    R = ring(symbols, QQ)[0]
     factors = [part.as_base_exp() for part in bottom.as_ordered_factors()]
     size = math.prod(len(base.as_ordered_terms()) ** abs(int(n)) for base, n in factors if n.is_Integer)
     if size > MAX_TERMS:
@@ -178,10 +179,10 @@ def multiplied_out(
 
     def terms(part: Expression) -> Polynomial:
         found: Polynomial = {}
-        for exponents, value in Poly(part, *symbols, domain="QQ").terms() if symbols else [((), part)]:
+        for exponents, value in R.from_expr(part).terms():
             powers = ((n, Fraction(e, root)) for (n, root), e in zip(place, exponents, strict=True) if e)
             monomial = tuple(sorted((n, int(e) if e.denominator == 1 else e) for n, e in powers))
-            found[monomial] = Fraction(int(value.p), int(value.q))
+            found[monomial] = Fraction(int(value.numerator), int(value.denominator))
         return found
 
     polynomial, scale, below = terms(top), Fraction(1), set[str]()

@@ -49,6 +49,12 @@ def test_roots_of_parameters_are_unknowns_of_their_own(equation, estimate, truth
     np.testing.assert_allclose(found.values, truth, rtol=1e-8)
 
 
+@pytest.mark.parametrize("equation", ["X/(a*(b + 1) - a*b - a) = F", "(a + b)*X/(z - 1) = F"])
+def test_a_denominator_that_cancels_is_refused_in_words(equation):
+    with pytest.raises(ValueError, match="it divides by zero"):
+        harmonic_model([equation], known={"z": 1.0}, estimate=["a", "b"])
+
+
 def test_another_function_of_a_parameter_is_refused_in_words():
     with pytest.raises(ValueError, match=r"'sin\(a\)' is neither a polynomial .* give such a term a name"):
         harmonic_model(["(p**2 + sin(a))*X = F"], estimate=["a"])
