@@ -12,7 +12,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import percent, sentence
+from rotorid.base.text import counted, percent, sentence
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.linear_start import LinearFit
 from rotorid.identify.operator_model import HarmonicModel
@@ -24,6 +24,8 @@ from rotorid.regression.undetermined_combinations import FoundCombination
 if TYPE_CHECKING:
     import pandas as pd
 
+FEW = 2
+"""Degrees of freedom that tell little of the size of errors."""
 HEADINGS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
 
 
@@ -182,6 +184,10 @@ class Identification(Answered, Uncertain):
         notes = [f"left out: {row}" for row in self.left_out]
         if self.covariance is None and self.converged and not self.prior:
             notes.append("no intervals: no errors are stated and there are no more equations than unknowns")
+        if self.covariance is not None and not self.errors_stated and self.dof <= FEW:
+            notes.append(
+                f"the intervals rest on what is left by {counted(self.dof, 'degree')} of freedom only"
+            )
         columns = self.misfit
         left = np.array(columns[-1].values)
         words = f"{self._judgement()} Method: {HEADINGS[self.method]}."

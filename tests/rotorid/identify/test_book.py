@@ -96,6 +96,15 @@ def test_the_generator_wrote_these_tables(tmp_path, monkeypatch):
             assert (tmp_path / path).read_text() == (FOLDER / path).read_text(), path
 
 
+def test_few_degrees_of_freedom_are_told(cli):
+    few, more = (
+        cli("identify", FOLDER / task / "model.toml", FOLDER / task / "data.csv")
+        for task in ("task_8_1", "task_7_1")
+    )
+    assert "rest on what is left by 2 degrees of freedom only" in few.out
+    assert "degrees of freedom" not in more.out
+
+
 def test_stated_errors(identify):
     found = identify("task_5_1", "--amplitude-error", 2, "--phase-error", 1)
     assert found["method"] == "output-error"
