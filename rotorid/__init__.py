@@ -10,10 +10,9 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False  # typing takes longer than all before the command line's answer to Ctrl-C
 if TYPE_CHECKING:
-    from rotorid.harmonic import Experiments as Experiments
-    from rotorid.harmonic import Identification as Identification
-    from rotorid.harmonic import harmonic_model as harmonic_model
-    from rotorid.harmonic import identify as identify
+    from rotorid.identify import Experiments as Experiments
+    from rotorid.identify import Identification as Identification
+    from rotorid.identify import harmonic_model as harmonic_model
     from rotorid.plots import plot as plot
     from rotorid.reduction import InputErrors as InputErrors
     from rotorid.reduction import Reduction as Reduction
@@ -63,10 +62,9 @@ _HOME = {
     "Estimate": "regression",
     "Combination": "regression",
     # harmonic tests, natural frequencies and shapes
-    "harmonic_model": "harmonic",
-    "identify": "harmonic",
-    "Experiments": "harmonic",
-    "Identification": "harmonic",
+    "harmonic_model": "identify",
+    "Experiments": "identify",
+    "Identification": "identify",
     # time records
     "ode_model": "timedomain",
     "Record": "timedomain",

@@ -81,9 +81,9 @@ def _reduction() -> Pictures:
     }
 
 
-def _harmonic() -> Pictures:
-    from rotorid.harmonic.plots import figure_identification
-    from rotorid.harmonic.result import Identification
+def _identify() -> Pictures:
+    from rotorid.identify.plots import figure_identification
+    from rotorid.identify.result import Identification
 
     return {Identification: lambda found, ax: figure_identification(found)}
 
@@ -99,6 +99,6 @@ _ROOMS: dict[str, Callable[[], Pictures]] = {
     "fem": _rotors,
     "balancing": _balancing,
     "rotorid.reduction": _reduction,
-    "rotorid.harmonic": _harmonic,
+    "rotorid.identify": _identify,
     "rotorid.timedomain": _timedomain,
 }

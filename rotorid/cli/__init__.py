@@ -14,7 +14,6 @@ from rotorid.cli.commands import (
     calibrate,
     demo,
     fit,
-    identify,
     modes,
     motion,
     periodic,
@@ -30,6 +29,7 @@ from rotorid.cli.worksheet import worksheet
 from rotorid.commands import (
     campbell,
     critical,
+    identify,
     influence,
     response,
     split,
@@ -74,7 +74,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "periodic": periodic.periodic,
     },
     "Identify coefficients": {
-        "identify": identify.identify,
+        "identify": typer_command(identify),
         "fit": fit.fit,
         "simulate": simulate.simulate,
         "modes": modes.modes,

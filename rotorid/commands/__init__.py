@@ -6,6 +6,7 @@
 from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
+from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.outcome import Outcome
 from rotorid.commands.response import ResponseOptions, response
@@ -19,6 +20,7 @@ __all__ = [
     "BalanceOptions",
     "CampbellOptions",
     "CriticalOptions",
+    "IdentifyOptions",
     "InfluenceOptions",
     "Outcome",
     "ResponseOptions",
@@ -30,6 +32,7 @@ __all__ = [
     "balance",
     "campbell",
     "critical",
+    "identify",
     "influence",
     "response",
     "split",

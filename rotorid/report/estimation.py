@@ -21,7 +21,7 @@ from rotorid.report.rotor_figures import Drawing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.harmonic import Identification
+    from rotorid.identify import Identification
     from rotorid.regression.d_optimal import Design
     from rotorid.regression.prior import PriorEffect
     from rotorid.timedomain.result import Fit
@@ -73,7 +73,7 @@ def identification_report(
     model: str,
 ) -> bytes:
     """Make the sheet of an identification, of frequencies to measure next, or of both; see `fit_report`."""
-    from rotorid.harmonic.plots import figure_identification
+    from rotorid.identify.plots import figure_identification
 
     document = Document(document)
     about: Facts = []

@@ -8,6 +8,7 @@ from rotorid.commands import (
     BalanceOptions,
     CampbellOptions,
     CriticalOptions,
+    IdentifyOptions,
     InfluenceOptions,
     ResponseOptions,
     SplitOptions,
@@ -18,6 +19,7 @@ from rotorid.commands import (
     balance,
     campbell,
     critical,
+    identify,
     influence,
     response,
     split,
@@ -26,12 +28,12 @@ from rotorid.commands import (
     unbalance,
 )
 from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
+from rotorid.commands.identify import Coefficients
 from rotorid.commands.outcome import Delivered
 from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
-from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, counted, listing
+from rotorid.commands.identify import amplitude_errors
 from rotorid.commands.input_checks import file_of, refuse
 from rotorid.commands.outcome import Delivered, command, phase, provenance
 from rotorid.commands.quantities import (
@@ -26,13 +27,12 @@ from rotorid.commands.quantities import (
     times,
 )
 from rotorid.workflows.fit import Values, sigmas
-from rotorid.workflows.identify import amplitude_errors
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from rotorid.base.arrays import FloatArray
-    from rotorid.harmonic import HarmonicModel
+    from rotorid.identify import HarmonicModel
     from rotorid.tables import HarmonicFile
     from rotorid.timedomain import OdeModel
 
@@ -168,8 +168,8 @@ def simulate(
 
 def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     """A table of amplitudes, or of natural frequencies and shapes."""
-    from rotorid.harmonic import HarmonicModel
-    from rotorid.harmonic.simulated_measurements import as_read, forced_vibration, free_vibration
+    from rotorid.identify import HarmonicModel
+    from rotorid.identify.direct_problem import as_read, forced_vibration, free_vibration
     from rotorid.tables import HarmonicFile, read_harmonic_model
     from rotorid.tables.data.measurements import measurement_columns
 

@@ -26,7 +26,7 @@ PACKAGES = (
     "fem",
     "balancing",
     "rotorid",
-    "rotorid.harmonic",
+    "rotorid.identify",
     "rotorid.timedomain",
     "rotorid.reduction",
     "rotorid.calibration",

@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.harmonic.comparison import TRUSTED, whitening
-from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.modal.modal_readings import Answers, Readings
 from rotorid.harmonic.modal.modal_result import FittedModes
+from rotorid.identify.amplitude_residuals import TRUSTED, whitening
+from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 
 PROMINENCE, SKIRT = 1.4, 4.0

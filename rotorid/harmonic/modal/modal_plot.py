@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.base.plot_style import COLORS, MARKERS, TEXT, WARNING, legend_below, look, new_figure, plain
 from rotorid.base.text import sentence
-from rotorid.harmonic.plots import CURVE_POINTS, MODEL_UNIT, scale_amplitudes
+from rotorid.identify.plots import CURVE_POINTS, MODEL_UNIT, scale_amplitudes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

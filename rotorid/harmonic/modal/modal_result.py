@@ -14,10 +14,10 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, error_figures, listing
-from rotorid.harmonic.comparison import reference_amplitude
-from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.modal.modal_readings import Readings
-from rotorid.harmonic.plausibility import misfit
+from rotorid.identify.amplitudes import Experiments
+from rotorid.identify.checks_amplitudes import misfit
+from rotorid.identify.operator_model import reference_amplitude
 from rotorid.regression.nonlinear import NonlinearEstimate
 
 if TYPE_CHECKING:

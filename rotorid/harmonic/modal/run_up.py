@@ -11,11 +11,11 @@ import numpy as np
 from balancing import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.unit_words import Shown, speed_axis
-from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.modal.modal_fit import fit_modes, peak_bands
 from rotorid.harmonic.modal.modal_readings import Answers, SteadyAnswers
 from rotorid.harmonic.modal.modal_result import RARE, FittedModes
 from rotorid.harmonic.modal.swept_answers import swept_answers
+from rotorid.identify.amplitudes import Experiments
 
 NOISE = 5.0
 """Standard deviations of a vector that are no peak."""

@@ -31,7 +31,7 @@ from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.reader.value_kinds import FLAG, number, table
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.identify.amplitudes import AmplitudeErrors
     from rotorid.timedomain.models.ode_model import OdeModel
 
 

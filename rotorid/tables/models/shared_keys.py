@@ -14,7 +14,7 @@ from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.identify.amplitudes import AmplitudeErrors
 
 _LIMITS = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 NAMES = {"type": "array", "items": {"type": "string"}}
@@ -39,7 +39,7 @@ def _errors(section: Section) -> AmplitudeErrors | None:
             "at least one of amplitude_percent, phase_deg and floor above 0, or no [errors] at all"
         )
         return None
-    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.identify.amplitudes import AmplitudeErrors
 
     return AmplitudeErrors(percent / 100.0, math.radians(phase), floor)
 

@@ -5,9 +5,9 @@ import pytest
 from repetitions import FULL
 from scipy.linalg import eigh
 
-from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.modal.modal_fit import fit_modes
 from rotorid.harmonic.modal.modal_readings import SteadyAnswers
+from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
 from rotorid.samples import sample_data
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.workflows.vibration.modes import ModesOptions, modes
@@ -89,8 +89,8 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
 @pytest.mark.full
 def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli):
     """Lesson 7 whole: amplitudes around resonances, modes, stiffnesses; 40 drawn tests."""
+    from rotorid.commands.identify import identify
     from rotorid.tables import read_harmonic_model, read_measurements
-    from rotorid.workflows.identify import identify
 
     omega0, _ = undamped(M, K)
     omega = around(omega0, 2e-4 * omega0)
@@ -105,7 +105,7 @@ def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli
             low <= TRUTH[n] <= high for n, (low, high) in zip(result.parameters, result.ci95, strict=True)
         )
     assert abs(held / 120 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 120)
-    output = cli("identify", TASK_7_1, path, "--method", "output-error", "--json").json["parameters"]
+    output = cli("identify", TASK_7_1, path, "--json").json["parameters"]
     for name, value, std in zip(result.parameters, result.values, result.std, strict=True):
         assert output[name]["value"] == pytest.approx(value, abs=0.05 * std)
         assert output[name]["std"] == pytest.approx(std, rel=0.05)  # the error of the reference counts, too
