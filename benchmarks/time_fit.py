@@ -33,10 +33,10 @@ import numpy as np
 from benchmarks.timing import Row, best_of, once, relative_difference
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
-from rotorid.timedomain.fit import fit
+from rotorid.identify.fit_records import fit
 from rotorid.timedomain.integration import taylor
-from rotorid.timedomain.models.ode_model import OdeModel, ode_model
-from rotorid.timedomain.models.record import Record
+from rotorid.identify.ode import OdeModel, ode_model
+from rotorid.identify.records import Record
 
 F_OPTIMUM = np.array([0.13999975, 11.99998962, 28.00000273])
 ALLOWED = 2e-6

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from rotorid.harmonic import Identification as Identification
     from rotorid.harmonic import harmonic_model as harmonic_model
     from rotorid.harmonic import identify as identify
+    from rotorid.identify.fit_records import fit as fit
+    from rotorid.identify.ode import ode_model as ode_model
+    from rotorid.identify.records import Record as Record
+    from rotorid.identify.result_records import Fit as Fit
+    from rotorid.identify.simulate import simulate as simulate
     from rotorid.plots import plot as plot
     from rotorid.reduction import InputErrors as InputErrors
     from rotorid.reduction import Reduction as Reduction
@@ -46,11 +51,6 @@ if TYPE_CHECKING:
     from rotorid.tables import read_unbalance as read_unbalance
     from rotorid.tables import write_influence as write_influence
     from rotorid.tables import write_rotor as write_rotor
-    from rotorid.timedomain import Record as Record
-    from rotorid.timedomain import ode_model as ode_model
-    from rotorid.timedomain.fit import fit as fit
-    from rotorid.timedomain.integration.simulate import simulate as simulate
-    from rotorid.timedomain.result import Fit as Fit
 
 __version__ = "0.1.0"
 
@@ -68,11 +68,11 @@ _HOME = {
     "Experiments": "harmonic",
     "Identification": "harmonic",
     # time records
-    "ode_model": "timedomain",
-    "Record": "timedomain",
-    "simulate": "timedomain.integration.simulate",
-    "fit": "timedomain.fit",
-    "Fit": "timedomain.result",
+    "ode_model": "identify.ode",
+    "Record": "identify.records",
+    "simulate": "identify.simulate",
+    "fit": "identify.fit_records",
+    "Fit": "identify.result_records",
     # a rotor as a few masses
     "reduce": "reduction",
     "reduce_measured": "reduction",

@@ -90,9 +90,9 @@ def _harmonic() -> Pictures:
     return {Identification: lambda found, ax: figure_identification(found)}
 
 
-def _timedomain() -> Pictures:
-    from rotorid.timedomain.plots import figure_fit
-    from rotorid.timedomain.result import Fit
+def _records() -> Pictures:
+    from rotorid.identify.plots_records import figure_fit
+    from rotorid.identify.result_records import Fit
 
     return {Fit: lambda found, ax: figure_fit(found)}
 
@@ -102,5 +102,5 @@ _ROOMS: dict[str, Callable[[], Pictures]] = {
     "balancing": _balancing,
     "rotorid.reduction": _reduction,
     "rotorid.harmonic": _harmonic,
-    "rotorid.timedomain": _timedomain,
+    "rotorid.identify": _records,
 }

@@ -26,10 +26,10 @@ from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import experiments
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 from rotorid.regression import stretch
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.ode_model import ode_model
-from rotorid.timedomain.models.record import Record
 
 RPM = np.pi / 30
 

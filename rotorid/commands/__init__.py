@@ -6,9 +6,11 @@
 from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
+from rotorid.commands.fit import FitOptions, RecordFit, fit
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.outcome import Outcome
 from rotorid.commands.response import ResponseOptions, response
+from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
@@ -19,9 +21,12 @@ __all__ = [
     "BalanceOptions",
     "CampbellOptions",
     "CriticalOptions",
+    "FitOptions",
     "InfluenceOptions",
     "Outcome",
+    "RecordFit",
     "ResponseOptions",
+    "SimulateOptions",
     "SplitOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
@@ -30,8 +35,10 @@ __all__ = [
     "balance",
     "campbell",
     "critical",
+    "fit",
     "influence",
     "response",
+    "simulate",
     "split",
     "tolerance",
     "trial_weight",

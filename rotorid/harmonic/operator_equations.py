@@ -54,7 +54,7 @@ def harmonic_model(
     >>> model.outputs, model.inputs
     (('X',), ('F',))
     """
-    from rotorid.expressions import names, parse_equation
+    from rotorid.identify.expressions import names, parse_equation
 
     if isinstance(equations, str):
         equations = [equations]
@@ -184,7 +184,7 @@ def _expand(lhs: Any, rhs: Any, known: Mapping[str, Fraction]) -> tuple[Polynomi
 
 
 def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
-    from rotorid.expressions import is_name
+    from rotorid.identify.expressions import is_name
 
     if not estimate:
         raise ValueError("no parameter is to be estimated: name at least one")

@@ -8,8 +8,11 @@ from rotorid.commands import (
     BalanceOptions,
     CampbellOptions,
     CriticalOptions,
+    FitOptions,
     InfluenceOptions,
+    RecordFit,
     ResponseOptions,
+    SimulateOptions,
     SplitOptions,
     ToleranceOptions,
     TrialWeightOptions,
@@ -18,8 +21,10 @@ from rotorid.commands import (
     balance,
     campbell,
     critical,
+    fit,
     influence,
     response,
+    simulate,
     split,
     tolerance,
     trial_weight,
@@ -28,7 +33,6 @@ from rotorid.commands import (
 from rotorid.commands.outcome import Delivered
 from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.workflows.demo import Demo, DemoOptions, demo
-from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
@@ -37,7 +41,6 @@ from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
-from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
 from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
@@ -79,7 +82,6 @@ __all__ = [
     "RunUp",
     "RunUpOptions",
     "SimulateOptions",
-    "Simulation",
     "SplitOptions",
     "StudiedMachines",
     "StudiedStarts",

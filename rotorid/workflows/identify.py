@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.logs import workflows as log
+from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.input_checks import check_choices, file_of, refuse
 from rotorid.commands.outcome import Found, Parts, command, phase, provenance, text_of
 from rotorid.commands.quantities import Speeds, speeds
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.registry import Method
-    from rotorid.harmonic import AmplitudeErrors, Experiments, HarmonicModel, Identification
+    from rotorid.harmonic import Experiments, HarmonicModel, Identification
     from rotorid.regression.d_optimal import Design
     from rotorid.tables import HarmonicFile
 
@@ -214,22 +215,6 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
         refuse(options, ("loss",), "belongs to --method output-error: linear regression has none")
     if options.design is None:
         refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
-
-
-def amplitude_errors(
-    stated: AmplitudeErrors | None, percent: float | None, degrees: float | None
-) -> AmplitudeErrors | None:
-    """Errors of the model file, those of the options before them."""
-    if percent is None and degrees is None:
-        return stated
-    for name, value, high in (("--amplitude-error", percent, 1000.0), ("--phase-error", degrees, 360.0)):
-        if value is not None and not 0 <= value <= high:
-            raise ValueError(f"{name} takes a number from 0 to {high:g}, not {value:g}")
-    from rotorid.harmonic import AmplitudeErrors
-
-    relative = percent / 100.0 if percent is not None else (stated.relative if stated else 0.0)
-    phase = math.radians(degrees) if degrees is not None else (stated.phase if stated else 0.0)
-    return AmplitudeErrors(relative, phase, stated.floor if stated else 0.0)
 
 
 def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, choose: int | None) -> Design:

@@ -13,10 +13,10 @@ import sympy
 
 import fem
 from book.printed import below, lines, parts, read
-from rotorid.expressions import parse_equation
 from rotorid.harmonic import Experiments, harmonic_model, identify
 from rotorid.harmonic.natural_frequencies import natural_modes
 from rotorid.harmonic.regression_rows import build_rows
+from rotorid.identify.expressions import parse_equation
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_measurements
 

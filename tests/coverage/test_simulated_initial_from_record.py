@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.integration.simulate import simulate
-from rotorid.timedomain.models.ode_model import ode_model
-from rotorid.timedomain.models.record import Record
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
+from rotorid.identify.simulate import simulate
 
 FROM_RECORD = {"x": "record", "v": "record"}
 

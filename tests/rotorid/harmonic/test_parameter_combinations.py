@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sympy import Rational, Symbol
 
-from rotorid.expressions import ExpressionError, parse
 from rotorid.harmonic import harmonic_model
 from rotorid.harmonic.parameter_combinations import combination_words
 from rotorid.harmonic.polynomial import difference
+from rotorid.identify.expressions import ExpressionError, parse
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,18 @@ import pytest
 import sympy
 from matplotlib.mathtext import MathTextParser
 
-from rotorid.expressions import parse
+from rotorid.commands.fit import fit
 from rotorid.harmonic import harmonic_model
 from rotorid.harmonic.experiments import experiments
+from rotorid.identify.expressions import parse
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
+from rotorid.identify.second_order import second_order
+from rotorid.identify.simulate import simulate
 from rotorid.report.equations import BEHIND, Equations, Row
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_job
-from rotorid.timedomain import Record, ode_model, second_order, simulate
 from rotorid.workflows import BalanceOptions, balance
-from rotorid.workflows.fit import fit
 from rotorid.workflows.identify import IdentifyOptions, identify
 from rotorid.workflows.reduce import ReduceOptions, reduce
 
@@ -315,9 +318,10 @@ def test_symbols_are_what_is_integrated():
     augmented = model.augmented(t, np.concatenate((x, S.ravel())), theta, np.zeros(0))[2:].reshape(2, 3)
     np.testing.assert_allclose(np.reshape(rates, (3, 2)).T, augmented, rtol=1e-9)
     starts = [value(row) for row in shown.symbolic if row.name == "start"]
-    np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0_theta(theta), rtol=1e-9)
+    np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0(theta)[:, 1:], rtol=1e-9)
     outputs = [value(row) for row in shown.symbolic if row.name == "output"]
-    wanted = model.h_x(t, x, theta) @ S + model.h_theta(t, x, theta)
+    table = model.h(t, x, theta)
+    wanted = table[:, 1:3] @ S + table[:, 3:]
     np.testing.assert_allclose(outputs, wanted[0], rtol=1e-9)  # the other one is a state
 
 

@@ -1,0 +1,1 @@
+"""Identification: coefficients of models from harmonic tests, vibration modes and time records."""

@@ -1,0 +1,487 @@
+"""What must be known of a fit to time records before its numbers are used: a few checks, the worst first.
+
+A series is one output of one record; each is judged by itself, as outputs may have other units. What residuals
+may hold beside noise, an offset, a drift, hum or a wrong initial value, is a column c beside the sensitivities J:
+its part outside them, c⊥, takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares. So hum is looked for in a periodogram that
+gives back what the parameters have taken of a sinusoid, which beside a resonance is most of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.identify.combinations_records import combined
+from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.record_residuals import RTOL, Iterations, Problem, at
+from rotorid.identify.records import Record
+from rotorid.identify.simulate import STEPWISE, simulate
+from rotorid.regression import gain, least_squares, solution
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.normal_matrix import NormalMatrix, normal_matrix
+from rotorid.regression.prior import PriorEffect, effect
+from rotorid.regression.search import RCOND
+
+FEWEST, LAGS = 20, 10
+"""Samples below which nothing can be said of correlations; neighbours that are looked at."""
+UNEXPLAINED, FEW_UNEXPLAINED, LINE, MISFIT = 0.05, 0.2, 0.5, 4.0
+"""Shares of a series' variance in residuals that are not white, in too few of them to tell, and of these in a
+line of the spectrum, and χ² per degree of freedom, above which a record is not described."""
+CHANCE = 1e-6
+"""Probability below which residuals or what takes a share of them are no noise."""
+SHARE, FAR = 0.3, 5.0
+"""Of the variance, or standard deviations of a parameter: what a cause takes or moves if it is named."""
+HINT = (
+    "a local minimum or an unsuitable model; try other starting values, bounds, several starts or multiple "
+    "shooting. No intervals are given"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The estimate, without intervals where these would mislead (not `reliable`), and what was noticed."""
+
+    estimate: Estimate
+    reliable: bool
+    warnings: tuple[str, ...]
+    integration_change: FloatArray | None
+    autocorrelation: float | None
+    prior: PriorEffect | None
+    normal_matrix: NormalMatrix | None
+
+
+def judge(problem: Problem, path: Iterations, loss: str) -> Judgement:
+    """Look at convergence, bounds, rank, integration error and residuals of a fit."""
+    estimate, theta = path.estimate, path.estimate.solution
+    words = ["" if path.converged else f"{path.message}; no intervals are given"]
+    prior, matrix, change, local = None, None, None, ""
+    try:
+        r, J = problem.evaluate(theta)
+    except SimulationError as error:
+        words.append(f"the model cannot be simulated with the result: {error}")
+        return Judgement(
+            _widened(estimate, np.nan), False, tuple(filter(None, words)), None, None, None, None
+        )
+    r = estimate.residuals
+    matrix = normal_matrix(estimate.names, path.regression[0] if path.regression else J)
+    prior = effect(problem.prior, J, r, theta, stated=problem.stated, at_bounds=path.at_bounds)
+    if prior is not None:
+        if prior.alone:  # in the words of the nonlinear model, not of its tangents
+            alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=RCOND), theta, r)
+            prior = replace(prior, alone=combined(problem, alone)[0].describe_rank())
+        estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
+    poor = misfit(problem, estimate.dof, r, loss)
+    words.append(poor)
+    seen = None if poor else correlation(problem, r)
+    widening = 1.0 if seen is None else seen.widening
+    cause, wrong = causes(problem, theta, J, r) if path.converged and loss == "linear" else ("", False)
+    words += [cause, path.bound_warning]
+    if path.converged:
+        estimate, local = combined(problem, estimate)
+        words += [local, "" if estimate.full_rank or poor else estimate.describe_rank()]
+    words += [] if prior is None else prior.warnings
+    if loss == "linear" and not poor:
+        words += [_unequal_words(problem, estimate, J, r), "" if seen is None else seen.words()]
+        words.append(_against_stated(estimate))
+    change = _integration_change(problem, theta, J)
+    words += [_integration_words(estimate, change), _too_fast(problem, theta), _begins_later(problem)]
+    sound = path.converged and not poor and not wrong and not problem.prior.ridge
+    if not sound or widening > 1:
+        estimate = _widened(estimate, widening if sound else np.nan)
+    neighbours = correlation(problem, r)
+    return Judgement(
+        estimate,
+        sound and widening == 1,
+        tuple(filter(None, words)),
+        change,
+        neighbours and neighbours.neighbours,
+        prior,
+        matrix,
+    )
+
+
+def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
+    """Words where the model does not describe the record: intervals would be wrong."""
+    if not problem.data.any():
+        return "the record is zero throughout: a sensor without a signal?"
+    if dof <= 0 or rounding_only(problem, r):
+        return ""
+    if problem.stated:
+        ratio = float(r @ r) / dof
+        if loss == "linear" and ratio > MISFIT and _chance(float(r @ r), dof) < CHANCE:
+            return f"residuals are {np.sqrt(ratio):.2g} times as large as the stated errors explain: {HINT}"
+        return ""
+    for name, data, part in zip(
+        problem.series_names, problem.split(problem.data), problem.split(r), strict=True
+    ):
+        limit = 3 * 1.4826 * float(np.median(np.abs(part)))
+        kept = part if loss == "linear" else np.clip(part, -limit, limit)  # without outliers
+        share = float(kept @ kept) / max(float(np.sum((data - data.mean()) ** 2)), 1e-300)
+        left = f"the model leaves {100 * share:.2g} % of the variance of {name}"
+        if len(part) < FEWEST:
+            if share > FEW_UNEXPLAINED and len(part) > 2 and np.ptp(data) > 0:
+                return f"{left}, in too few samples to tell whether that is noise; if not, {HINT}"
+        elif _correlation([_unit(kept)]).probability < CHANCE:
+            if share > UNEXPLAINED:
+                return f"{left}, and not as noise: {HINT}"
+            power = np.abs(np.fft.rfft(kept - kept.mean())[1:]) ** 2
+            if np.convolve(power, np.ones(3), "same").max() > LINE * power.sum():
+                return f"{left}, most of it at one frequency: {HINT}; state the errors if it is interference"
+    return ""
+
+
+# -- correlated residuals
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Of residuals with those some samples later.
+
+    Attributes
+    ----------
+    neighbours
+        Of neighbouring samples.
+    probability
+        Of such correlations up to the tenth neighbour in white residuals (Box and Pierce 1970).
+    factor
+        How many times too narrow intervals are, about; 1 where the correlations do not widen them.
+    """
+
+    neighbours: float
+    probability: float
+    factor: float
+
+    @property
+    def widening(self) -> float:
+        """By what intervals are multiplied; 1 where the residuals may be white, or it does not matter."""
+        return self.factor if self.probability < 1e-4 and self.factor > 1.2 else 1.0
+
+    def words(self) -> str:
+        """A warning, or nothing."""
+        if not self.probability < 1e-4:
+            return ""
+        longer = f": intervals were made {self.widening:.2g} times as wide" if self.widening > 1 else ""
+        return (
+            "the residuals are not random: those of neighbouring samples are correlated "
+            f"({self.neighbours:.2f}, Durbin–Watson {2 - 2 * self.neighbours:.2f}){longer}. Either the noise "
+            "is, or the model does not quite describe the record, or this is a local minimum (try several "
+            "starts)"
+        )
+
+
+def correlation(problem: Problem, r: FloatArray) -> Correlation | None:
+    """Over all series, each in its own unit; None where there is nothing to say."""
+    if len(r) < FEWEST or rounding_only(problem, r):
+        return None
+    return _correlation([_unit(part) for part in problem.split(r)])
+
+
+def rounding_only(problem: Problem, r: FloatArray) -> bool:
+    """Whether nothing but rounding is left."""
+    return bool(np.linalg.norm(r) <= 1e-7 * np.linalg.norm(problem.data))
+
+
+def _correlation(parts: list[FloatArray]) -> Correlation:
+    total = sum(float(part @ part) for part in parts)
+    if total == 0:
+        return Correlation(0.0, 1.0, 1.0)
+    lags = range(1, 1 + min(LAGS, max(1, min(len(part) for part in parts) // 5)))
+    rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) / total for k in lags])
+    first = float(rho[0])
+    # of correlations that fade as fast as the first one says
+    factor = float(np.sqrt((1 + first) / (1 - first))) if 0 < first < 1 else 1.0
+    return Correlation(first, _chance(sum(map(len, parts)) * float(rho @ rho), len(rho)), factor)
+
+
+def _unit(part: FloatArray) -> FloatArray:
+    return part / (float(np.sqrt(np.mean(part**2))) or 1.0)
+
+
+def _chance(chi_square: float, dof: int) -> float:
+    """Probability of a larger χ²."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(dof, chi_square))
+
+
+# -- causes
+
+
+def causes(problem: Problem, theta: FloatArray, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
+    """Words about what residuals point at, and whether intervals without it would be wrong.
+
+    Parameters
+    ----------
+    problem, theta
+        What was fitted, and the minimum (n,).
+    J, r
+        Sensitivities (m, n) and residuals (m,) there.
+    """
+    if rounding_only(problem, r) or len(r) < FEWEST:
+        return "", False
+    seen, G = correlation(problem, r), gain(J, rcond=RCOND)
+    candidates = _hum(problem, J, r)
+    if seen is not None and seen.probability < 1e-2:
+        candidates += [*_offset_and_drift(problem), *_initial_values(problem, theta)]
+    tested = [_tested(problem, J, G, r, *candidate) for candidate in candidates]
+    named = sorted((one for one in tested if one is not None), reverse=True)
+    named = [one for one in named if one[0] > 0.9 * named[0][0]]  # as good as the best
+    if not named:
+        return "", False
+    wrong, moved = all(shift > FAR for _, shift, _ in named), max(shift for _, shift, _ in named)
+    which = "; or ".join(words for *_, words in named)
+    share = 100 * named[0][0] / float(r @ r)
+    off = f", and move a parameter by {moved:.2g} standard deviations" if moved > 1 else ""
+    end = ". No intervals are given" if wrong else ""
+    return f"{which}: that would take {share:.2g} % of the residuals' variance{off}{end}", wrong
+
+
+def _tested(
+    problem: Problem, J: FloatArray, G: FloatArray, r: FloatArray, C: FloatArray, words: str, alone: bool
+) -> tuple[float, float, str] | None:
+    """What columns (m, q) take of the residuals, how far they move a parameter, and words.
+
+    None for what chance may give, what the parameters give, and beside what is no noise if it has to be alone.
+    G is the gain of J: J G y is what the parameters take of y.
+    """
+    from scipy.special import chdtrc, fdtrc
+
+    size = np.maximum(np.linalg.norm(C, axis=0), 1e-300)
+    C = C / size
+    outside = C - J @ (G @ C)
+    q, free = C.shape[1], len(r) - round(float(np.sum(G.T * J))) - C.shape[1]
+    if free < 3 or np.linalg.norm(outside, axis=0).min() < 1e-6 or np.linalg.cond(outside) > 1e8:
+        return None
+    amount = solution(outside, -r)
+    rest = r + outside @ amount
+    taken, left = float(r @ r - rest @ rest), correlation(problem, rest)
+    spread = float(rest @ rest) / free * (1.0 if left is None else left.factor**2)
+    spread = max(spread, 1.0 if problem.stated else 1e-300)
+    probability = chdtrc(q, taken / spread) if problem.stated else fdtrc(q, free, taken / spread / q)
+    # a line beside others is rather a vibration that the model does not describe
+    if not probability < CHANCE or (alone and left and left.probability < CHANCE):
+        return None
+    move, error = G @ (C @ amount), np.sqrt(spread * (G**2).sum(axis=1))
+    shift = float(np.max(np.abs(move) / np.maximum(error, 1e-300)))
+    if taken < SHARE * float(r @ r) and shift < FAR:
+        return None
+    return taken, shift, words.format(amount[0] / size[0])
+
+
+Candidate = tuple[FloatArray, str, bool]
+"""Columns (m, q), what to do ({0}: size of the first), and whether only noise may be left."""
+
+
+def _series_columns(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """Times of the rows (m, 1), and a constant of each series (m, g)."""
+    t = problem.vector([np.tile(x.t[:, None], len(problem.model.outputs)) for x in problem.records])
+    w = problem.vector([np.ones_like(data) for data in problem.measured])
+    which = np.repeat(np.arange(len(problem.series)), [*problem.series.values()])
+    return (t / w)[:, None], (which[:, None] == np.arange(len(problem.series))) * w[:, None]
+
+
+def _offset_and_drift(problem: Problem) -> Iterator[Candidate]:
+    t, series = _series_columns(problem)
+    yield series, "the residuals have an offset (estimate it: [nuisance] offset = true)", False
+    yield series * t, "the residuals drift (estimate it: [nuisance] drift = true)", False
+
+
+def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> list[Candidate]:
+    """The frequency of a sinusoid that takes most of a series' residuals, with all parameters free."""
+    t, series = _series_columns(problem)
+    Q = np.linalg.svd(J, full_matrices=False)[0]
+    best, frequency, span = 0.0, 0.0, 1.0
+    for column in series.T:
+        rows = column != 0
+        n, times = int(rows.sum()), t[rows, 0]
+        if n < FEWEST:
+            continue
+        even = np.linspace(times[0], times[-1], n)
+        parts = np.column_stack([r, Q])[rows] * column[rows, None]
+        waves = np.fft.rfft([np.interp(even, times, part) for part in parts.T], 4 * n)[:, 4:]
+        (c, s), (a, b) = (waves[0].real, waves[0].imag), (waves[1:].real, waves[1:].imag)
+        half = float(column[rows] @ column[rows]) / 2
+        cc, ss, cs = half - (a * a).sum(axis=0), half - (b * b).sum(axis=0), -(a * b).sum(axis=0)
+        det = cc * ss - cs**2
+        power = np.where(det > 1e-3 * half**2, (ss * c**2 - 2 * cs * c * s + cc * s**2) / det, 0.0)
+        if power.max() > best * float(r @ r):
+            best, span = float(power.max() / (r @ r)), float(times[-1] - times[0])
+            frequency = (4 + int(np.argmax(power))) / (4 * n) * (n - 1) / span
+    if best == 0:
+        return []
+    for mains in (50.0, 60.0):
+        whole = mains * max(1, round(frequency / mains))
+        frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
+    phase = 2 * np.pi * frequency * t
+    words = (
+        f"the residuals hum with {frequency:.5g} Hz (if that is interference, estimate it: "
+        f"[nuisance] hum_Hz = {frequency:.5g})"
+    )
+    return [(np.hstack([series * np.cos(phase), series * np.sin(phase)]), words, True)]
+
+
+def _initial_values(problem: Problem, theta: FloatArray) -> Iterator[Candidate]:
+    """Known initial values, each of every record by itself."""
+    n = len(theta)
+    for number, (model, record) in enumerate(zip(problem.models, problem.records, strict=True)):
+        if not model.known_initial:
+            continue
+        try:
+            start = np.concatenate([theta, model.x0(theta)[:, 0]])
+            run = simulate(
+                model.with_free_start, start, record, integrator=problem.integrator, rtol=problem.rtol
+            )
+        except SimulationError:
+            continue
+        where = f" of {record.name}" if len(problem.records) > 1 else ""
+        for i in model.known_initial:
+            tables = [np.zeros_like(data) for data in problem.measured]
+            tables[number] = run.y_theta[:, :, n + i]
+            column, name = problem.vector(tables)[:, None], model.states[i]
+            words = (
+                f"the residuals contradict the initial value {start[n + i]:.4g} of {name}{where}, about "
+                f"{start[n + i]:.6g} + ({{0:.3g}}) would suit them (estimate it: [initial] {name} = "
+                f'"{name}_0", with {name}_0 in [estimate])'
+            )
+            if column.any():
+                yield column, words, False
+
+
+# -- errors of the outputs
+
+
+def output_errors(problem: Problem, r: FloatArray, n_parameters: int) -> dict[str, float]:
+    """Standard deviation of each output from its residuals; none where only rounding is left."""
+    if rounding_only(problem, r):
+        return {}
+    squares: dict[str, FloatArray] = {}
+    for (_, name), part in zip(problem.series, problem.split(problem.plain(r)), strict=True):
+        squares[name] = np.append(squares.get(name, ()), part**2)
+    share = 1 - min(n_parameters / len(r), 0.9)
+    errors = {name: float(np.sqrt(part.mean() / share)) for name, part in squares.items()}
+    least = 1e-6 * max(errors.values())  # an output that is met exactly would count for everything
+    return {name: max(size, least) for name, size in errors.items()}
+
+
+def _unequal_words(problem: Problem, estimate: Estimate, J: FloatArray, r: FloatArray) -> str:
+    """Where series differ (Bartlett 1937): the covariance would be Σ s_g² G_g G_gᵀ, G = J⁺."""
+    parts = problem.split(r)
+    counts = np.array([len(part) for part in parts], dtype=float)
+    freedom = counts * (1 - J.shape[1] / counts.sum())
+    if problem.stated or len(parts) < 2 or (freedom < 4).any() or rounding_only(problem, r):
+        return ""
+    variances = np.array([float(part @ part) for part in parts]) / freedom
+    pooled, k = float(freedom @ variances / freedom.sum()), len(parts) - 1
+    test = freedom.sum() * np.log(pooled) - float(freedom @ np.log(np.maximum(variances, 1e-300)))
+    test /= 1 + (np.sum(1 / freedom) - 1 / freedom.sum()) / (3 * k)
+    if variances.max() < 1.5**2 * variances.min() or _chance(float(test), k) > 1e-3:
+        return ""
+    each = np.repeat(np.sqrt(variances), counts.astype(int))
+    sizes = ", ".join(
+        f"{name} {part[0]:.2g}"
+        for name, part in zip(problem.series_names, problem.split(problem.plain(each)), strict=True)
+    )
+    words = f"the outputs have different errors ({sizes}), but the intervals hold for equal ones"
+    if estimate.full_rank and estimate.std is not None and np.isfinite(estimate.std).all():
+        ratio = np.sqrt(((gain(J, rcond=RCOND) * each) ** 2).sum(axis=1)) / estimate.std
+        words += f"; with their own they would be {ratio.min():.2g} to {ratio.max():.2g} times as wide"
+    return f"{words}. With --sigma auto precise outputs count for more"
+
+
+def _against_stated(estimate: Estimate) -> str:
+    """Whether the residuals are as large as stated errors let one expect."""
+    chi_square, dof = estimate.chi_square, estimate.dof
+    if not estimate.errors_stated or dof <= 0 or chi_square is None:
+        return ""
+    ratio, chance = np.sqrt(chi_square / dof), _chance(chi_square, dof)
+    if chance < 1e-3:
+        return (
+            f"residuals are {ratio:.2g} times as large as the stated errors explain: intervals are too "
+            "narrow, or the model does not quite describe the record"
+        )
+    if chance > 1 - CHANCE and ratio < 0.7:
+        return f"residuals are only {ratio:.2g} times as large as the stated errors: these are too large"
+    return ""
+
+
+# -- the integration and the times
+
+
+def _integration_change(problem: Problem, theta: FloatArray, J: FloatArray) -> FloatArray | None:
+    """Change of the parameters at a tighter tolerance (n,); None where the solution is exact."""
+    integrator = problem.runs[0].integrator
+    if integrator in ("expm", "none"):
+        return None
+    r, rtol = problem.residual(theta), max(problem.rtol / 100, 1e-13)
+    finer = problem.again("auto", RTOL) if integrator in STEPWISE else problem.again(problem.integrator, rtol)
+    missed = r - finer.residual(theta)
+    if not np.linalg.norm(missed) > 1e-14 * np.linalg.norm(problem.data):
+        return np.zeros(len(theta))
+    K = problem.prior.below(J)
+    change: FloatArray = solution(K, np.append(missed, np.zeros(len(K) - len(J))), rcond=RCOND)
+    return change
+
+
+def _integration_words(estimate: Estimate, change: FloatArray | None) -> str:
+    if change is None:
+        return ""
+    unknown = np.full(len(change), np.nan)
+    std = unknown if estimate.std is None else estimate.std
+    limit = np.maximum(1e-8 * np.abs(estimate.solution), 0.1 * np.nan_to_num(std))
+    words = [
+        f"{name} by about {c:.2g}" + ("" if np.isnan(s) else f" (standard deviation {s:.2g})")
+        for name, c, s, most in zip(estimate.names, change, std, limit, strict=True)
+        if abs(c) > most
+    ]
+    return f"a more accurate integration would change {', '.join(words)}" if words else ""
+
+
+def _too_fast(problem: Problem, theta: FloatArray) -> str:
+    """Words where a model vibrates faster than its samples can tell."""
+    for model, record, run, u in zip(
+        problem.models, problem.records, problem.runs, problem.inputs, strict=True
+    ):
+        if len(record) > 2 and model.states:
+            fastest = _fastest(model, record, theta, run.x[0], u[0])
+            step = float(np.median(np.diff(record.t)))
+            if fastest * step > np.pi:
+                return (
+                    f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
+                    f"({np.pi / step:.4g} rad/s): slower vibrations may describe the record as well. Are the "
+                    "times in seconds, and not in ms?"
+                )
+    return ""
+
+
+def _fastest(model: OdeModel, record: Record, theta: FloatArray, x: FloatArray, u: FloatArray) -> float:
+    """Largest angular frequency of small vibrations about the first states, rad/s."""
+    A = model.f(float(record.t[0]), x, theta, u)[:, 1 : 1 + len(x)]
+    return float(np.abs(np.linalg.eigvals(A).imag).max()) if np.isfinite(A).all() else 0.0
+
+
+def _begins_later(problem: Problem) -> str:
+    """Ask where the known initial values belong, if the record does not begin at 0."""
+    model, late = problem.model, [record for record in problem.records if record.t[0] != 0]
+    if model.t0 is not None or not late or not model.known_initial:
+        return ""
+    return (
+        f"{late[0].name} begins at t = {late[0].t[0]:.6g} s, and the initial values were put there: state "
+        'where they belong, t0 = 0 in [initial] (the time 0) or t0 = "first" (the first time of each record)'
+    )
+
+
+def _widened(estimate: Estimate, factor: float) -> Estimate:
+    """With standard deviations so many times as large; NaN: without any."""
+    square = None if np.isnan(factor) else factor**2
+    covariances = [
+        None if square is None or C is None else C * square
+        for C in (estimate.covariance, estimate.solution_covariance)
+    ]
+    curved = estimate.curved and tuple(
+        replace(one, std=None if square is None or one.std is None else one.std * factor)
+        for one in estimate.curved
+    )
+    return replace(estimate, covariance=covariances[0], solution_covariance=covariances[1], curved=curved)

@@ -1,0 +1,194 @@
+"""Quasilinearization after Bellman and Kalaba, as [Q] describes it.
+
+About the last trajectory x_s(t) and parameters θ_s the equations are linear, [Q] (2.17),
+
+    dx/dt = f + f_x (x − x_s) + f_θ (θ − θ_s),    x = G θ + D,                             (2.18)
+    dG/dt = f_x G + f_θ,    dD/dt = f − f_θ θ_s + f_x (D − x_s),    G θ + D = x0(θ) at t0,   (2.21)–(2.24)
+
+and θ follows from linear least squares, M θ = Y with M = Σ (h_x G)ᵀ(h_x G) (2.28); x is the next trajectory.
+It need not solve the equations until the end, which is what makes the method forgiving. D + G θ_s is
+integrated here in place of D, which is the same, and keeps the digits of θ − θ_s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
+from rotorid.identify.integrators import HEUN, heun_step
+from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, at, negligible
+from rotorid.identify.records import Record, inputs_of
+from rotorid.identify.sensitivity_steps import ending, quality, stop
+
+FINER = 4
+"""Points of a trajectory from sample to sample; of the schemes of `HEUN` one."""
+
+
+def quasilinearization(
+    problem: Problem,
+    start: FloatArray,
+    trajectories: Sequence[FloatArray],
+    *,
+    max_iterations: int,
+    epsilon: float | None,
+) -> Iterations:
+    """Iterate linear fits about the last trajectory until neither it nor the parameters change.
+
+    Parameters
+    ----------
+    problem
+        Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
+        [Q] does; with any other the linear equations are solved by DOP853.
+    start
+        First parameters (n,).
+    trajectories
+        First states of each record at the times of `grid`.
+    max_iterations
+        Steps at most.
+    epsilon
+        As in `sensitivity_steps`.
+
+    Raises
+    ------
+    SimulationError
+        The linear equations have no finite solution with the starting values.
+    """
+    theta, states = start.copy(), list(trajectories)
+    every = FINER if problem.integrator not in HEUN else 1
+    records = [grid(record, every) for record in problem.records]
+    samples = [tuple(x[::every] for x in states)]
+    r = problem.vector(
+        [
+            model.h(record.t, x, theta, u)[..., 0] - data
+            for model, record, x, u, data in zip(
+                problem.models, problem.records, samples[0], problem.inputs, problem.measured, strict=True
+            )
+        ]
+    )
+    if not np.isfinite(r).all():
+        raise SimulationError("the starting trajectory is beyond all bounds; start from another one")
+    history, costs, integrals = [theta], [problem.cost(r, theta)], [quality(problem, r)]
+    steps: list[FloatArray] = []
+    fitted = None
+    converged, message, ended = False, f"not converged in {counted(max_iterations, 'iteration')}", None
+    for count in range(1, max_iterations + 1):
+        try:
+            if not np.isfinite(theta).all():
+                raise SimulationError("the parameters grow beyond all bounds")
+            tables = [
+                linear_solutions(model, theta, record, x, problem.integrator)
+                for model, record, x in zip(problem.models, records, states, strict=True)
+            ]
+            K, Y = linear_rows(problem, theta, [x[::every] for x in states], [w[::every] for w in tables])
+            fitted = problem.linear_fit(K, Y, theta)
+        except SimulationError as error:
+            if fitted is None:
+                raise
+            message = f"quasilinearization diverged after {counted(count - 1, 'iteration')}: {error}"
+            break
+        steps.append(fitted.solution)
+        theta = theta + steps[-1]
+        before, states = states, [table @ np.append(1.0, steps[-1]) for table in tables]
+        history.append(theta)
+        samples.append(tuple(x[::every] for x in states))
+        costs.append(problem.cost(fitted.residuals, theta))
+        integrals.append(quality(problem, fitted.residuals))
+        moved = max((_change(a, b) for a, b in zip(before, states, strict=True)), default=0.0)
+        # quadratic convergence: the next step is smaller than this one by more than this one than the last
+        size = [float(np.abs(each).max()) for each in steps[-2:]]
+        next_step = steps[-1] * (min(1.0, size[-1] / max(size[0], 1e-300)) if len(size) > 1 else 1.0)
+        ended = stop(steps[-1], negligible(next_step, theta, fitted, (1e-9, 1e-5)), epsilon, integrals[-1])
+        near = (1e-8, 1e-5) if epsilon is None else (1e-6, 0.1)
+        converged = bool(ended) and moved < 1e-3 and negligible(next_step, theta, fitted, near)
+        if ended and (converged or epsilon is not None):
+            message = ending(ended, count, epsilon, converged)
+            break
+        ended = None
+    assert fitted is not None
+    r = problem.residual(theta)
+    if not np.isfinite(r).all():
+        converged, message, r = False, "not converged: the states diverge", -fitted.residuals
+    return Iterations(
+        at(fitted, theta, r),
+        np.array(history),
+        np.array(costs),
+        converged,
+        message,
+        trajectories=tuple(samples),
+        integrals=tuple(integrals),
+        regression=(K, Y + K @ history[-2]),
+        stopped_by=ended,
+    )
+
+
+def linear_solutions(
+    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, integrator: str
+) -> FloatArray:
+    """[D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), about the states (n, n_x) and θ_s."""
+    from scipy.integrate import solve_ivp
+    from scipy.interpolate import CubicSpline
+
+    t, n = record.t, len(model.states)
+    first = model.x0(theta)
+    if not n or len(t) == 1:
+        return np.broadcast_to(first, (len(t), *first.shape))
+
+    def rate(table: FloatArray, x: FloatArray, w: FloatArray) -> FloatArray:
+        """Of W (…, n_x, 1 + n_p), from [f f_x f_θ] at x."""
+        bend = table[:, 1 : 1 + n] @ w + np.delete(table, np.s_[1 : 1 + n], axis=1)
+        bend[:, 0] -= table[:, 1 : 1 + n] @ x
+        return bend
+
+    if integrator in HEUN:
+        tables, parts = model.f(t, x, theta, inputs_of(model, record)), HEUN[integrator](n)
+        W = np.empty((len(t), *first.shape))
+        W[0] = w = first
+        for i, h in enumerate(np.diff(t)):
+            W[i + 1] = w = heun_step(lambda j, w: rate(tables[j], x[j], w), i, i + 1, w, h, parts)
+    else:
+        curve, columns = CubicSpline(t, x), [record.inputs[name] for name in model.inputs]
+
+        def rates(time: float, w: FloatArray) -> FloatArray:
+            u, now = np.array([np.interp(time, t, column) for column in columns]), curve(time)
+            return rate(model.f(time, now, theta, u), now, w.reshape(first.shape)).reshape(-1)
+
+        size = 1e-3 + np.abs(x).max()
+        run = solve_ivp(rates, t[[0, -1]], first.ravel(), "DOP853", t, rtol=1e-10, atol=1e-12 * size)
+        W = run.y.T.reshape(-1, *first.shape) if run.success else np.full((1, 1), np.nan)
+    if not np.isfinite(W).all():
+        raise SimulationError(
+            "the linearised equations have no finite solution; start from another trajectory"
+        )
+    return W
+
+
+def linear_rows(
+    problem: Problem, theta: FloatArray, states: Sequence[FloatArray], tables: Sequence[FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Rows K (θ − θ_s) = Y of the samples, from states and `linear_solutions` there; M θ = Y is Kᵀ of it."""
+    slopes, left = [], []
+    parts = zip(problem.models, problem.records, problem.inputs, problem.measured, strict=True)
+    for (model, record, u, data), x, W in zip(parts, states, tables, strict=True):
+        outputs = model.h(record.t, x, theta, u)
+        C = outputs[..., 1 : 1 + x.shape[1]]
+        left.append(data - outputs[..., 0] - (C @ (W[..., 0] - x)[..., None])[..., 0])
+        slopes.append(C @ W[..., 1:] + outputs[..., 1 + x.shape[1] :])
+    K, Y = problem.vector(slopes), problem.vector(left)
+    if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
+        raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")
+    return K, Y
+
+
+def grid(record: Record, every: int) -> Record:
+    """The times of a record and others between them, with its inputs."""
+    t = np.interp(np.arange(every * (len(record) - 1) + 1) / every, np.arange(len(record)), record.t)
+    inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
+    return Record(t, {}, inputs, None, record.name)
+
+
+def _change(before: FloatArray, after: FloatArray) -> float:
+    return float(np.abs(after - before).max(initial=0.0)) / max(float(np.abs(after).max(initial=0.0)), 1e-300)
