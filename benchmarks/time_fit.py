@@ -34,7 +34,6 @@ from benchmarks.timing import Row, best_of, once, relative_difference
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
-from rotorid.timedomain.integration import taylor
 from rotorid.identify.ode import OdeModel, ode_model
 from rotorid.identify.records import Record
 
@@ -123,7 +122,7 @@ def measured(model: OdeModel, rates: Rates, truth: list[float]) -> Record:
     """The exact record over 20 s with errors of 1e-3."""
     from scipy.integrate import solve_ivp
 
-    t, start = np.linspace(0.0, 20.0, 201), model.x0(model.start)
+    t, start = np.linspace(0.0, 20.0, 201), model.x0(model.start)[:, 0]
     found = solve_ivp(
         rates, (0.0, 20.0), start, t_eval=t, args=(np.array(truth),), method="DOP853", rtol=1e-12, atol=1e-12
     )
@@ -177,7 +176,7 @@ def with_lmfit(model: OdeModel, record: Record, rates: Rates, rtol: float) -> np
     import lmfit
     from scipy.integrate import solve_ivp
 
-    start, names = model.x0(model.start), model.parameters
+    start, names = model.x0(model.start)[:, 0], model.parameters
     measured = np.array([record.outputs[name] for name in model.outputs])
 
     def residual(parameters: Any) -> np.ndarray:
@@ -206,7 +205,7 @@ class WithCasadi:
             "run", "cvodes", {"x": x, "p": theta, "ode": rates}, 0.0, record.t[1:], options
         )
         p = casadi.MX.sym("p", 3)
-        start = model.x0(model.start)
+        start = model.x0(model.start)[:, 0]
         states = casadi.horzcat(casadi.DM(start), run(x0=start, p=p)["xf"])
         measured = np.array([record.outputs[name] for name in model.outputs])
         residual = casadi.vec(states - measured)

@@ -8,6 +8,7 @@ high-order Taylor methods for astrodynamics and celestial mechanics", MNRAS 504 
 from __future__ import annotations
 
 import warnings
+from importlib.util import find_spec
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -56,9 +57,7 @@ def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, 
         raise ValueError(f"rtol must be between 1e-14 and 1, not {rtol:g}")
     samples = len(system.t)
     if integrator == "taylor":
-        if system.model not in _COMPILED:
-            _COMPILED[system.model] = _Taylor(system.model)
-        table = _COMPILED[system.model](system)
+        table = _compiled(system.model)(system)
         if table is not None:
             return table, "taylor"
         integrator = "dop853"  # says why
@@ -68,6 +67,26 @@ def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, 
         except TooManySteps:
             integrator = "lsoda"
     return _solve(system, integrator, rtol, max(MAX_STEPS[integrator], 10 * samples)), integrator
+
+
+def worth_compiling(model: OdeModel, steps: int) -> bool:
+    """Whether heyoka knows the model, and a fit by solutions of so many steps takes longer than compiling.
+
+    Both were measured: compiling takes as long as a fit whose solutions have size² steps, about.
+    """
+    size = len(model.states) * (1 + len(model.parameters))
+    if not 0 < size**2 <= steps or find_spec("heyoka") is None:
+        return False
+    try:
+        return _compiled(model) is not None
+    except ValueError:
+        return False
+
+
+def _compiled(model: OdeModel) -> _Taylor:
+    if model not in _COMPILED:
+        _COMPILED[model] = _Taylor(model)
+    return _COMPILED[model]
 
 
 def diverged(model: OdeModel, time: float, state: int, value: str) -> SimulationError:
@@ -107,6 +126,7 @@ def _solve(system: System, name: str, rtol: float, budget: int) -> FloatArray:
                 if (budget := budget - 1) < 0:
                     raise TooManySteps(_too_many(name, float(solver.t), float(t[-1])))
                 solver.step()
+                system.steps += 1
                 _check(system, solver)
                 last = max(last, float(solver.step_size))
                 running = solver.status == "running"

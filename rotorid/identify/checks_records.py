@@ -32,6 +32,8 @@ UNEXPLAINED, FEW_UNEXPLAINED, LINE, MISFIT = 0.05, 0.2, 0.5, 4.0
 line of the spectrum, and χ² per degree of freedom, above which a record is not described."""
 CHANCE = 1e-6
 """Probability below which residuals or what takes a share of them are no noise."""
+PEAK = 10.0
+"""Height of a peak of the periodogram over the noise that is worth a test."""
 SHARE, FAR = 0.3, 5.0
 """Of the variance, or standard deviations of a parameter: what a cause takes or moves if it is named."""
 HINT = (
@@ -117,8 +119,10 @@ def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
     for name, data, part in zip(
         problem.series_names, problem.split(problem.data), problem.split(r), strict=True
     ):
-        limit = 3 * 1.4826 * float(np.median(np.abs(part)))
-        kept = part if loss == "linear" else np.clip(part, -limit, limit)  # without outliers
+        kept = part
+        if loss != "linear":  # without outliers
+            limit = 3 * 1.4826 * float(np.median(np.abs(part)))
+            kept = np.clip(part, -limit, limit)
         share = float(kept @ kept) / max(float(np.sum((data - data.mean()) ** 2)), 1e-300)
         left = f"the model leaves {100 * share:.2g} % of the variance of {name}"
         if len(part) < FEWEST:
@@ -222,10 +226,10 @@ def causes(problem: Problem, theta: FloatArray, J: FloatArray, r: FloatArray) ->
     """
     if rounding_only(problem, r) or len(r) < FEWEST:
         return "", False
-    seen, G = correlation(problem, r), gain(J, rcond=RCOND)
-    candidates = _hum(problem, J, r)
+    seen, candidates = correlation(problem, r), _hum(problem, J, r)
     if seen is not None and seen.probability < 1e-2:
         candidates += [*_offset_and_drift(problem), *_initial_values(problem, theta)]
+    G = gain(J, rcond=RCOND) if candidates else J.T
     tested = [_tested(problem, J, G, r, *candidate) for candidate in candidates]
     named = sorted((one for one in tested if one is not None), reverse=True)
     named = [one for one in named if one[0] > 0.9 * named[0][0]]  # as good as the best
@@ -310,7 +314,7 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> list[Candidate]:
         if power.max() > best * float(r @ r):
             best, span = float(power.max() / (r @ r)), float(times[-1] - times[0])
             frequency = (4 + int(np.argmax(power))) / (4 * n) * (n - 1) / span
-    if best == 0:
+    if best < 2 * PEAK / len(r):  # (c⊥ᵀr)² over the mean square of the residuals is χ² of noise
         return []
     for mains in (50.0, 60.0):
         whole = mains * max(1, round(frequency / mains))
@@ -413,7 +417,7 @@ def _against_stated(estimate: Estimate) -> str:
 def _integration_change(problem: Problem, theta: FloatArray, J: FloatArray) -> FloatArray | None:
     """Change of the parameters at a tighter tolerance (n,); None where the solution is exact."""
     integrator = problem.runs[0].integrator
-    if integrator in ("expm", "none"):
+    if integrator in ("expm", "taylor", "none"):
         return None
     r, rtol = problem.residual(theta), max(problem.rtol / 100, 1e-13)
     finer = problem.again("auto", RTOL) if integrator in STEPWISE else problem.again(problem.integrator, rtol)

@@ -14,13 +14,14 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
+from rotorid.base.suggestions import one_of
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
 from rotorid.identify.integrators import HEUN
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.quasilinearization import FINER, grid, quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
-from rotorid.identify.records import Record, for_copies, recorded_starts
+from rotorid.identify.records import Record, for_copies, inputs_of, recorded_starts
 from rotorid.identify.result_records import Fit, Minimum
 from rotorid.identify.sensitivity_steps import sensitivity_steps
 from rotorid.identify.shooting import measured_states, shoot
@@ -113,7 +114,7 @@ def fit(  # noqa: PLR0913
     [1.003] True
     """
     several = (records,) if isinstance(records, Record) else tuple(records)
-    _check(model, several, method, integrator, loss, starts, max_iterations, tolerance, weigh)
+    _check(model, several, method, integrator, loss, starts, trajectory, max_iterations, tolerance, weigh)
     problem = Problem(model, several, integrator, rtol)
     limits, names = problem.model.bounds, problem.model.parameters
     given = recorded_starts(model, problem.records) | for_copies(model, len(several), start or {})
@@ -129,25 +130,13 @@ def fit(  # noqa: PLR0913
             first = [_trajectory(problem, theta, k, trajectory) for k in range(len(several))]
             return quasilinearization(problem, theta, first, max_iterations=max_iterations, epsilon=tolerance)
         if method == "multiple-shooting":
-            states = [measured_states(problem, theta, k) for k in range(len(several))]
-            first_theta = shoot(problem, theta, states, limits)
-            return minimum(problem, first_theta, limits, loss, max_iterations).after(theta[None])
+            return minimum(problem, _shot(problem, theta), limits, loss, max_iterations).after(theta[None])
         return minimum(problem, theta, limits, loss, max_iterations)
 
     begins = spread_starts(begin, limits, starts or 1, seed)
     paths, more = _searched(search, problem, begins), ""
-    alone = starts is None and method == "levenberg-marquardt" and paths[0].converged
-    if alone and _astray(problem, paths[0], loss):
-        others = spread_starts(begin, limits, OTHERS, seed)[1:]
-        shot = _searched(lambda p, theta: _shot(p, theta, limits, loss, max_iterations), problem, [begin], [])
-        paths += shot + _searched(search, problem, others, [])
-        if _cost(problem, paths[0]) > BETTER * min(_cost(problem, path) for path in paths):
-            more = (
-                "from the starting values the search ends where the model does not describe the record; this "
-                f"is from another of {counted(len(paths), 'start')} (--start names better ones)"
-            )
-        else:
-            del paths[1:]
+    if starts is None and method == "levenberg-marquardt" and _astray(problem, paths[0], loss):
+        paths, more = _from_elsewhere(problem, begin, paths[0], search, seed)
     path = min(paths, key=lambda path: _cost(problem, path))
     minima = _merged(problem, paths) if starts and starts > 1 else ()
     if weigh:
@@ -264,37 +253,51 @@ def _searched(
 
 
 def _astray(problem: Problem, path: Iterations, loss: str) -> bool:
-    return bool(misfit(problem, path.estimate.dof, path.estimate.residuals, loss))
+    """Whether the model at a minimum does not describe the record."""
+    return path.converged and bool(misfit(problem, path.estimate.dof, path.estimate.residuals, loss))
 
 
-def _shot(
-    problem: Problem, theta: FloatArray, limits: FloatArray, loss: str, max_iterations: int
-) -> Iterations:
+def _from_elsewhere(
+    problem: Problem, begin: FloatArray, first: Iterations, search: Searching, seed: int
+) -> tuple[list[Iterations], str]:
+    """A better minimum than the first, from pieces that join or from other starts, and words; or the first."""
+
+    def shot(problem: Problem, theta: FloatArray) -> Iterations:
+        return search(problem, _shot(problem, theta)).after(theta[None])
+
+    others = spread_starts(begin, problem.model.bounds, OTHERS, seed)[1:]
+    paths = [first, *_searched(shot, problem, [begin], []), *_searched(search, problem, others, [])]
+    best = min(paths, key=lambda path: _cost(problem, path))
+    if _cost(problem, first) <= BETTER * _cost(problem, best):
+        return [first], ""
+    return [best], (
+        "from the starting values the search ends where the model does not describe the record; this is from "
+        f"another of {counted(len(paths), 'start')} (--start names better ones)"
+    )
+
+
+def _shot(problem: Problem, theta: FloatArray) -> FloatArray:
     states = [measured_states(problem, theta, k) for k in range(len(problem.records))]
-    first = shoot(problem, theta, states, limits)
-    return minimum(problem, first, limits, loss, max_iterations).after(theta[None])
+    return shoot(problem, theta, states, problem.model.bounds)
 
 
-def _trajectory(problem: Problem, theta: FloatArray, number: int, kind: Trajectories) -> FloatArray:
-    """States to begin quasilinearization with, at the times of `grid`."""
+def _trajectory(
+    problem: Problem, theta: FloatArray, number: int, kind: Trajectories
+) -> tuple[FloatArray, FloatArray]:
+    """States to begin quasilinearization with, at the times of `grid`, and their slopes."""
     model, record = problem.models[number], problem.records[number]
     finer = grid(record, FINER if problem.integrator not in HEUN else 1)
     if kind == "model":
-        run = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False)
-        return run.x
+        x = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False).x
+        return x, model.f(finer.t, x, theta, inputs_of(model, finer))[..., 0]
     if isinstance(kind, str):
-        if kind != "data":
-            raise ValueError(f"no starting trajectory {kind!r}: it is 'model', 'data', or given by state")
         states = measured_states(problem, theta, number)
-    elif set(kind) != set(model.states):
-        raise ValueError(
-            f"a starting trajectory needs every state ({', '.join(model.states)}); got {', '.join(kind)}"
-        )
     else:
         columns = [np.broadcast_to(np.asarray(kind[x], dtype=float), record.t.shape) for x in model.states]
-        states = np.stack(columns, axis=-1)
+        states = np.array(columns).reshape(-1, len(record)).T
     columns = [np.interp(finer.t, record.t, column) for column in states.T]
-    return np.array(columns).reshape(-1, len(finer)).T
+    x = np.array(columns).reshape(-1, len(finer)).T
+    return x, np.gradient(x, finer.t, axis=0) if len(finer) > 1 else np.zeros_like(x)
 
 
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
@@ -351,6 +354,7 @@ def _check(  # noqa: PLR0913
     integrator: str,
     loss: str,
     starts: int | None,
+    trajectory: Trajectories,
     max_iterations: int,
     tolerance: float | None,
     weigh: bool,
@@ -362,6 +366,12 @@ def _check(  # noqa: PLR0913
             "file"
         )
     find(METHODS, method, "method")
+    if isinstance(trajectory, str):
+        one_of(trajectory, "trajectory", ("model", "data"))
+    elif set(trajectory) != set(model.states):
+        raise ValueError(
+            f"a starting trajectory needs every state ({', '.join(model.states)}); got {', '.join(trajectory)}"
+        )
     if method in OF_TEXTS and loss != "linear":
         raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":

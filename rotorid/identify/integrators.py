@@ -55,6 +55,8 @@ class System:
         table = model.x0(theta)[:, : 1 + self.np]
         self.first = np.concatenate([table[:, 0], table[:, 1:].reshape(-1)])
         """States and sensitivities at the first time."""
+        self.steps = 0
+        """Of an integration with error control."""
 
     def inputs(self, time: float) -> FloatArray:
         """Inputs at a time, (n_u,)."""
@@ -109,11 +111,11 @@ def exact(system: System) -> FloatArray:
         P, D = expm_and_derivatives(h * matrix[0], h[:, None] * matrix[1 + moving])
         if len(h) > 1:
             P, D = P[place], D[place]
-        x[part] = _recurrence(P[:, :n, :n], x[low], P[:, :n, n:] @ w)
+        x[part] = recurrence(P[:, :n, :n], x[low], P[:, :n, n:] @ w)
         z = np.concatenate([x[low : low + len(w)], w], axis=1)
         bend = np.zeros((len(w), n, k))
         bend[:, :, moving] = (D[:, :, :n] @ z[:, None])[..., 0].swapaxes(1, 2)
-        s[part] = _recurrence(P[:, :n, :n], s[low], bend)
+        s[part] = recurrence(P[:, :n, :n], s[low], bend)
     return np.concatenate([x[:, :, 0], s.reshape(len(t), -1)], axis=1)
 
 
@@ -151,7 +153,7 @@ def expm_and_derivatives(matrix: FloatArray, direction: FloatArray) -> tuple[Flo
     return whole[..., 0, :n, :n], whole[..., :n, n:] / scale
 
 
-def _recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
+def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
     """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k), by doubling spans; P (n, m, m), or one for all."""
     y = push.copy()
     y[0] += P[0] @ first

@@ -18,20 +18,20 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
-from rotorid.identify.integrators import HEUN, heun_step
+from rotorid.identify.integrators import HEUN, heun_step, recurrence
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, at, negligible
 from rotorid.identify.records import Record, inputs_of
 from rotorid.identify.sensitivity_steps import ending, quality, stop
 
-FINER = 4
+FINER = 3
 """Points of a trajectory from sample to sample; of the schemes of `HEUN` one."""
 
 
 def quasilinearization(
     problem: Problem,
     start: FloatArray,
-    trajectories: Sequence[FloatArray],
+    trajectories: Sequence[tuple[FloatArray, FloatArray]],
     *,
     max_iterations: int,
     epsilon: float | None,
@@ -42,11 +42,11 @@ def quasilinearization(
     ----------
     problem
         Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
-        [Q] does; with any other the linear equations are solved by DOP853.
+        [Q] does; with any other the linear equations are solved by a step of DOP853 from point to point.
     start
         First parameters (n,).
     trajectories
-        First states of each record at the times of `grid`.
+        First states (n, n_x) of each record at the times of `grid`, and their slopes.
     max_iterations
         Steps at most.
     epsilon
@@ -60,7 +60,7 @@ def quasilinearization(
     theta, states = start.copy(), list(trajectories)
     every = FINER if problem.integrator not in HEUN else 1
     records = [grid(record, every) for record in problem.records]
-    samples = [tuple(x[::every] for x in states)]
+    samples = [tuple(x[::every] for x, _ in states)]
     r = problem.vector(
         [
             model.h(record.t, x, theta, u)[..., 0] - data
@@ -80,10 +80,10 @@ def quasilinearization(
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
             tables = [
-                linear_solutions(model, theta, record, x, problem.integrator)
+                linear_solutions(model, theta, record, *x, problem.integrator)
                 for model, record, x in zip(problem.models, records, states, strict=True)
             ]
-            K, Y = linear_rows(problem, theta, [x[::every] for x in states], [w[::every] for w in tables])
+            K, Y = linear_rows(problem, theta, samples[-1], [W[::every] for W, _ in tables])
             fitted = problem.linear_fit(K, Y, theta)
         except SimulationError as error:
             if fitted is None:
@@ -92,12 +92,13 @@ def quasilinearization(
             break
         steps.append(fitted.solution)
         theta = theta + steps[-1]
-        before, states = states, [table @ np.append(1.0, steps[-1]) for table in tables]
+        weights = np.append(1.0, steps[-1])
+        states = [(W @ weights, rates @ weights) for W, rates in tables]
         history.append(theta)
-        samples.append(tuple(x[::every] for x in states))
+        samples.append(tuple(x[::every] for x, _ in states))
         costs.append(problem.cost(fitted.residuals, theta))
         integrals.append(quality(problem, fitted.residuals))
-        moved = max((_change(a, b) for a, b in zip(before, states, strict=True)), default=0.0)
+        moved = max((_change(*pair) for pair in zip(*samples[-2:], strict=True)), default=0.0)
         # quadratic convergence: the next step is smaller than this one by more than this one than the last
         size = [float(np.abs(each).max()) for each in steps[-2:]]
         next_step = steps[-1] * (min(1.0, size[-1] / max(size[0], 1e-300)) if len(size) > 1 else 1.0)
@@ -126,44 +127,50 @@ def quasilinearization(
 
 
 def linear_solutions(
-    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, integrator: str
-) -> FloatArray:
-    """[D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), about the states (n, n_x) and θ_s."""
-    from scipy.integrate import solve_ivp
-    from scipy.interpolate import CubicSpline
+    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, slopes: FloatArray, integrator: str
+) -> tuple[FloatArray, FloatArray]:
+    """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), and dW/dt.
 
-    t, n = record.t, len(model.states)
+    About θ_s and the states (n, n_x) with their slopes. DOP853 takes one step from time to time, all of them at
+    once, from 1 and from 0: W is then P W + q of the time before.
+    """
+    from scipy.integrate import DOP853
+    from scipy.interpolate import CubicHermiteSpline
+
+    t, n, u = record.t, len(model.states), inputs_of(model, record)
     first = model.x0(theta)
     if not n or len(t) == 1:
-        return np.broadcast_to(first, (len(t), *first.shape))
+        W = np.broadcast_to(first, (len(t), *first.shape))
+        return W, np.zeros_like(W)
 
-    def rate(table: FloatArray, x: FloatArray, w: FloatArray) -> FloatArray:
-        """Of W (…, n_x, 1 + n_p), from [f f_x f_θ] at x."""
-        bend = table[:, 1 : 1 + n] @ w + np.delete(table, np.s_[1 : 1 + n], axis=1)
-        bend[:, 0] -= table[:, 1 : 1 + n] @ x
-        return bend
+    def linear(t: FloatArray, x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A and B of dW/dt = A W + B."""
+        table = model.f(t, x, theta, u)
+        A, B = table[..., 1 : 1 + n], np.delete(table, np.s_[1 : 1 + n], axis=-1)
+        B[..., 0] -= (A @ x[..., None])[..., 0]
+        return A, B
 
+    A, B = linear(t, x, u)
     if integrator in HEUN:
-        tables, parts = model.f(t, x, theta, inputs_of(model, record)), HEUN[integrator](n)
-        W = np.empty((len(t), *first.shape))
+        W, parts = np.empty((len(t), *first.shape)), HEUN[integrator](n)
         W[0] = w = first
         for i, h in enumerate(np.diff(t)):
-            W[i + 1] = w = heun_step(lambda j, w: rate(tables[j], x[j], w), i, i + 1, w, h, parts)
+            W[i + 1] = w = heun_step(lambda j, w: A[j] @ w + B[j], i, i + 1, w, h, parts)
     else:
-        curve, columns = CubicSpline(t, x), [record.inputs[name] for name in model.inputs]
-
-        def rates(time: float, w: FloatArray) -> FloatArray:
-            u, now = np.array([np.interp(time, t, column) for column in columns]), curve(time)
-            return rate(model.f(time, now, theta, u), now, w.reshape(first.shape)).reshape(-1)
-
-        size = 1e-3 + np.abs(x).max()
-        run = solve_ivp(rates, t[[0, -1]], first.ravel(), "DOP853", t, rtol=1e-10, atol=1e-12 * size)
-        W = run.y.T.reshape(-1, *first.shape) if run.success else np.full((1, 1), np.nan)
+        h, curve = np.diff(t)[:, None, None], CubicHermiteSpline(t, x, slopes)
+        begin, rates = np.eye(n, n + first.shape[1]), np.zeros((12, len(t) - 1, n, n + first.shape[1]))
+        for j, (weights, c) in enumerate(zip(DOP853.A, DOP853.C, strict=True)):
+            at = t[:-1] + c * h[:, 0, 0]
+            between, load = linear(at, curve(at), u[:-1] + c * np.diff(u, axis=0))
+            rates[j] = between @ (begin + h * np.tensordot(weights[:j], rates[:j], 1))
+            rates[j, :, :, n:] += load
+        end = begin + h * np.tensordot(DOP853.B, rates, 1)
+        W = np.concatenate([first[None], recurrence(end[..., :n], first, end[..., n:])])
     if not np.isfinite(W).all():
         raise SimulationError(
             "the linearised equations have no finite solution; start from another trajectory"
         )
-    return W
+    return W, A @ W + B
 
 
 def linear_rows(

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.identify.adaptive_steps import worth_compiling
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.records import Record, from_t0, inputs_of, models_of
 from rotorid.identify.simulate import Trajectory, simulate
@@ -120,6 +121,8 @@ class Problem:
         self._last: tuple[bytes, FloatArray, FloatArray] | None = None
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
+        self.quick = integrator
+        """That of the evaluations: after the first one "taylor" where that is worth compiling."""
 
     @property
     def scaled(self) -> bool:
@@ -178,18 +181,28 @@ class Problem:
         if self._last is None or self._last[0] != key:
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
-            runs = [
-                simulate(model, theta, record, integrator=self.integrator, rtol=self.rtol)
-                for model, record in zip(self.models, self.records, strict=True)
-            ]
-            r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
-            J = self.vector([run.y_theta for run in runs])
-            if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
-                raise SimulationError(
-                    "the outputs of the model, or their sensitivities, are beyond all bounds"
-                )
+            runs, r, J = self._evaluated(theta)
+            if self._last is None and self.quick == "auto" and len({*self.models}) == 1:
+                if worth_compiling(self.model, sum(run.steps for run in runs)):
+                    self.quick = "taylor"
+                    again = self._evaluated(theta)
+                    if np.abs(again[1] - r).max() <= 1e-7 * (np.abs(r) + np.abs(self.data)).max():
+                        runs, r, J = again
+                    else:
+                        self.quick = "dop853"
             self._last, self.runs = (key, r, J), tuple(runs)
         return self._last[1], self._last[2]
+
+    def _evaluated(self, theta: FloatArray) -> tuple[list[Trajectory], FloatArray, FloatArray]:
+        runs = [
+            simulate(model, theta, record, integrator=self.quick, rtol=self.rtol)
+            for model, record in zip(self.models, self.records, strict=True)
+        ]
+        r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
+        J = self.vector([run.y_theta for run in runs])
+        if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
+            raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
+        return runs, r, J
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""

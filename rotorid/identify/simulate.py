@@ -35,6 +35,8 @@ class Trajectory:
         Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
     integrator
         The one used: "none" without states.
+    steps
+        Of "dop853" or "lsoda".
     """
 
     t: FloatArray
@@ -43,6 +45,7 @@ class Trajectory:
     y: FloatArray
     y_theta: FloatArray
     integrator: str
+    steps: int = 0
 
 
 @np.errstate(all="ignore")  # what is not finite is looked for
@@ -88,12 +91,13 @@ def simulate(
         )
     whole = from_t0(model, given)
     t, u, n = whole.t, inputs_of(model, whole), len(model.states)
-    size, used = n * (1 + sensitivities * len(values)), "none"
+    size, used, steps = n * (1 + sensitivities * len(values)), "none", 0
     table = np.zeros((len(t), 0))
     if n:
         system = System(model, values, t, u, sensitivities)
         _check(model, t[:1], system.first[None])
         table, used = integrate(system, rtol)
+        steps = system.steps
         _check(model, t, table)
     x, S = table[:, :n], table[:, n:size].reshape(len(t), n, -1) if sensitivities and n else None
     if S is None:
@@ -109,7 +113,7 @@ def simulate(
             "the output"
         )
     late = len(t) - len(given)
-    return Trajectory(t[late:], x[late:], S[late:], y[late:], y_theta[late:], used)
+    return Trajectory(t[late:], x[late:], S[late:], y[late:], y_theta[late:], used, steps)
 
 
 def simulated_record(

@@ -62,16 +62,20 @@ RATES = {"x": "v", "v": "-a*x - b*x**3 - 0.1*v"}
 
 
 def test_fits_are_the_same_with_and_without(monkeypatch):
-    t = np.linspace(0.0, 10.0, 101)
+    t = np.linspace(0.0, 30.0, 301)
     truth = simulate(model_of(RATES), [1.0, 0.5, 0.2], t, sensitivities=False).x
     noise = 1e-3 * np.random.default_rng(0).standard_normal(truth.shape)
     record = Record(t, dict(zip(("x", "v"), (truth + noise).T, strict=True)))
-    slow, quick = fit(model_of(RATES), record), fit(model_of(RATES), record, integrator="taylor")
+    slow, quick = (fit(model_of(RATES), record, integrator=name) for name in ("dop853", "taylor"))
     assert (slow.integrator, quick.integrator) == ("dop853", "taylor")
+    assert fit(model_of(RATES), record).integrator == "taylor"  # by itself, where that is quicker
     np.testing.assert_allclose(quick.values, slow.values, rtol=1e-8)
     np.testing.assert_allclose(quick.std, slow.std, rtol=1e-6)
     assert quick.warnings == slow.warnings
     monkeypatch.setitem(__import__("sys").modules, "heyoka", None)
+    monkeypatch.setattr("rotorid.identify.adaptive_steps.find_spec", lambda name: None)
+    without = fit(model_of(RATES), record)
+    np.testing.assert_array_equal(without.values, slow.values)
     with pytest.raises(ValueError, match=r"needs the extra: pip install rotorid\[fast\]"):
         fit(model_of(RATES), record, integrator="taylor")
 
