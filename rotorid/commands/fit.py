@@ -51,8 +51,8 @@ class FitOptions:
     max_iterations : N from 1
         At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
     tolerance : X
-        ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β), the
-        sum of squares times Δt, is below it; default: where no step matters.
+        ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β),
+        the sum of squares times Δt, is below it; default: where no step matters.
     trajectory : model|data
         Where quasilinearization begins: the model's own solution (default), or the measured outputs.
     rtol : X
@@ -99,7 +99,7 @@ class RecordFit(Found):
     model: str = ""
 
     def table_file(self, path: Path) -> bytes:
-        """Parameters; with the methods of the texts every iteration, in a workbook the states of each, too."""
+        """Parameters; of the methods of the texts every iteration, in a workbook the states of each, too."""
         from rotorid.base.tables import csv, excel
 
         iterations = self.found.tables()

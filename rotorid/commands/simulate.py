@@ -136,10 +136,10 @@ def simulate(
     files = [Path(given) for given in (model, options.input_record) if isinstance(given, Path | str)]
     with phase("simulation"):
         solve = _amplitudes if way in ("frequencies", "modes") else _record
-        values, columns, about, notes = solve(model, options, noisy)
+        values, told, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
     about += "" if options.digits is None else f", {counted(options.digits, 'significant digit')}"
-    columns = tuple(Column(each.name, each.values, each.shown or str) for each in columns)
+    columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in told)
     first, *others = columns
     blocks = [(first, *others[k : k + BESIDE]) for k in range(0, len(others), BESIDE)]
     listed = listing((f"{name} = {value:g}" for name, value in values.items()), "and")

@@ -1,8 +1,8 @@
 """Integration with error control, in a bounded number of steps: scipy's, and Taylor series by heyoka.
 
 Absolute tolerances follow the size that each state and sensitivity has had so far. heyoka belongs to the
-extra `rotorid[fast]`; a model is compiled once, which takes a second or two. Source: Biscani and Izzo, "Revisiting
-high-order Taylor methods for astrodynamics and celestial mechanics", MNRAS 504 (2021) 2614.
+extra `rotorid[fast]`; a model is compiled once, which takes a second or two. Source: Biscani and Izzo,
+"Revisiting high-order Taylor methods for astrodynamics and celestial mechanics", MNRAS 504 (2021) 2614.
 """
 
 from __future__ import annotations

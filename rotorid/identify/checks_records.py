@@ -1,23 +1,23 @@
 """What must be known of a fit to time records before its numbers are used: a few checks, the worst first.
 
-A series is one output of one record; each is judged by itself, as outputs may have other units. What residuals
-may hold beside noise, an offset, a drift, hum or a wrong initial value, is a column c beside the sensitivities J:
-its part outside them, c⊥, takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares. So hum is looked for in a periodogram that
-gives back what the parameters have taken of a sinusoid, which beside a resonance is most of it.
+A series is one output of one record; each is judged by itself, as outputs may have other units. What
+residuals may hold beside noise, an offset, a drift, hum or a wrong initial value, is a column c beside the
+sensitivities J: its part outside them, c⊥, takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares. So hum is looked for
+in a periodogram that gives back what the parameters have taken of a sinusoid, beside a resonance most of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.combinations_records import combined
-from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.ode import SimulationError
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem, at
-from rotorid.identify.records import Record
 from rotorid.identify.simulate import STEPWISE, simulate
 from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Estimate
@@ -59,49 +59,42 @@ def judge(problem: Problem, path: Iterations, loss: str) -> Judgement:
     """Look at convergence, bounds, rank, integration error and residuals of a fit."""
     estimate, theta = path.estimate, path.estimate.solution
     words = ["" if path.converged else f"{path.message}; no intervals are given"]
-    prior, matrix, change, local = None, None, None, ""
     try:
-        r, J = problem.evaluate(theta)
+        _, J = problem.evaluate(theta)
     except SimulationError as error:
         words.append(f"the model cannot be simulated with the result: {error}")
-        return Judgement(
-            _widened(estimate, np.nan), False, tuple(filter(None, words)), None, None, None, None
-        )
-    r = estimate.residuals
-    matrix = normal_matrix(estimate.names, path.regression[0] if path.regression else J)
+        return Judgement(_widened(estimate, None), False, tuple(filter(None, words)), None, None, None, None)
+    r, linear = estimate.residuals, loss == "linear"
     prior = effect(problem.prior, J, r, theta, stated=problem.stated, at_bounds=path.at_bounds)
     if prior is not None:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
             alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=RCOND), theta, r)
             prior = replace(prior, alone=combined(problem, alone)[0].describe_rank())
         estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
-    poor = misfit(problem, estimate.dof, r, loss)
-    words.append(poor)
-    seen = None if poor else correlation(problem, r)
-    widening = 1.0 if seen is None else seen.widening
-    cause, wrong = causes(problem, theta, J, r) if path.converged and loss == "linear" else ("", False)
-    words += [cause, path.bound_warning]
+    poor, seen = misfit(problem, estimate.dof, r, loss), correlation(problem, r)
+    cause, wrong = causes(problem, theta, J, r) if path.converged and linear else ("", False)
+    change = _integration_change(problem, theta, J)
+    words += [_integration_words(estimate, change), poor, cause, path.bound_warning]
     if path.converged:
         estimate, local = combined(problem, estimate)
         words += [local, "" if estimate.full_rank or poor else estimate.describe_rank()]
     words += [] if prior is None else prior.warnings
-    if loss == "linear" and not poor:
-        words += [_unequal_words(problem, estimate, J, r), "" if seen is None else seen.words()]
+    if not poor:
+        words += [_unequal_words(problem, r) if linear else "", _correlated_words(seen)]
         words.append(_against_stated(estimate))
-    change = _integration_change(problem, theta, J)
-    words += [_integration_words(estimate, change), _too_fast(problem, theta), _begins_later(problem)]
+    words += [_too_fast(problem, theta), _begins_later(problem)]
     sound = path.converged and not poor and not wrong and not problem.prior.ridge
+    widening = 1.0 if seen is None else seen.widening
     if not sound or widening > 1:
-        estimate = _widened(estimate, widening if sound else np.nan)
-    neighbours = correlation(problem, r)
+        estimate = _widened(estimate, widening if sound else None)
     return Judgement(
-        estimate,
-        sound and widening == 1,
-        tuple(filter(None, words)),
-        change,
-        neighbours and neighbours.neighbours,
-        prior,
-        matrix,
+        estimate=estimate,
+        reliable=sound and widening == 1,
+        warnings=tuple(filter(None, words)),
+        integration_change=change,
+        autocorrelation=seen and seen.neighbours,
+        prior=prior,
+        normal_matrix=normal_matrix(estimate.names, path.regression[0] if path.regression else J),
     )
 
 
@@ -128,7 +121,7 @@ def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
         if len(part) < FEWEST:
             if share > FEW_UNEXPLAINED and len(part) > 2 and np.ptp(data) > 0:
                 return f"{left}, in too few samples to tell whether that is noise; if not, {HINT}"
-        elif _correlation([_unit(kept)]).probability < CHANCE:
+        elif _correlation([kept]).probability < CHANCE:
             if share > UNEXPLAINED:
                 return f"{left}, and not as noise: {HINT}"
             power = np.abs(np.fft.rfft(kept - kept.mean())[1:]) ** 2
@@ -140,18 +133,11 @@ def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
 # -- correlated residuals
 
 
-@dataclass(frozen=True)
-class Correlation:
+class Correlation(NamedTuple):
     """Of residuals with those some samples later.
 
-    Attributes
-    ----------
-    neighbours
-        Of neighbouring samples.
-    probability
-        Of such correlations up to the tenth neighbour in white residuals (Box and Pierce 1970).
-    factor
-        How many times too narrow intervals are, about; 1 where the correlations do not widen them.
+    Of neighbours, the probability of such correlations up to the tenth neighbour in white residuals (Box and
+    Pierce 1970), and how many times too narrow intervals are, with correlations that fade as the first.
     """
 
     neighbours: float
@@ -163,24 +149,12 @@ class Correlation:
         """By what intervals are multiplied; 1 where the residuals may be white, or it does not matter."""
         return self.factor if self.probability < 1e-4 and self.factor > 1.2 else 1.0
 
-    def words(self) -> str:
-        """A warning, or nothing."""
-        if not self.probability < 1e-4:
-            return ""
-        longer = f": intervals were made {self.widening:.2g} times as wide" if self.widening > 1 else ""
-        return (
-            "the residuals are not random: those of neighbouring samples are correlated "
-            f"({self.neighbours:.2f}, Durbin–Watson {2 - 2 * self.neighbours:.2f}){longer}. Either the noise "
-            "is, or the model does not quite describe the record, or this is a local minimum (try several "
-            "starts)"
-        )
-
 
 def correlation(problem: Problem, r: FloatArray) -> Correlation | None:
     """Over all series, each in its own unit; None where there is nothing to say."""
     if len(r) < FEWEST or rounding_only(problem, r):
         return None
-    return _correlation([_unit(part) for part in problem.split(r)])
+    return _correlation(problem.split(r))
 
 
 def rounding_only(problem: Problem, r: FloatArray) -> bool:
@@ -188,20 +162,25 @@ def rounding_only(problem: Problem, r: FloatArray) -> bool:
     return bool(np.linalg.norm(r) <= 1e-7 * np.linalg.norm(problem.data))
 
 
-def _correlation(parts: list[FloatArray]) -> Correlation:
-    total = sum(float(part @ part) for part in parts)
-    if total == 0:
-        return Correlation(0.0, 1.0, 1.0)
+def _correlation(series: list[FloatArray]) -> Correlation:
+    parts = [part / (float(np.sqrt(np.mean(part**2))) or 1.0) for part in series]
+    total, size = sum(float(part @ part) for part in parts), sum(map(len, parts))
     lags = range(1, 1 + min(LAGS, max(1, min(len(part) for part in parts) // 5)))
-    rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) / total for k in lags])
+    rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) for k in lags]) / (total or 1.0)
     first = float(rho[0])
-    # of correlations that fade as fast as the first one says
     factor = float(np.sqrt((1 + first) / (1 - first))) if 0 < first < 1 else 1.0
-    return Correlation(first, _chance(sum(map(len, parts)) * float(rho @ rho), len(rho)), factor)
+    return Correlation(first, _chance(size * float(rho @ rho), len(rho)), factor)
 
 
-def _unit(part: FloatArray) -> FloatArray:
-    return part / (float(np.sqrt(np.mean(part**2))) or 1.0)
+def _correlated_words(seen: Correlation | None) -> str:
+    if seen is None or not seen.probability < 1e-4:
+        return ""
+    longer = f": intervals were made {seen.widening:.2g} times as wide" if seen.widening > 1 else ""
+    return (
+        "the residuals are not random: those of neighbouring samples are correlated "
+        f"({seen.neighbours:.2f}, Durbin–Watson {2 - 2 * seen.neighbours:.2f}){longer}. Either the noise is, "
+        "or the model does not quite describe the record, or this is a local minimum (try several starts)"
+    )
 
 
 def _chance(chi_square: float, dof: int) -> float:
@@ -248,8 +227,8 @@ def _tested(
 ) -> tuple[float, float, str] | None:
     """What columns (m, q) take of the residuals, how far they move a parameter, and words.
 
-    None for what chance may give, what the parameters give, and beside what is no noise if it has to be alone.
-    G is the gain of J: J G y is what the parameters take of y.
+    None for what chance may give, what the parameters give, and beside what is no noise if it has to be
+    alone. G is the gain of J: J G y is what the parameters take of y.
     """
     from scipy.special import chdtrc, fdtrc
 
@@ -370,11 +349,11 @@ def output_errors(problem: Problem, r: FloatArray, n_parameters: int) -> dict[st
     return {name: max(size, least) for name, size in errors.items()}
 
 
-def _unequal_words(problem: Problem, estimate: Estimate, J: FloatArray, r: FloatArray) -> str:
-    """Where series differ (Bartlett 1937): the covariance would be Σ s_g² G_g G_gᵀ, G = J⁺."""
+def _unequal_words(problem: Problem, r: FloatArray) -> str:
+    """Where series differ (Bartlett 1937)."""
     parts = problem.split(r)
     counts = np.array([len(part) for part in parts], dtype=float)
-    freedom = counts * (1 - J.shape[1] / counts.sum())
+    freedom = counts * (1 - len(problem.model.parameters) / counts.sum())
     if problem.stated or len(parts) < 2 or (freedom < 4).any() or rounding_only(problem, r):
         return ""
     variances = np.array([float(part @ part) for part in parts]) / freedom
@@ -383,16 +362,12 @@ def _unequal_words(problem: Problem, estimate: Estimate, J: FloatArray, r: Float
     test /= 1 + (np.sum(1 / freedom) - 1 / freedom.sum()) / (3 * k)
     if variances.max() < 1.5**2 * variances.min() or _chance(float(test), k) > 1e-3:
         return ""
-    each = np.repeat(np.sqrt(variances), counts.astype(int))
-    sizes = ", ".join(
-        f"{name} {part[0]:.2g}"
-        for name, part in zip(problem.series_names, problem.split(problem.plain(each)), strict=True)
+    scale = [part[0] for part in problem.split(problem.plain(np.ones(len(r))))]
+    sizes = zip(problem.series_names, np.sqrt(variances) * scale, strict=True)
+    return (
+        f"the outputs have different errors ({', '.join(f'{name} {size:.2g}' for name, size in sizes)}), but "
+        "the intervals hold for equal ones. With --sigma auto precise outputs count for more"
     )
-    words = f"the outputs have different errors ({sizes}), but the intervals hold for equal ones"
-    if estimate.full_rank and estimate.std is not None and np.isfinite(estimate.std).all():
-        ratio = np.sqrt(((gain(J, rcond=RCOND) * each) ** 2).sum(axis=1)) / estimate.std
-        words += f"; with their own they would be {ratio.min():.2g} to {ratio.max():.2g} times as wide"
-    return f"{words}. With --sigma auto precise outputs count for more"
 
 
 def _against_stated(estimate: Estimate) -> str:
@@ -444,26 +419,19 @@ def _integration_words(estimate: Estimate, change: FloatArray | None) -> str:
 
 
 def _too_fast(problem: Problem, theta: FloatArray) -> str:
-    """Words where a model vibrates faster than its samples can tell."""
-    for model, record, run, u in zip(
-        problem.models, problem.records, problem.runs, problem.inputs, strict=True
-    ):
-        if len(record) > 2 and model.states:
-            fastest = _fastest(model, record, theta, run.x[0], u[0])
-            step = float(np.median(np.diff(record.t)))
-            if fastest * step > np.pi:
-                return (
-                    f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
-                    f"({np.pi / step:.4g} rad/s): slower vibrations may describe the record as well. Are the "
-                    "times in seconds, and not in ms?"
-                )
-    return ""
-
-
-def _fastest(model: OdeModel, record: Record, theta: FloatArray, x: FloatArray, u: FloatArray) -> float:
-    """Largest angular frequency of small vibrations about the first states, rad/s."""
-    A = model.f(float(record.t[0]), x, theta, u)[:, 1 : 1 + len(x)]
-    return float(np.abs(np.linalg.eigvals(A).imag).max()) if np.isfinite(A).all() else 0.0
+    """Words where small vibrations about the first states are faster than samples can tell."""
+    model, record, n = problem.model, problem.records[0], len(problem.model.states)
+    A = model.f(record.t[0], problem.runs[0].x[0], theta, problem.inputs[0][0])[:, 1 : 1 + n]
+    if len(record) < 3 or not n or not np.isfinite(A).all():
+        return ""
+    fastest, step = np.abs(np.linalg.eigvals(A).imag).max(), np.median(np.diff(record.t))
+    if fastest * step <= np.pi:
+        return ""
+    return (
+        f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
+        f"({np.pi / step:.4g} rad/s): slower vibrations may describe the record as well. Are the times in "
+        "seconds, and not in ms?"
+    )
 
 
 def _begins_later(problem: Problem) -> str:
@@ -477,15 +445,15 @@ def _begins_later(problem: Problem) -> str:
     )
 
 
-def _widened(estimate: Estimate, factor: float) -> Estimate:
-    """With standard deviations so many times as large; NaN: without any."""
-    square = None if np.isnan(factor) else factor**2
-    covariances = [
-        None if square is None or C is None else C * square
-        for C in (estimate.covariance, estimate.solution_covariance)
-    ]
-    curved = estimate.curved and tuple(
-        replace(one, std=None if square is None or one.std is None else one.std * factor)
-        for one in estimate.curved
+def _widened(estimate: Estimate, factor: float | None) -> Estimate:
+    """With standard deviations so many times as large; None: without any."""
+
+    def wider(value: Any, power: int = 1) -> Any:  # noqa: ANN401 - a number or an array
+        return None if factor is None or value is None else value * factor**power
+
+    return replace(
+        estimate,
+        covariance=wider(estimate.covariance, 2),
+        solution_covariance=wider(estimate.solution_covariance, 2),
+        curved=estimate.curved and tuple(replace(one, std=wider(one.std)) for one in estimate.curved),
     )
-    return replace(estimate, covariance=covariances[0], solution_covariance=covariances[1], curved=curved)

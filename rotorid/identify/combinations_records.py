@@ -1,8 +1,8 @@
 """What records determine of a model in time where they do not determine every parameter, in words.
 
-The outputs depend on the parameters by the coefficients of the equations alone: in dx/dt = −(a + b) x + g h u these
-are a + b and g h. A coefficient, or a product or quotient of two, is determined where its gradient stands in the row
-space of the sensitivities J, here and at other values beside these, so that it is no chance of the place.
+The outputs depend on the parameters by the coefficients of the equations alone: in dx/dt = −(a + b) x + g h u
+these are a + b and g h. A coefficient, or a product or quotient of two, is determined where its gradient
+stands in the row space of the sensitivities, here and at other values, so that it is no chance of the place.
 """
 
 from __future__ import annotations

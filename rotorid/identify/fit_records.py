@@ -260,7 +260,7 @@ def _astray(problem: Problem, path: Iterations, loss: str) -> bool:
 def _from_elsewhere(
     problem: Problem, begin: FloatArray, first: Iterations, search: Searching, seed: int
 ) -> tuple[list[Iterations], str]:
-    """A better minimum than the first, from pieces that join or from other starts, and words; or the first."""
+    """A better minimum than the first, from pieces that join or other starts, and words; or the first."""
 
     def shot(problem: Problem, theta: FloatArray) -> Iterations:
         return search(problem, _shot(problem, theta)).after(theta[None])
@@ -297,7 +297,7 @@ def _trajectory(
         states = np.array(columns).reshape(-1, len(record)).T
     columns = [np.interp(finer.t, record.t, column) for column in states.T]
     x = np.array(columns).reshape(-1, len(finer)).T
-    return x, np.gradient(x, finer.t, axis=0) if len(finer) > 1 else np.zeros_like(x)
+    return x, np.asarray(np.gradient(x, finer.t, axis=0)) if len(finer) > 1 else np.zeros_like(x)
 
 
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
@@ -332,7 +332,9 @@ def _merged(problem: Problem, paths: Sequence[Iterations]) -> tuple[Minimum, ...
         else:
             kept.append((theta, reached, 1))
     names = problem.model.parameters
-    return tuple(Minimum(dict(zip(names, theta.tolist(), strict=True)), *rest) for theta, *rest in kept)
+    return tuple(
+        Minimum(dict(zip(names, theta.tolist(), strict=True)), least, count) for theta, least, count in kept
+    )
 
 
 def _start(model: OdeModel, given: Mapping[str, float]) -> FloatArray:
@@ -370,7 +372,8 @@ def _check(  # noqa: PLR0913
         one_of(trajectory, "trajectory", ("model", "data"))
     elif set(trajectory) != set(model.states):
         raise ValueError(
-            f"a starting trajectory needs every state ({', '.join(model.states)}); got {', '.join(trajectory)}"
+            f"a starting trajectory needs every state ({', '.join(model.states)}); got "
+            f"{', '.join(trajectory)}"
         )
     if method in OF_TEXTS and loss != "linear":
         raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")

@@ -131,8 +131,8 @@ def linear_solutions(
 ) -> tuple[FloatArray, FloatArray]:
     """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), and dW/dt.
 
-    About θ_s and the states (n, n_x) with their slopes. DOP853 takes one step from time to time, all of them at
-    once, from 1 and from 0: W is then P W + q of the time before.
+    About θ_s and the states (n, n_x) with their slopes. DOP853 takes one step from time to time, all of them
+    at once, from 1 and from 0: W is then P W + q of the time before.
     """
     from scipy.integrate import DOP853
     from scipy.interpolate import CubicHermiteSpline

@@ -182,14 +182,14 @@ class Problem:
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
             runs, r, J = self._evaluated(theta)
-            if self._last is None and self.quick == "auto" and len({*self.models}) == 1:
-                if worth_compiling(self.model, sum(run.steps for run in runs)):
-                    self.quick = "taylor"
-                    again = self._evaluated(theta)
-                    if np.abs(again[1] - r).max() <= 1e-7 * (np.abs(r) + np.abs(self.data)).max():
-                        runs, r, J = again
-                    else:
-                        self.quick = "dop853"
+            steps = sum(run.steps for run in runs) if self._last is None and self.quick == "auto" else 0
+            if len({*self.models}) == 1 and worth_compiling(self.model, steps):
+                self.quick = "taylor"
+                again = self._evaluated(theta)
+                if np.abs(again[1] - r).max() <= 1e-7 * (np.abs(r) + np.abs(self.data)).max():
+                    runs, r, J = again
+                else:
+                    self.quick = "dop853"
             self._last, self.runs = (key, r, J), tuple(runs)
         return self._last[1], self._last[2]
 

@@ -54,10 +54,10 @@ class Fit(Answered, Iterations):
         What was fitted to what: one model for each record, all with the same parameters.
     method, integrator, loss
         How; the integrator is the one that was used ("none": the model has no states).
-    history, costs, trajectories, integrals, stopped_by
+    history, costs, trajectories, integrals, regression, stopped_by
         Parameters at the start and after each iteration, (k + 1, n), half the sum of squared residuals at
-        each, the states of each record that quasilinearization went through, I(β) of the methods of the texts,
-        and what ended these.
+        each; of the methods of the texts the states of each record by iteration, I(β), K θ = Y of the last
+        one, and what ended them.
     converged, message, at_bounds
         Whether a minimum was reached, and in words; parameters that stand at a bound.
     estimate

@@ -140,8 +140,8 @@ def simulated_record(
 def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
     """Refuse states and sensitivities (n, size) that have diverged, with the time and the state."""
     n = len(model.states)
-    lost = ~(np.abs(table[:, :n]) < LARGEST)
-    unsure = ~np.isfinite(table[:, n:].reshape(len(t), n, -1)).all(axis=-1)
+    lost = np.logical_not(np.abs(table[:, :n]) < LARGEST)
+    unsure = np.logical_not(np.isfinite(table[:, n:].reshape(len(t), n, -1)).all(axis=-1))
     for i in np.flatnonzero((lost | unsure).any(axis=1))[:1]:
         j = int(np.argmax(lost[i] if lost[i].any() else unsure[i]))
         value = f"{table[i, j]:.3g}" if lost[i].any() else "not finite in its sensitivity to the parameters"

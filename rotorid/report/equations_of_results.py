@@ -153,7 +153,7 @@ def _(found: Fit) -> Equations:
 
 
 def _linear_about_last(found: Fit) -> Equations:
-    """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17), (2.21), (2.22), and M θ = Y of the last step, (2.28)."""
+    """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17)–(2.22), and M θ = Y of the last step, (2.28)."""
     model = found.model
     x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
     if model.inertia:

@@ -53,3 +53,12 @@ def test_the_algorithm_of_f_step_by_step():
     expected = as_f_prints(record, np.array([0.1, 11.0, 23.0]), found.iterations)
     np.testing.assert_allclose(found.history, expected, rtol=1e-9)
     assert found.history[-1] == pytest.approx([0.14, 12.0, 28.0], rel=1e-5)
+
+
+def test_the_printed_record_is_a_sample_that_is_read():
+    """What is intact of it, with gaps; by the printed method and integrator."""
+    model = read_ode_model(FOLDER / "three_masses" / "model.toml")
+    record = read_record(FOLDER / "three_masses" / "printed.csv", model, allow_missing=True)
+    assert sum(np.isfinite(column).sum() for column in record.outputs.values()) == 383
+    found = fit(model, record, method="gauss-newton", integrator="rk4")
+    assert found.values == pytest.approx([0.1399996, 11.999993, 28.000002], abs=6e-7)

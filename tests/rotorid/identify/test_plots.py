@@ -93,7 +93,7 @@ def test_residuals_stand_in_a_band_of_two_standard_deviations(result):
         axes = Figure().add_subplot()
         draw_residuals(found, "y2", axes)
         assert band(axes) == pytest.approx(size)
-        assert words(figure_fit(found).subfigs[0])[-1].endswith("± 2σ")
+        assert figure_fit(found).subfigs[0].legends[0].get_title().get_text().endswith("± 2σ")
 
 
 def test_parameters_have_their_intervals_in_percent_of_their_values(result):
