@@ -253,8 +253,9 @@ def _searched(
 
 
 def _astray(problem: Problem, path: Iterations, loss: str) -> bool:
-    """Whether the model at a minimum does not describe the record."""
-    return path.converged and bool(misfit(problem, path.estimate.dof, path.estimate.residuals, loss))
+    """Whether the model does not describe the record at a minimum, or where a long search gave up."""
+    over = path.converged or path.iterations > 20
+    return over and bool(misfit(problem, path.estimate.dof, path.estimate.residuals, loss))
 
 
 def _from_elsewhere(

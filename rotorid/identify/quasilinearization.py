@@ -61,16 +61,7 @@ def quasilinearization(
     every = FINER if problem.integrator not in HEUN else 1
     records = [grid(record, every) for record in problem.records]
     samples = [tuple(x[::every] for x, _ in states)]
-    r = problem.vector(
-        [
-            model.h(record.t, x, theta, u)[..., 0] - data
-            for model, record, x, u, data in zip(
-                problem.models, problem.records, samples[0], problem.inputs, problem.measured, strict=True
-            )
-        ]
-    )
-    if not np.isfinite(r).all():
-        raise SimulationError("the starting trajectory is beyond all bounds; start from another one")
+    r = problem.residual(theta)
     history, costs, integrals = [theta], [problem.cost(r, theta)], [quality(problem, r)]
     steps: list[FloatArray] = []
     fitted = None
