@@ -360,8 +360,8 @@ def _unequal_words(problem: Problem, r: FloatArray) -> str:
     if problem.stated or problem.errors or rounding_only(problem, r) or most < 2 * least:
         return ""
     return (
-        f"the outputs have different errors ({', '.join(f'{n} {size:.2g}' for n, size in sizes.items())}), but "
-        "the intervals hold for equal ones. With --sigma auto precise outputs count for more"
+        f"the outputs have different errors ({', '.join(f'{n} {size:.2g}' for n, size in sizes.items())}), "
+        "but the intervals hold for equal ones. With --sigma auto precise outputs count for more"
     )
 
 

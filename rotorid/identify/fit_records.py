@@ -19,9 +19,9 @@ from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
 from rotorid.identify.integrators import HEUN
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.quasilinearization import FINER, grid, quasilinearization
+from rotorid.identify.quasilinearization import FINER, quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
-from rotorid.identify.records import Record, for_copies, inputs_of, recorded_starts
+from rotorid.identify.records import Record, for_copies, inputs_of, recorded_starts, refined
 from rotorid.identify.result_records import Fit, Minimum
 from rotorid.identify.sensitivity_steps import sensitivity_steps
 from rotorid.identify.shooting import measured_states, shoot
@@ -285,9 +285,9 @@ def _shot(problem: Problem, theta: FloatArray) -> FloatArray:
 def _trajectory(
     problem: Problem, theta: FloatArray, number: int, kind: Trajectories
 ) -> tuple[FloatArray, FloatArray]:
-    """States to begin quasilinearization with, at the times of `grid`, and their slopes."""
+    """States to begin quasilinearization with, at the times of `refined`, and their slopes."""
     model, record = problem.models[number], problem.records[number]
-    finer = grid(record, FINER if problem.integrator not in HEUN else 1)
+    finer = refined(record, FINER if problem.integrator not in HEUN else 1)
     if kind == "model":
         x = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False).x
         return x, model.f(finer.t, x, theta, inputs_of(model, finer))[..., 0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, look, new_figure, plain
 from rotorid.base.text import counted
-from rotorid.identify.records import Record, record_names
+from rotorid.identify.records import record_names, refined
 from rotorid.identify.simulate import STEPWISE, simulate
 from rotorid.regression.interval_plot import ROOM, draw_intervals
 
@@ -55,12 +55,9 @@ def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
     curves = []
     for model, record, run in zip(result.models, result.records, result.simulations, strict=False):
         if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
-            t = np.unique(np.concatenate((record.t, np.linspace(record.t[0], record.t[-1], CURVE_POINTS))))
-            # a step that is rounding alone would be no step for an integrator
-            t = t[np.diff(t, prepend=-np.inf) > 1e-9 * max(1e-300, float(np.ptp(record.t)))]
-            inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
+            finer = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
             theta = result.estimate.solution
-            run = simulate(model, theta, Record(t, inputs=inputs), sensitivities=False)
+            run = simulate(model, theta, finer, sensitivities=False)
         curves.append(run)
     return tuple(curves)
 

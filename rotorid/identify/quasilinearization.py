@@ -20,9 +20,9 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.identify.integrators import HEUN, heun_step, recurrence
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, at, negligible
-from rotorid.identify.records import Record, inputs_of
-from rotorid.identify.sensitivity_steps import ending, quality, stop
+from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negligible
+from rotorid.identify.records import Record, inputs_of, refined
+from rotorid.identify.sensitivity_steps import Steps
 
 FINER = 3
 """Points of a trajectory from sample to sample; of the schemes of `HEUN` one."""
@@ -43,13 +43,9 @@ def quasilinearization(
     problem
         Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
         [Q] does; with any other the linear equations are solved by a step of DOP853 from point to point.
-    start
-        First parameters (n,).
     trajectories
-        First states (n, n_x) of each record at the times of `grid`, and their slopes.
-    max_iterations
-        Steps at most.
-    epsilon
+        First states (n, n_x) of each record at the times of `refined`, and their slopes.
+    start, max_iterations, epsilon
         As in `sensitivity_steps`.
 
     Raises
@@ -57,19 +53,13 @@ def quasilinearization(
     SimulationError
         The linear equations have no finite solution with the starting values.
     """
-    theta, states = start.copy(), list(trajectories)
+    theta, states, last, fitted = start.copy(), list(trajectories), np.inf, None
     every = FINER if problem.integrator not in HEUN else 1
-    records = [grid(record, every) for record in problem.records]
+    records = [refined(record, every) for record in problem.records]
     samples = [tuple(x[::every] for x, _ in states)]
-    r = problem.residual(theta)
-    history, costs, integrals = [theta], [problem.cost(r, theta)], [quality(problem, r)]
-    steps: list[FloatArray] = []
-    fitted = None
-    converged, message, ended = False, f"not converged in {counted(max_iterations, 'iteration')}", None
+    steps = Steps(problem, theta, problem.residual(theta), max_iterations, epsilon)
     for count in range(1, max_iterations + 1):
         try:
-            if not np.isfinite(theta).all():
-                raise SimulationError("the parameters grow beyond all bounds")
             tables = [
                 linear_solutions(model, theta, record, *x, problem.integrator)
                 for model, record, x in zip(problem.models, records, states, strict=True)
@@ -79,42 +69,26 @@ def quasilinearization(
         except SimulationError as error:
             if fitted is None:
                 raise
-            message = f"quasilinearization diverged after {counted(count - 1, 'iteration')}: {error}"
+            steps.message = f"quasilinearization diverged after {counted(count - 1, 'iteration')}: {error}"
             break
-        steps.append(fitted.solution)
-        theta = theta + steps[-1]
-        weights = np.append(1.0, steps[-1])
-        states = [(W @ weights, rates @ weights) for W, rates in tables]
-        history.append(theta)
+        step = fitted.solution
+        regression, theta = (K, Y + K @ theta), theta + step
+        states = [(W @ np.append(1.0, step), rates @ np.append(1.0, step)) for W, rates in tables]
         samples.append(tuple(x[::every] for x, _ in states))
-        costs.append(problem.cost(fitted.residuals, theta))
-        integrals.append(quality(problem, fitted.residuals))
-        moved = max((_change(*pair) for pair in zip(*samples[-2:], strict=True)), default=0.0)
+        steps.append(theta, fitted.residuals)
+        pairs = zip(*samples[-2:], strict=True)
+        still = all(np.abs(b - a).max(initial=0) < 1e-3 * np.abs(b).max(initial=1e-300) for a, b in pairs)
         # quadratic convergence: the next step is smaller than this one by more than this one than the last
-        size = [float(np.abs(each).max()) for each in steps[-2:]]
-        next_step = steps[-1] * (min(1.0, size[-1] / max(size[0], 1e-300)) if len(size) > 1 else 1.0)
-        ended = stop(steps[-1], negligible(next_step, theta, fitted, (1e-9, 1e-5)), epsilon, integrals[-1])
-        near = (1e-8, 1e-5) if epsilon is None else (1e-6, 0.1)
-        converged = bool(ended) and moved < 1e-3 and negligible(next_step, theta, fitted, near)
-        if ended and (converged or epsilon is not None):
-            message = ending(ended, count, epsilon, converged)
+        size = max(float(np.abs(step).max()), 1e-300)
+        following, last = step * min(1.0, size / last if count > 1 else 1.0), size
+        settled = still and negligible(following, theta, fitted, steps.near)
+        if steps.end(step, negligible(following, theta, fitted, (1e-9, 1e-5)), settled):
             break
-        ended = None
     assert fitted is not None
     r = problem.residual(theta)
     if not np.isfinite(r).all():
-        converged, message, r = False, "not converged: the states diverge", -fitted.residuals
-    return Iterations(
-        at(fitted, theta, r),
-        np.array(history),
-        np.array(costs),
-        converged,
-        message,
-        trajectories=tuple(samples),
-        integrals=tuple(integrals),
-        regression=(K, Y + K @ history[-2]),
-        stopped_by=ended,
-    )
+        steps.converged, steps.message, r = False, "not converged: the states diverge", -fitted.residuals
+    return steps.result(fitted, r, trajectories=tuple(samples), regression=regression)
 
 
 def linear_solutions(
@@ -158,9 +132,7 @@ def linear_solutions(
         end = begin + h * np.tensordot(DOP853.B, rates, 1)
         W = np.concatenate([first[None], recurrence(end[..., :n], first, end[..., n:])])
     if not np.isfinite(W).all():
-        raise SimulationError(
-            "the linearised equations have no finite solution; start from another trajectory"
-        )
+        raise SimulationError("the linearised equations have no finite solution; start from another place")
     return W, A @ W + B
 
 
@@ -179,14 +151,3 @@ def linear_rows(
     if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
         raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")
     return K, Y
-
-
-def grid(record: Record, every: int) -> Record:
-    """The times of a record and others between them, with its inputs."""
-    t = np.interp(np.arange(every * (len(record) - 1) + 1) / every, np.arange(len(record)), record.t)
-    inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
-    return Record(t, {}, inputs, None, record.name)
-
-
-def _change(before: FloatArray, after: FloatArray) -> float:
-    return float(np.abs(after - before).max(initial=0.0)) / max(float(np.abs(after).max(initial=0.0)), 1e-300)

@@ -120,6 +120,13 @@ def from_t0(model: OdeModel, record: Record) -> Record:
     return replace(record, t=np.append(model.t0, record.t), outputs=outputs, inputs=inputs, sigma=sigma)
 
 
+def refined(record: Record, every: int) -> Record:
+    """The times of a record and others between them, with its inputs."""
+    t = np.interp(np.arange(every * (len(record) - 1) + 1) / every, np.arange(len(record)), record.t)
+    inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
+    return Record(t, {}, inputs, None, record.name)
+
+
 def inputs_of(model: OdeModel, record: Record) -> FloatArray:
     """Inputs of the model in its order, (n, n_u)."""
     if missing := [name for name in model.inputs if name not in record.inputs]:

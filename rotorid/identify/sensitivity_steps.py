@@ -8,12 +8,15 @@ step is taken, without safeguards and bounds, until |Δβ| < ε or I(β) < ε.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.identify.ode import SimulationError
 from rotorid.identify.record_residuals import Iterations, Problem, at, negligible
+from rotorid.regression.estimate import Estimate
 
 
 def sensitivity_steps(
@@ -39,56 +42,68 @@ def sensitivity_steps(
     """
     theta = start.copy()
     r, U = problem.evaluate(theta)
-    history, costs, integrals = [theta], [problem.cost(r, theta)], [quality(problem, r)]
+    steps = Steps(problem, theta, r, max_iterations, epsilon)
     step = problem.linear_fit(U, -r, theta)
-    converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
-    ended: str | None = None
     for count in range(1, max_iterations + 1):
-        new, last = theta + step.solution, step.solution
+        new, last = theta + step.solution, step
         try:
             r, U = problem.evaluate(new)
         except SimulationError as error:
-            message = f"Gauss–Newton diverged after {counted(count - 1, 'iteration')}: {error}"
+            steps.message = f"Gauss–Newton diverged after {counted(count - 1, 'iteration')}: {error}"
             break
         theta = new
-        history.append(theta)
-        costs.append(problem.cost(r, theta))
-        integrals.append(quality(problem, r))
-        short = negligible(last, theta, step, (1e-9, 1e-5))
+        steps.append(theta, r)
         step = problem.linear_fit(U, -r, theta)
+        short = negligible(last.solution, theta, last, (1e-9, 1e-5))
         # a minimum, not only a short step: the next one is no longer either
-        near = (1e-8, 1e-5) if epsilon is None else (1e-6, 0.1)
-        ended = stop(last, short, epsilon, integrals[-1])
-        converged = ended is not None and negligible(step.solution, theta, step, near)
-        if ended and (converged or epsilon is not None):
-            message = ending(ended, count, epsilon, converged)
+        if steps.end(last.solution, short, negligible(step.solution, theta, step, steps.near)):
             break
-        ended = None
-    path = np.array(history), np.array(costs)
-    r = problem.evaluate(theta)[0]
-    return Iterations(
-        at(step, theta, r), *path, converged, message, (), (), tuple(integrals), stopped_by=ended
-    )
+    return steps.result(step, problem.evaluate(theta)[0])
 
 
-def quality(problem: Problem, r: FloatArray) -> float:
-    """I(β) of residuals, in the unit of the outputs squared times s: each sample times the step before it."""
-    steps = [np.diff(record.t, prepend=record.t[0]) for record in problem.records]
-    rows = problem.vector([np.tile(h[:, None], len(problem.model.outputs)) for h in steps])
-    return float(problem.plain(rows) @ problem.plain(r) ** 2)
+class Steps:
+    """What an iteration passes, and when it ends."""
 
+    def __init__(
+        self, problem: Problem, theta: FloatArray, r: FloatArray, max_iterations: int, epsilon: float | None
+    ) -> None:
+        self.problem, self.epsilon = problem, epsilon
+        self.history: list[FloatArray] = []
+        self.costs: list[float] = []
+        self.integrals: list[float] = []
+        self.converged, self.message = False, f"not converged in {counted(max_iterations, 'iteration')}"
+        self.ended: str | None = None
+        self.near = (1e-8, 1e-5) if epsilon is None else (1e-6, 0.1)
+        """Limits of a next step that no longer matters, see `negligible`."""
+        self.append(theta, r)
 
-def stop(step: FloatArray, short: bool, epsilon: float | None, integral: float) -> str | None:
-    """Which condition of [F] step 5 ends the iteration, "step" or "cost"; without ε a short step does."""
-    if epsilon is None:
-        return "step" if short else None
-    return "step" if np.abs(step).max() < epsilon else "cost" if integral < epsilon else None
+    def append(self, theta: FloatArray, r: FloatArray) -> None:
+        """Parameters and residuals of an iteration; I(β): each sample times the step before it."""
+        widths = [np.diff(record.t, prepend=record.t[0]) for record in self.problem.records]
+        rows = self.problem.vector([np.tile(h[:, None], len(self.problem.model.outputs)) for h in widths])
+        self.history.append(theta)
+        self.costs.append(self.problem.cost(r, theta))
+        self.integrals.append(float(self.problem.plain(rows) @ self.problem.plain(r) ** 2))
 
+    def end(self, step: FloatArray, short: bool, settled: bool) -> bool:
+        """Whether a step ends it, by step 5 of [F], or without ε if it is short; settled: at a minimum."""
+        by = "step" if short and self.epsilon is None else None
+        if self.epsilon is not None:
+            small = np.abs(step).max() < self.epsilon
+            by = "step" if small else "cost" if self.integrals[-1] < self.epsilon else None
+        if by is None or not (settled or self.epsilon is not None):
+            return False
+        self.ended, self.converged = by, settled
+        words = f"converged in {counted(len(self.history) - 1, 'iteration')}"
+        if self.epsilon is not None:
+            words += f": {'|Δβ|' if by == 'step' else 'I(β)'} is below {self.epsilon:g}"
+        self.message = (
+            words if settled else f"not {words}, but the next step still matters; lower --tolerance"
+        )
+        return True
 
-def ending(by: str, iterations: int, epsilon: float | None, converged: bool) -> str:
-    """How it ended, in words."""
-    words = f"converged in {counted(iterations, 'iteration')}"
-    if epsilon is None:
-        return words
-    words += f": {'|Δβ|' if by == 'step' else 'I(β)'} is below {epsilon:g}"
-    return words if converged else f"not {words}, but the next step still matters; lower --tolerance"
+    def result(self, step: Estimate, r: FloatArray, **more: Any) -> Iterations:  # noqa: ANN401
+        """All of it, with the estimate of a step as one of the parameters, and residuals there."""
+        estimate = at(step, self.history[-1], r)
+        path = np.array(self.history), np.array(self.costs), self.converged, self.message
+        return Iterations(estimate, *path, **more, integrals=tuple(self.integrals), stopped_by=self.ended)
