@@ -5,9 +5,8 @@ About the last trajectory x_s(t) and parameters θ_s the equations are linear, [
     dx/dt = f + f_x (x − x_s) + f_θ (θ − θ_s),    x = G θ + D,                             (2.18)
     dG/dt = f_x G + f_θ,    dD/dt = f − f_θ θ_s + f_x (D − x_s),    G θ + D = x0(θ) at t0,   (2.21)–(2.24)
 
-and θ follows from linear least squares, M θ = Y with M = Σ (h_x G)ᵀ(h_x G) (2.28); x is the next trajectory.
-It need not solve the equations until the end, which is what makes the method forgiving. D + G θ_s is
-integrated here in place of D, which is the same, and keeps the digits of θ − θ_s.
+and θ follows from linear least squares, M θ = Y with M = Σ (h_x G)ᵀ(h_x G) (2.28); x, the next trajectory,
+need not solve the equations until the end. D + G θ_s is integrated in place of D: θ − θ_s keeps its digits.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negl
 from rotorid.identify.records import Record, inputs_of, refined
 from rotorid.identify.sensitivity_steps import Steps
 
-FINER = 3
-"""Points of a trajectory from sample to sample; of the schemes of `HEUN` one."""
+FINER = 5  # points of a trajectory from sample to sample; of the schemes of `HEUN` one
 
 
 def quasilinearization(
@@ -96,8 +94,7 @@ def linear_solutions(
 ) -> tuple[FloatArray, FloatArray]:
     """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), and dW/dt.
 
-    About θ_s and the states (n, n_x) with their slopes. DOP853 takes one step from time to time, all of them
-    at once, from 1 and from 0: W is then P W + q of the time before.
+    About θ_s and states (n, n_x) with slopes. DOP853 steps from all times at once: W is P W + q of the last.
     """
     from scipy.integrate import DOP853
     from scipy.interpolate import CubicHermiteSpline
