@@ -107,13 +107,7 @@ def test_iterations_of_the_texts_are_written_as_tables(cli, tmp_path):
     """Tables 2.2 and 2.3 of [Q]; beta and I(beta) by step of [F]; the default method writes parameters."""
     import openpyxl
 
-    given = (
-        *files("quasilinearization"),
-        "--method",
-        "quasilinearization",
-        "--integrator",
-        "sequential-heun",
-    )
+    scheme = ("--method", "quasilinearization", "--integrator", "sequential-heun")
     book, table = tmp_path / "q.xlsx", tmp_path / "f.csv"
     found = cli("fit", *files("quasilinearization"), *scheme, "--json", "--output", book).json
     sheets = openpyxl.load_workbook(book)
