@@ -55,8 +55,8 @@ class Judgement:
     normal_matrix: NormalMatrix | None
 
 
-def judge(problem: Problem, path: Iterations, loss: str) -> Judgement:
-    """Look at convergence, bounds, rank, integration error and residuals of a fit."""
+def judge(problem: Problem, path: Iterations, loss: str, poor: str | None = None) -> Judgement:
+    """Look at convergence, bounds, rank, integration error and residuals of a fit; `poor` is its `misfit`."""
     estimate, theta = path.estimate, path.estimate.solution
     words = ["" if path.converged else f"{path.message}; no intervals are given"]
     try:
@@ -71,8 +71,9 @@ def judge(problem: Problem, path: Iterations, loss: str) -> Judgement:
             alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=RCOND), theta, r)
             prior = replace(prior, alone=combined(problem, alone)[0].describe_rank())
         estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
-    poor, seen = misfit(problem, estimate.dof, r, loss), correlation(problem, r)
-    cause, wrong = causes(problem, theta, J, r) if path.converged and linear else ("", False)
+    seen = correlation(problem, r)
+    poor = misfit(problem, estimate.dof, r, loss) if poor is None or prior else poor
+    cause, wrong = causes(problem, theta, J, r, seen) if path.converged and linear else ("", False)
     change = _integration_change(problem, theta, J)
     words += [_integration_words(estimate, change), poor, cause, path.bound_warning]
     if path.converged:
@@ -193,20 +194,22 @@ def _chance(chi_square: float, dof: int) -> float:
 # -- causes
 
 
-def causes(problem: Problem, theta: FloatArray, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
+def causes(
+    problem: Problem, theta: FloatArray, J: FloatArray, r: FloatArray, seen: Correlation | None
+) -> tuple[str, bool]:
     """Words about what residuals point at, and whether intervals without it would be wrong.
 
     Parameters
     ----------
     problem, theta
         What was fitted, and the minimum (n,).
-    J, r
-        Sensitivities (m, n) and residuals (m,) there.
+    J, r, seen
+        Sensitivities (m, n) and residuals (m,) there, and their `correlation`.
     """
-    if rounding_only(problem, r) or len(r) < FEWEST:
+    if seen is None:
         return "", False
-    seen, candidates = correlation(problem, r), _hum(problem, J, r)
-    if seen is not None and seen.probability < 1e-2:
+    candidates = _hum(problem, J, r)
+    if seen.probability < 1e-2:
         candidates += [*_offset_and_drift(problem), *_initial_values(problem, theta)]
     G = gain(J, rcond=RCOND) if candidates else J.T
     tested = [_tested(problem, J, G, r, *candidate) for candidate in candidates]

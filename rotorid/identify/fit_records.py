@@ -32,8 +32,8 @@ from rotorid.regression.search import inside
 
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""
-OTHERS = 7
-"""Starts besides, where the first minimum does not describe the record."""
+OTHERS, LONG = 7, 20
+"""Starts besides, where the first minimum does not describe the record, or the end of a search so long."""
 BETTER = 1.5
 """Ratio of the sums of squares from which on another minimum is the better one."""
 MOST_STARTS = 10_000
@@ -134,9 +134,11 @@ def fit(  # noqa: PLR0913
         return minimum(problem, theta, limits, loss, max_iterations)
 
     begins = spread_starts(begin, limits, starts or 1, seed)
-    paths, more = _searched(search, problem, begins), ""
-    if starts is None and method == "levenberg-marquardt" and _astray(problem, paths[0], loss):
-        paths, more = _from_elsewhere(problem, begin, paths[0], search, seed)
+    paths, more, poor = _searched(search, problem, begins), "", None
+    if starts is None and method == "levenberg-marquardt":
+        first = paths[0]
+        poor = misfit(problem, first.estimate.dof, first.estimate.residuals, loss)
+        paths, more = _from_elsewhere(problem, begin, first, search, seed) if poor else (paths, "")
     path = min(paths, key=lambda path: _cost(problem, path))
     minima = _merged(problem, paths) if starts and starts > 1 else ()
     if weigh:
@@ -148,7 +150,7 @@ def fit(  # noqa: PLR0913
             paths = _searched(search, problem, [path.estimate.solution, *begins[1:]])
             minima = _merged(problem, paths) if len(begins) > 1 else ()
             path = min(paths, key=lambda path: _cost(problem, path)).after(path.history)
-    judged = judge(problem, path, loss)
+    judged = judge(problem, path, loss, None if weigh or more else poor)
     outside = (path.estimate.solution < limits[:, 0]) | (path.estimate.solution > limits[:, 1])
     warnings = [*judged.warnings, more]
     if len(minima) > 1:
@@ -252,16 +254,12 @@ def _searched(
     return paths
 
 
-def _astray(problem: Problem, path: Iterations, loss: str) -> bool:
-    """Whether the model does not describe the record at a minimum, or where a long search gave up."""
-    over = path.converged or path.iterations > 20
-    return over and bool(misfit(problem, path.estimate.dof, path.estimate.residuals, loss))
-
-
 def _from_elsewhere(
     problem: Problem, begin: FloatArray, first: Iterations, search: Searching, seed: int
 ) -> tuple[list[Iterations], str]:
     """A better minimum than the first, from pieces that join or other starts, and words; or the first."""
+    if not (first.converged or first.iterations > LONG):
+        return [first], ""
 
     def shot(problem: Problem, theta: FloatArray) -> Iterations:
         return search(problem, _shot(problem, theta)).after(theta[None])

@@ -88,9 +88,9 @@ class OdeModel:
         table = _values(self._rates_table, t, x, theta, u)
         if self.inertia:
             inverse, slopes = self._inverse(theta)
-            table = np.asarray(inverse @ table)
-            moved = np.einsum("pij,...j->...ip", slopes, table[..., 0])
-            table[..., 1 + len(self.states) :] -= inverse @ moved
+            table = np.moveaxis(np.tensordot(inverse, table, (1, -2)), 0, -2)
+            moved = np.tensordot(np.tensordot(inverse, slopes, (1, 1)), table[..., 0], (2, -1))
+            table[..., 1 + len(self.states) :] -= np.moveaxis(moved, (0, 1), (-2, -1))
         return table
 
     def h(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
