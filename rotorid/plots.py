@@ -82,17 +82,14 @@ def _reduction() -> Pictures:
 
 
 def _identify() -> Pictures:
+    from rotorid.identify import Fit, Identification
     from rotorid.identify.plots import figure_identification
-    from rotorid.identify.result import Identification
+    from rotorid.identify.plots_records import figure_fit
 
-    return {Identification: lambda found, ax: figure_identification(found)}
-
-
-def _timedomain() -> Pictures:
-    from rotorid.timedomain.plots import figure_fit
-    from rotorid.timedomain.result import Fit
-
-    return {Fit: lambda found, ax: figure_fit(found)}
+    return {
+        Identification: lambda found, ax: figure_identification(found),
+        Fit: lambda found, ax: figure_fit(found),
+    }
 
 
 _ROOMS: dict[str, Callable[[], Pictures]] = {
@@ -100,5 +97,4 @@ _ROOMS: dict[str, Callable[[], Pictures]] = {
     "balancing": _balancing,
     "rotorid.reduction": _reduction,
     "rotorid.identify": _identify,
-    "rotorid.timedomain": _timedomain,
 }

@@ -25,10 +25,10 @@ from rotorid.calibration import Unknown, calibrate
 from rotorid.fleet import fit_type, update
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 from rotorid.regression import stretch
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.ode_model import ode_model
-from rotorid.timedomain.models.record import Record
 
 RPM = np.pi / 30
 

@@ -20,7 +20,6 @@ from rotorid.cli.commands import (
     reduce,
     runup,
     schema,
-    simulate,
     vectors,
 )
 from rotorid.cli.fleet import fleet
@@ -32,6 +31,7 @@ from rotorid.commands import (
     identify,
     influence,
     response,
+    simulate,
     split,
     tolerance,
     trial_weight,
@@ -76,7 +76,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Identify coefficients": {
         "identify": typer_command(identify),
         "fit": fit.fit,
-        "simulate": simulate.simulate,
+        "simulate": typer_command(simulate),
         "modes": modes.modes,
         "runup": runup.runup,
         "calibrate": calibrate.calibrate,

@@ -6,10 +6,12 @@
 from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
+from rotorid.commands.fit import FitOptions, RecordFit, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.outcome import Outcome
 from rotorid.commands.response import ResponseOptions, response
+from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
@@ -20,10 +22,13 @@ __all__ = [
     "BalanceOptions",
     "CampbellOptions",
     "CriticalOptions",
+    "FitOptions",
     "IdentifyOptions",
     "InfluenceOptions",
     "Outcome",
+    "RecordFit",
     "ResponseOptions",
+    "SimulateOptions",
     "SplitOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
@@ -32,9 +37,11 @@ __all__ = [
     "balance",
     "campbell",
     "critical",
+    "fit",
     "identify",
     "influence",
     "response",
+    "simulate",
     "split",
     "tolerance",
     "trial_weight",

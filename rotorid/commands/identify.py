@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotorid.base.answer import Answer
 from rotorid.base.logs import workflows as log
 from rotorid.base.text import listing
+from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.input_checks import check_choices, file_of, refuse
 from rotorid.commands.outcome import EQUATIONS, WITH_REPORT, Parts, command, phase, provenance, text_of
 from rotorid.commands.quantities import Speeds, speeds
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.registry import Method
-    from rotorid.identify import AmplitudeErrors, Experiments, HarmonicModel, Identification
+    from rotorid.identify import Experiments, HarmonicModel, Identification
     from rotorid.identify.structures import StructureTest
     from rotorid.regression.d_optimal import Design
     from rotorid.report.equations import Equations
@@ -214,22 +215,6 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
         refuse(options, ("loss", "ridge", "against"), "belongs to DATA: nothing is fitted without them")
     if options.design is None:
         refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
-
-
-def amplitude_errors(
-    stated: AmplitudeErrors | None, percent: float | None, degrees: float | None
-) -> AmplitudeErrors | None:
-    """Errors of the model file, those of the options before them."""
-    if percent is None and degrees is None:
-        return stated
-    for name, value, high in (("--amplitude-error", percent, 1000.0), ("--phase-error", degrees, 360.0)):
-        if value is not None and not 0 <= value <= high:
-            raise ValueError(f"{name} takes a number from 0 to {high:g}, not {value:g}")
-    from rotorid.identify import AmplitudeErrors
-
-    relative = percent / 100.0 if percent is not None else (stated.relative if stated else 0.0)
-    phase = math.radians(degrees) if degrees is not None else (stated.phase if stated else 0.0)
-    return AmplitudeErrors(relative, phase, stated.floor if stated else 0.0)
 
 
 def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, choose: int | None) -> Design:

@@ -73,7 +73,7 @@ def harmonic_model(
     >>> model.outputs, model.inputs
     (('X',), ('F',))
     """
-    from rotorid.expressions import names, parse_equation
+    from rotorid.identify.expressions import names, parse_equation
 
     texts = (equations,) if isinstance(equations, str) else tuple(equations)
     if not texts:
@@ -292,7 +292,7 @@ def _row_by_row(
 
 
 def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
-    from rotorid.expressions import is_name
+    from rotorid.identify.expressions import is_name
 
     if not estimate:
         raise ValueError("no parameter is to be estimated: name at least one")

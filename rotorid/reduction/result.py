@@ -148,7 +148,7 @@ class Reduction(Answered):
 
         The displacement of the mass at node 7 is `x7`. There is no damping: what a rotor's bearings and its
         surroundings take out is for the user to add, or to estimate
-        (`rotorid.timedomain.models.second_order`), or comes with the supports (`small`).
+        (`rotorid.identify.second_order`), or comes with the supports (`small`).
         """
         K = np.linalg.inv(self.compliance) + np.diag(self.seal_stiffness)
         n = len(self.nodes)

@@ -10,16 +10,16 @@ from sympy import Add, I, Integer, Matrix, Symbol, collect, eye, factor_terms
 
 from balancing import Correction
 from rotorid.base.text import counted
-from rotorid.expressions import names, parse
 from rotorid.identify import Experiments, HarmonicModel, Identification
 from rotorid.identify.combinations import CONSTANT, ONE, Monomial, Polynomial, expression, times
+from rotorid.identify.expression_functions import real, usual
+from rotorid.identify.expressions import names, parse
+from rotorid.identify.ode import OdeModel
+from rotorid.identify.result_records import Fit
 from rotorid.reduction import Reduction
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design
 from rotorid.regression.linear import stretch
 from rotorid.report.equations import BEHIND, Equations, Expression, Row
-from rotorid.timedomain import OdeModel
-from rotorid.timedomain.models.compiled import real, usual
-from rotorid.timedomain.result import Fit
 
 PARTS = ("Re", "Im")
 _START = "θ here is where the search begins: the answer predicts the amplitudes, which bias it less"
@@ -166,10 +166,45 @@ def _(found: Reduction) -> Equations:
 
 @equations_of.register
 def _(found: Fit) -> Equations:
+    """[F] (3.6), (3.7), or of quasilinearization (2.17) to (2.28) of [Q]."""
+    return _sensitivities(found) if found.regression is None else _linear_about_last(found)
+
+
+def _linear_about_last(found: Fit) -> Equations:
+    """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17)–(2.22), and M θ = Y of the last step, (2.28)."""
+    model = found.model
+    x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
+    if model.inertia:
+        raise ValueError("--show equations of quasilinearization needs a model that states its rates itself")
+    rates, _, _ = _as_written(model)
+    rows: list[Row] = []
+    for i, f in enumerate(rates):
+        rows += [Row("f_x", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in x]
+        rows += [Row("f_θ", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in thetas]
+    for i, f in enumerate(rates):
+        slopes = [usual(f.diff(by)) for by in x]
+        for j, theta in enumerate(thetas):
+            G = [Symbol(f"G{p + 1}{j + 1}") for p in range(len(x))]
+            terms = [*zip(slopes, G, strict=True), (usual(f.diff(theta)), 1)]
+            rows.append(Row("G", [(1, Symbol(f"dG{i + 1}{j + 1}/dt"))], terms))
+        D = [Symbol(f"D{p + 1}") - by for p, by in enumerate(x)]
+        known = usual(f) - Add(*(usual(f.diff(theta)) * theta for theta in thetas))
+        rows.append(Row("D", [(1, Symbol(f"dD{i + 1}/dt"))], [*zip(slopes, D, strict=True), (known, 1)]))
+    K, Y = found.regression or (np.zeros((0, 0)), np.zeros(0))
+    labels = [f"M{j + 1}" for j in range(len(thetas))]
+    title = "x = G θ + D about the last trajectory x, θ, [Q] (2.17)–(2.24), and M θ = Y, (2.28)"
+    notes = ["G and D begin with G θ + D = x(t0); M and Y are those of the last iteration"]
+    return Equations(
+        title, rows, ("M", "θ", "Y"), labels, model.parameters, K.T @ K, K.T @ Y, found.estimate.values, notes
+    )
+
+
+def _sensitivities(found: Fit) -> Equations:
     """Sensitivities ∂x/∂θ of the states and ∂y/∂θ of the outputs, [F] (3.6), (3.7), in symbols."""
     model, n = found.model, len(found.model.states)
     x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
-    E, velocities = Matrix(n, n, getattr(model, "inertia", eye(n))), [Symbol(f"d{state}/dt") for state in x]
+    E = Matrix(n, n, model.inertia) if model.inertia else eye(n)
+    velocities = [Symbol(f"d{state}/dt") for state in x]
     equations, starts, outputs = [], [], []
 
     def chain(f: Expression, by: Expression, S: list[Expression]) -> list[tuple[Expression, Expression]]:
@@ -200,6 +235,6 @@ def _as_written(model: OdeModel) -> list[list[Expression]]:
     groups = {"state": model.states, "initial": model.states, "output": model.outputs}
     read = [[real(parse(model.texts[f"{kind} {name}"])) for name in of] for kind, of in groups.items()]
     told = {name for group in read for e in group for name in names(e)}
-    if {*model.parameters} <= told and not hasattr(model, "inertia"):
+    if {*model.parameters} <= told and not model.inertia:
         return read
     return [[*model.rates], [*model.initial], [*model.observed]]

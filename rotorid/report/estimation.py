@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.identify import Identification
+    from rotorid.identify.result_records import Fit
     from rotorid.regression.d_optimal import Design
     from rotorid.regression.prior import PriorEffect
-    from rotorid.timedomain.result import Fit
 
 READINGS = 40
 """Rows at most."""
@@ -48,7 +48,7 @@ def fit_report(
     """
     from markupsafe import Markup
 
-    from rotorid.timedomain.plots import figure_fit
+    from rotorid.identify.plots_records import figure_fit
 
     document = Document(document)
     left = Markup("Residuals {} (rms, in the unit of the model)").format(document.show("residual_rms", 4))
@@ -111,7 +111,7 @@ def _sheet(
 
 def _records(result: Fit) -> Facts:
     """What was measured, with which errors, and how it was fitted."""
-    from rotorid.timedomain.models.record import record_names
+    from rotorid.identify.records import record_names
 
     names = record_names([one.name for one in result.records])
     spans = [

@@ -8,9 +8,12 @@ from rotorid.commands import (
     BalanceOptions,
     CampbellOptions,
     CriticalOptions,
+    FitOptions,
     IdentifyOptions,
     InfluenceOptions,
+    RecordFit,
     ResponseOptions,
+    SimulateOptions,
     SplitOptions,
     ToleranceOptions,
     TrialWeightOptions,
@@ -19,9 +22,11 @@ from rotorid.commands import (
     balance,
     campbell,
     critical,
+    fit,
     identify,
     influence,
     response,
+    simulate,
     split,
     tolerance,
     trial_weight,
@@ -31,7 +36,6 @@ from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.identify import Coefficients
 from rotorid.commands.outcome import Delivered
 from rotorid.workflows.demo import Demo, DemoOptions, demo
-from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
@@ -39,7 +43,6 @@ from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
-from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
 from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
@@ -81,7 +84,6 @@ __all__ = [
     "RunUp",
     "RunUpOptions",
     "SimulateOptions",
-    "Simulation",
     "SplitOptions",
     "StudiedMachines",
     "StudiedStarts",

@@ -13,8 +13,8 @@ import sympy
 
 import fem
 from book.printed import below, lines, parts, read
-from rotorid.expressions import parse_equation
 from rotorid.identify import Experiments, harmonic_model
+from rotorid.identify.expressions import parse_equation
 from rotorid.identify.linear_start import build_rows, linear_fit
 from rotorid.identify.operator_model import natural_modes
 from rotorid.samples import sample_data

@@ -8,8 +8,9 @@ from repetitions import FULL
 
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.timedomain import Record, ode_model
-from rotorid.timedomain.fit import fit
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 
 T = np.linspace(0.0, 3.0, 25)
 

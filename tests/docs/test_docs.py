@@ -27,7 +27,6 @@ PACKAGES = (
     "balancing",
     "rotorid",
     "rotorid.identify",
-    "rotorid.timedomain",
     "rotorid.reduction",
     "rotorid.calibration",
     "rotorid.tables",

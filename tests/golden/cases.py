@@ -274,7 +274,7 @@ fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
-fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4
+fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
 fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
@@ -291,12 +291,12 @@ fit-prior                   fit prior.toml {FIT}/quasilinearization/record_noisy
 fit-prior-auto              fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma auto
 fit-prior-unweighed         fit prior.toml {FIT}/quasilinearization/record_noisy.csv
 fit-ridge                   fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --ridge 0.001 --table
-fit-design                  fit {FIT}/quasilinearization/model.toml --start theta1=1,theta2=-1,theta3=-1 --sigma 0.02 --design 0:10:0.5 --choose 4
 identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
 identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
 identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml --show equations
 identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
 reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
+fit-printed                 fit {FIT}/three_masses/model.toml {FIT}/three_masses/printed.csv --allow-missing --method gauss-newton --integrator rk4
 fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 """
 
@@ -524,7 +524,6 @@ STORED = (
     "critical-rotor23",
     "critical-rotor23-mesh",
     "demo-list",
-    "fit-design",
     "fit-equations",
     "fit-prior",
     "fit-run-down-plot",

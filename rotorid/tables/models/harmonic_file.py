@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
-from rotorid.expressions import ExpressionError, parse_equation
+from rotorid.identify.expressions import ExpressionError, parse_equation
 from rotorid.tables.models.ode_file import read_time_form
 from rotorid.tables.models.shared_keys import (
     BOUNDS,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.expressions import is_name
+from rotorid.identify.expressions import is_name
 from rotorid.tables.reader import value_kinds
 from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.settings_keys import Key, Kind, Said, take

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from rotorid.commands.identify import amplitude_errors
+from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.input_checks import file_of
 from rotorid.commands.outcome import Found, command, phase, provenance
 from rotorid.commands.quantities import Band, band, one_of

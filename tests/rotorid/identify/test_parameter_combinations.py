@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sympy import Rational, Symbol
 
-from rotorid.expressions import ExpressionError, parse
 from rotorid.identify import harmonic_model
 from rotorid.identify.combinations import sum_words
 from rotorid.identify.equations import multiplied_out
+from rotorid.identify.expressions import ExpressionError, parse
 
 
 @pytest.mark.parametrize(

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorid.commands.fit import FitOptions
+from rotorid.commands.fit import fit as work
 from rotorid.commands.identify import IdentifyOptions
 from rotorid.commands.identify import identify as work_harmonic
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import prior_rows
-from rotorid.report.equations_of_results import equations_of
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_ode_model
-from rotorid.timedomain import Record, ode_model
-from rotorid.timedomain.fit import fit
-from rotorid.workflows.fit import FitOptions
-from rotorid.workflows.fit import fit as work
 
 T = np.linspace(0.0, 3.0, 25)
 K = np.column_stack((np.ones(25), T, np.exp(-T)))
@@ -313,26 +313,14 @@ def test_the_other_outputs_tell_of_a_prior(tmp_path):
     text = (folder / "model.toml").read_text(encoding="utf-8")
     path.write_text(f"{text}\n[prior]\ntheta1 = [1.0, 0.004]\n", encoding="utf-8")
     start = {"theta1": 1.0, "theta2": -1.0, "theta3": -1.0}
-    found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start, design="0:10:1"))
+    found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start))
     sheet = found.sheet().decode()
     assert "% from the data" in sheet.partition("<script")[0].partition("What was found")[2][:20_000]
-    words = "the expected deviations are those of the readings alone, without [prior]"
-    assert words in found.summary().replace("\n  ", " ")
-    assert found.design.notes
-    assert not work(
-        folder / "model.toml", options=FitOptions(sigma=1, start=start, design="0:9:1")
-    ).design.notes
-    assert any("rows of [prior]" in note for note in equations_of(found.fit).notes)
-    assert not equations_of(work(folder / "model.toml", folder / "record_noisy.csv").fit).notes
+    assert any("rows of [prior]" in note for note in found.equations.notes)
+    assert not work(folder / "model.toml", folder / "record_noisy.csv").equations.notes
 
 
-@pytest.mark.parametrize(
-    "more", [{"ridge": 0.1}, {"method": "gauss-newton"}, {"starts": 3}, {"allow_missing": True}]
-)
-def test_a_design_without_a_record_refuses_what_it_would_not_look_at(more):
-    path, start = sample_data() / "fit" / "quasilinearization" / "model.toml", "theta1=1,theta2=-1,theta3=-1"
-    with pytest.raises(ValueError, match=r"--[a-z-]+ belongs to a record: nothing is fitted without one"):
-        work(path, options=FitOptions(sigma=0.02, start=start, design="0:10:1", **more))
+def test_a_design_without_data_refuses_what_it_would_not_look_at():
     harmonic = sample_data() / "identify" / "task_5_1" / "model.toml"
     with pytest.raises(ValueError, match="--loss belongs to DATA"):
         work_harmonic(harmonic, None, IdentifyOptions(loss="huber", design="5:40:5"))

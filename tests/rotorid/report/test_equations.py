@@ -9,16 +9,19 @@ import pytest
 import sympy
 from matplotlib.mathtext import MathTextParser
 
+from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
-from rotorid.expressions import parse
 from rotorid.identify import harmonic_model
 from rotorid.identify.amplitudes import experiments
+from rotorid.identify.expressions import parse
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
+from rotorid.identify.second_order import second_order
+from rotorid.identify.simulation import simulate
 from rotorid.report.equations import BEHIND, Equations, Row
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_job
-from rotorid.timedomain import Record, ode_model, second_order, simulate
 from rotorid.workflows import BalanceOptions, balance
-from rotorid.workflows.fit import fit
 from rotorid.workflows.reduce import ReduceOptions, reduce
 
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
@@ -313,9 +316,10 @@ def test_symbols_are_what_is_integrated():
     augmented = model.augmented(t, np.concatenate((x, S.ravel())), theta, np.zeros(0))[2:].reshape(2, 3)
     np.testing.assert_allclose(np.reshape(rates, (3, 2)).T, augmented, rtol=1e-9)
     starts = [value(row) for row in shown.symbolic if row.name == "start"]
-    np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0_theta(theta), rtol=1e-9)
+    np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0(theta)[:, 1:], rtol=1e-9)
     outputs = [value(row) for row in shown.symbolic if row.name == "output"]
-    wanted = model.h_x(t, x, theta) @ S + model.h_theta(t, x, theta)
+    table = model.h(t, x, theta)
+    wanted = table[:, 1:3] @ S + table[:, 3:]
     np.testing.assert_allclose(outputs, wanted[0], rtol=1e-9)  # the other one is a state
 
 
@@ -328,6 +332,24 @@ def simulated(model, n=60):
     t = np.linspace(0, 3, n)
     found = simulate(model, model.start, t)
     return Record(t, dict(zip(model.outputs, found.y.T, strict=True)))
+
+
+def test_quasilinearization_shows_its_own_equations():
+    """f_x, f_θ, G and D of [Q] (2.17) to (2.22) in symbols, and M θ = Y, (2.28), of the last iteration."""
+    paths = (FIT / "quasilinearization" / name for name in ("model.toml", "record.csv"))
+    options = FitOptions(method="quasilinearization", integrator="sequential-heun")
+    found = fit(*paths, options)
+    shown = found.equations
+    assert "∂f1/∂x2 = theta1" in written(shown, "f_x")
+    assert "∂f2/∂theta3 = x2" in written(shown, "f_θ")
+    assert "dG23/dt = theta2·G13 + theta3·G23 + x2" in written(shown, "G")
+    x, theta = sympy.symbols("x1 x2"), sympy.symbols("theta1:4")
+    D1, D2 = sympy.symbols("D1 D2")
+    f = theta[1] * x[0] + theta[2] * x[1] + sympy.cos(sympy.Symbol("t"))
+    (row,) = [row for row in shown.symbolic if row.name == "D" and "dD2" in row.written()]
+    expected = f + theta[1] * (D1 - x[0]) + theta[2] * (D2 - x[1]) - theta[1] * x[0] - theta[2] * x[1]
+    assert sympy.simplify(side(row.right) - expected) == 0
+    np.testing.assert_allclose(np.linalg.solve(shown.matrix, shown.right), found.found.values, rtol=1e-6)
 
 
 def test_a_model_of_matrices_keeps_its_masses_on_the_left():

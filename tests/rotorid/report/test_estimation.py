@@ -7,10 +7,10 @@ import pytest
 from documents import check_hygiene
 from sheets import ESTIMATES, disagreements, make, read_sheet, rows_of
 
+from rotorid.commands.fit import FitOptions, fit
+from rotorid.identify.records import Record
 from rotorid.report.document import NOTHING
 from rotorid.samples import sample_data
-from rotorid.timedomain import Record
-from rotorid.workflows.fit import FitOptions, fit
 
 FIT, IDENTIFY = sample_data() / "fit", sample_data() / "identify"
 PARAMETERS = "Parameters, in the units of the model"
