@@ -7,8 +7,10 @@ from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
 from rotorid.commands.influence import InfluenceOptions, influence
+from rotorid.commands.modes import ModesOptions, modes
 from rotorid.commands.outcome import Outcome
 from rotorid.commands.response import ResponseOptions, response
+from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
@@ -20,8 +22,10 @@ __all__ = [
     "CampbellOptions",
     "CriticalOptions",
     "InfluenceOptions",
+    "ModesOptions",
     "Outcome",
     "ResponseOptions",
+    "RunUpOptions",
     "SplitOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
@@ -31,7 +35,9 @@ __all__ = [
     "campbell",
     "critical",
     "influence",
+    "modes",
     "response",
+    "runup",
     "split",
     "tolerance",
     "trial_weight",

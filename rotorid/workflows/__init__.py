@@ -9,7 +9,9 @@ from rotorid.commands import (
     CampbellOptions,
     CriticalOptions,
     InfluenceOptions,
+    ModesOptions,
     ResponseOptions,
+    RunUpOptions,
     SplitOptions,
     ToleranceOptions,
     TrialWeightOptions,
@@ -19,7 +21,9 @@ from rotorid.commands import (
     campbell,
     critical,
     influence,
+    modes,
     response,
+    runup,
     split,
     tolerance,
     trial_weight,
@@ -40,9 +44,6 @@ from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
-from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
-from rotorid.workflows.vibration.runup import RunUpOptions, runup
-from rotorid.workflows.vibration.runup_result import RunUp
 from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
 from rotorid.workflows.vibration.vectors_result import VectorsOfRecords
 
@@ -66,7 +67,6 @@ __all__ = [
     "FleetShown",
     "IdentifyOptions",
     "InfluenceOptions",
-    "ModesOfReadings",
     "ModesOptions",
     "Motion",
     "MotionOptions",
@@ -76,7 +76,6 @@ __all__ = [
     "ReduceOptions",
     "ReducedRotor",
     "ResponseOptions",
-    "RunUp",
     "RunUpOptions",
     "SimulateOptions",
     "Simulation",
