@@ -20,7 +20,6 @@ from rotorid.cli.commands import (
     reduce,
     schema,
     simulate,
-    vectors,
 )
 from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
@@ -36,6 +35,7 @@ from rotorid.commands import (
     tolerance,
     trial_weight,
     unbalance,
+    vectors,
 )
 from rotorid.commands.app import run, typer_command, written_help
 from rotorid.commands.terminal import markup_mode
@@ -53,7 +53,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Balance rotors": {
         "balance": balance.balance,
         "worksheet": worksheet,
-        "vectors": vectors.vectors,
+        "vectors": typer_command(vectors),
         "trial-weight": typer_command(trial_weight),
         "split": typer_command(split),
         "tolerance": typer_command(tolerance),

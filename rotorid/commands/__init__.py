@@ -15,6 +15,7 @@ from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
+from rotorid.commands.vectors import VectorsOptions, vectors
 
 __all__ = [
     "Balance",
@@ -31,6 +32,7 @@ __all__ = [
     "TrialWeightOptions",
     "TrialWeights",
     "UnbalanceOptions",
+    "VectorsOptions",
     "balance",
     "campbell",
     "critical",
@@ -42,4 +44,5 @@ __all__ = [
     "tolerance",
     "trial_weight",
     "unbalance",
+    "vectors",
 ]

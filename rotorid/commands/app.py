@@ -283,6 +283,7 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
         told: dict[str, Any] = {"metavar": about[name].metavar, "help": about[name].text}
         declared = typer.Option(f"--{name}", **told) if hints else typer.Argument(**told)
         taken: Any = Path if "Path" in str(one.annotation) and not hints else str
+        taken = list[Path] if str(one.annotation).startswith("Sequence[Path") else taken
         hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
         parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
     parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]

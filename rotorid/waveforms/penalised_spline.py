@@ -16,10 +16,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 
-from rotorid.base.arrays import AnyArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, FloatArray
 
 TRACE, SOFTEST, STEP = -22.0, -10.0, 0.28
 """log λ, relative to the samples between two knots: what keeps knots solvable between which there are none,
@@ -30,6 +31,8 @@ LEAST_GAIN = 0.01
 """Twice the gain in log likelihood, for 1 of log λ, at which the search still goes for more."""
 ROUNDS, NEIGHBOURS = 3, 12
 """The weights of the penalty are found again so often, each from so many knots on either side."""
+CELLS = 1 << 20
+"""Numbers of a right-hand side that are solved for at a time."""
 EVENING, FEW = 0.1, 0.1
 """Share of the mean jump that is added to each, so that the weights stay finite, and share of the jump that
 is likely for λ: of a curve that hardly bends the weights are even, and not those of rounding."""
@@ -41,16 +44,9 @@ def weights(f: FloatArray) -> FloatArray:
     return np.stack((g**3, 4 - 6 * f**2 + 3 * f**3, 4 - 6 * g**2 + 3 * g**3, f**3), axis=-1) / 6
 
 
-def slopes(f: FloatArray) -> FloatArray:
-    """Their derivatives with respect to s, (…, 4)."""
-    g = 1.0 - f
-    return np.stack((-(g**2), -4 * f + 3 * f**2, 4 * g - 3 * g**2, f**2), axis=-1) / 2
-
-
-def along(shape: Callable[[FloatArray], FloatArray], c: AnyArray, j: IntArray, f: FloatArray) -> AnyArray:
-    """Splines (`weights`) or their slopes with coefficients c (n + 3, …) at j + f, (P,)."""
-    own = shape(f)
-    return np.asarray(sum((own[:, a] * c[j + a].T).T for a in range(4)))
+def spline(start: float, step: float, c: AnyArray) -> BSpline:
+    """The curve with coefficients c (n + 3, …) and n intervals of a step between its knots."""
+    return BSpline(start + step * np.arange(-3, len(c) + 1), c, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +124,22 @@ class Smoothing:
     variance: float
     factor: FloatArray
 
-    def deviation(self, rows: FloatArray, at: AnyArray) -> FloatArray:
-        """Standard deviation of Σ rows · c from the knots `at` on, (P,), of rows (P, q)."""
-        n, out = self.factor.shape[1], np.empty(len(rows))
-        for part in range(0, len(rows), 256):
-            some = rows[part : part + 256]
-            own = np.zeros((n, len(some)))
-            index = at[part : part + 256, None] + np.arange(rows.shape[1])
-            np.add.at(own, (index, np.arange(len(some))[:, None]), some)
-            found = cho_solve_banded((self.factor, True), own)
-            out[part : part + 256] = np.sqrt(self.variance * np.einsum("np,np->p", own, found))
+    def deviation(self, s: FloatArray) -> FloatArray:
+        """Standard deviation of the curve at places s (P,), in knots from the first one."""
+        j = np.clip(s.astype(np.int64), 0, self.factor.shape[1] - 4)
+        rows, out = weights(s - j), np.empty(len(s))
+        size = max(1, CELLS // self.factor.shape[1])
+        for part in range(0, len(s), size):
+            some = rows[part : part + size]
+            sums = np.zeros((self.factor.shape[1], len(some)))
+            np.put_along_axis(sums, (j[part : part + size, None] + np.arange(4)).T, some.T, axis=0)
+            out[part : part + size] = self.of_sums(sums)
         return out
+
+    def of_sums(self, sums: FloatArray) -> FloatArray:
+        """Standard deviation of sums of the coefficients with weights (n + 3, P), (P,)."""
+        solved = cho_solve_banded((self.factor, True), sums)
+        return np.asarray(np.sqrt(self.variance * np.einsum("np,np->p", sums, solved)))
 
 
 def third_differences(penalty: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ from rotorid.commands import (
     TrialWeightOptions,
     TrialWeights,
     UnbalanceOptions,
+    VectorsOptions,
     balance,
     campbell,
     critical,
@@ -28,6 +29,7 @@ from rotorid.commands import (
     tolerance,
     trial_weight,
     unbalance,
+    vectors,
 )
 from rotorid.commands.outcome import Delivered
 from rotorid.workflows.calibration.calibrate import Calibrated, CalibrateOptions, calibrate
@@ -44,8 +46,6 @@ from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
-from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
-from rotorid.workflows.vibration.vectors_result import VectorsOfRecords
 
 __all__ = [
     "Balance",
@@ -87,7 +87,6 @@ __all__ = [
     "TrialWeightOptions",
     "TrialWeights",
     "UnbalanceOptions",
-    "VectorsOfRecords",
     "VectorsOptions",
     "balance",
     "bearings",
