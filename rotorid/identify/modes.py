@@ -75,12 +75,11 @@ def fit_modes(
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
     if readings.covariances is not None or readings.shares is not None:
         return FittedModes(readings, answers, *_search(readings, answers, q, ends)[1:], ends, "")
-    size = np.broadcast_to(np.eye(2), (*Z.shape, 2, 2))
-    share = _search(readings, answers, q, ends, stated=False)
-    other = _search(replace(readings, covariances=size), answers, q, ends, stated=False)
-    if other[0] < share[0] + CLEARLY:
-        return FittedModes(readings, answers, *share[1:], ends, "share of every amplitude")
-    return FittedModes(readings, answers, *other[1:], ends, "size everywhere")
+    size = replace(readings, covariances=np.broadcast_to(np.eye(2), (*Z.shape, 2, 2)))
+    share, other = (_search(each, answers, q, ends, stated=False) for each in (readings, size))
+    likely = other[0] >= share[0] + CLEARLY
+    same = "size everywhere" if likely else "share of every amplitude"
+    return FittedModes(readings, answers, *(other if likely else share)[1:], ends, same)
 
 
 def _search(

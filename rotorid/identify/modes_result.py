@@ -61,9 +61,10 @@ class FittedModes:
     def unit(self) -> float:
         """Variance of residuals where no errors are stated, else 1; NaN where nothing is left to show it."""
         estimate = self.fit.estimate
-        if estimate.errors_stated or estimate.dof < 1:
-            return 1.0 if estimate.errors_stated else np.nan
-        return float(np.fmax(estimate.residuals @ estimate.residuals, 1e-300) / estimate.dof)
+        if estimate.errors_stated:
+            return 1.0
+        left = float(np.fmax(estimate.residuals @ estimate.residuals, 1e-300))
+        return left / estimate.dof if estimate.dof > 0 else np.nan
 
     def curve(self, omega: FloatArray) -> ComplexArray:
         """The fitted amplitudes at frequencies between the readings, (m,): (m, P)."""

@@ -96,14 +96,14 @@ def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArra
             f"{sweep.labels.speed_words(speed)}; the lowest speed is "
             f"{sweep.labels.speed_words(float(sweep.speeds.min()))}"
         )
-    mean = np.nanmean(slow.vectors, axis=0)
-    if slow.covariances is not None:
-        there = ~np.isnan(slow.vectors)[..., None, None]
-        return mean, np.where(there, slow.covariances, 0.0).sum(axis=0) / count[:, None, None] ** 2
-    off = np.nan_to_num(slow.vectors - mean)
-    parts = np.stack((off.real, off.imag), axis=-1)
-    free = np.where(count > 1, count - 1.0, np.nan) * count
-    return mean, np.einsum("nci,ncj->cij", parts, parts) / free[:, None, None]
+    mean, variances = np.nanmean(slow.vectors, axis=0), slow.covariances
+    if variances is None:  # as the vectors scatter
+        off = slow.vectors - mean
+        parts = np.stack((off.real, off.imag), axis=-1)
+        free = np.where(count > 1, 1 - 1 / count, np.nan)[:, None, None]
+        variances = parts[..., None] * parts[..., None, :] / free
+    read = ~np.isnan(slow.vectors)[..., None, None]
+    return mean, np.where(read, variances, 0.0).sum(axis=0) / count[:, None, None] ** 2
 
 
 def vectors_when_passing(
