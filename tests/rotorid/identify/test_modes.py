@@ -350,3 +350,19 @@ def test_probes_a_quarter_turn_apart_read_a_real_mode():
         SteadyAnswers(omega, omega**2 + 0j),
     )  # fmt: skip
     assert skew.warnings[0].startswith("mode 1 is complex")
+
+
+def test_a_point_that_was_mostly_not_read_keeps_its_weights():
+    """Of amplitudes in µm: what lacks says nothing about how large the others are."""
+    omega0, _ = undamped(M, K)
+    omega = around(omega0, 2e-4 * omega0, 25)
+    Z = 1e-6 * amplitudes(omega, M, 4e-4 * K, K, [0.0, 0.0, 1.0])
+    rng = np.random.default_rng(8)
+    Z = Z * (1 + 0.02 * (rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)))
+    whole = fitted(omega, measured(omega, Z, (0.02, 0.02)))
+    Z[np.arange(len(omega)) % 3 > 0, 0] = np.nan
+    some = fitted(omega, measured(omega, Z, (0.02, 0.02)))
+    assert some.warnings == ()
+    ratio = some.shape_std[:, 0] / whole.shape_std[:, 0]
+    assert (ratio > 1.2).all()
+    assert (ratio < 2.5).all()  # of a third of the readings
