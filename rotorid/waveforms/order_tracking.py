@@ -20,11 +20,12 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.waveforms.penalised_spline import (
     ROUNDS,
     SOFTEST,
-    Moments,
     Smoothing,
+    band_of,
     moments,
     smooth,
     spline,
+    sums_of,
     third_differences,
     times,
 )
@@ -141,9 +142,9 @@ def track_orders(parts: Parts, first: float, last: float, highest: int, knot: fl
         for turns, samples in parts():
             yield np.clip((turns - first) / knot, 0, n), _columns(turns, highest), samples
 
-    sums = moments(with_columns(), n)
-    band, right = sums.band(), sums.sums()
-    alone = Moments(sums.gram[:, :, :1, :, :1], sums.right[:, :, :1]).band()
+    blocks, samples = moments(with_columns(), n)
+    of_mean = blocks[:, :: 2 * highest + 1, :: 2 * highest + 1]
+    band, alone, right = band_of(blocks), band_of(of_mean), sums_of(samples)
     loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
     M = 2 * highest + 1
     start = _solved(band, [loose] * M, right)
@@ -170,7 +171,7 @@ def track_orders(parts: Parts, first: float, last: float, highest: int, knot: fl
         raw.append(np.stack(means, axis=-1))
     c = np.stack(coefficients, axis=-1)
     complex_ones = np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)
-    density = sums.gram[:, :, 0, :, 0].sum(axis=(1, 2)) / knot
+    density = of_mean.sum(axis=(1, 2)) / knot
     found = Orders(first, knot, complex_ones, tuple(smoothings), density, np.stack(raw, axis=-1))
     return found if fine or not found.too_fast() else track_orders(parts, first, last, highest, FINE)
 

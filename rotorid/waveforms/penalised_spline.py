@@ -49,61 +49,49 @@ def spline(start: float, step: float, c: AnyArray) -> BSpline:
     return BSpline(start + step * np.arange(-3, len(c) + 1), c, 3)
 
 
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """All that the samples say about splines: sums over the intervals between knots.
+def moments(
+    parts: Iterable[tuple[FloatArray, FloatArray, FloatArray]], n: int
+) -> tuple[FloatArray, FloatArray]:
+    """All that samples say about splines: sums over the n intervals between knots.
 
-    Attributes
-    ----------
-    gram
-        Of the columns, (n, 4, M, 4, M) for n intervals.
-    right
-        Columns by samples, (n, 4, M, C).
+    Parts of a record are places s (L,), increasing, from 0 to n; columns (L, M); samples (L, C). The sums are
+    Gram matrices (n, 4 M, 4 M) of the columns, spline by spline, and columns by samples (n, 4 M, C).
     """
-
-    gram: FloatArray
-    right: AnyArray
-
-    def band(self) -> FloatArray:
-        """Gram matrix of all coefficients (knot by knot, column by column), lower band for LAPACK."""
-        n, _, M = self.gram.shape[:3]
-        band = np.zeros((4 * M, (n + 3) * M))
-        for a in range(4):
-            for b in range(a + 1):
-                for m in range(M):
-                    for k in range(M):
-                        if (below := (a - b) * M + m - k) >= 0:
-                            band[below, b * M + k : (b + n) * M : M] += self.gram[:, a, m, b, k]
-        return band
-
-    def sums(self) -> AnyArray:
-        """Right-hand sides of all coefficients, (n + 3, M, C)."""
-        n, _, M, C = self.right.shape
-        out = np.zeros((n + 3, M, C), dtype=self.right.dtype)
-        for a in range(4):
-            out[a : a + n] += self.right[:, a]
-        return out
-
-
-def moments(parts: Iterable[tuple[FloatArray, FloatArray, FloatArray]], n: int) -> Moments:
-    """Sums over parts of a record: places s (L,), increasing, from 0 to n; columns (L, M); samples (L, C)."""
-    gram = right = None
+    gram, right = np.zeros((n, 0, 0)), np.zeros((n, 0, 0))
     for s, columns, samples in parts:
-        L, M = columns.shape
-        if gram is None or right is None:
-            gram, right = np.zeros((n, 4 * M, 4 * M)), np.zeros((n, 4 * M, samples.shape[1]))
+        if not gram.size:
+            size = 4 * columns.shape[1]
+            gram, right = np.zeros((n, size, size)), np.zeros((n, size, samples.shape[1]))
         j = np.minimum(s.astype(np.int64), n - 1)
-        design = (weights(s - j)[:, :, None] * columns[:, None, :]).reshape(L, 4 * M)
+        design = (weights(s - j)[:, :, None] * columns[:, None, :]).reshape(len(s), -1)
         first, last = int(j[0]), int(j[-1])
         ends = np.searchsorted(j, np.arange(first, last + 2))
         for at, (low, high) in enumerate(pairwise(ends), start=first):
-            own = design[low:high]
-            gram[at] += own.T @ own
-            right[at] += own.T @ samples[low:high]
-    if gram is None or right is None:
-        raise ValueError("there are no samples")
-    M = gram.shape[1] // 4
-    return Moments(gram.reshape(n, 4, M, 4, M), right.reshape(n, 4, M, -1))
+            rows = design[low:high]
+            gram[at] += rows.T @ rows
+            right[at] += rows.T @ samples[low:high]
+    return gram, right
+
+
+def band_of(gram: FloatArray) -> FloatArray:
+    """The matrix of all coefficients (knot by knot, column by column) of blocks (n, 4 M, 4 M), lower band."""
+    n, size = gram.shape[:2]
+    M = size // 4
+    band = np.zeros((size, (n + 3) * M))
+    for p in range(size):
+        for q in range(p + 1):
+            band[p - q, q : q + n * M : M] += gram[:, p, q]
+    return band
+
+
+def sums_of(right: FloatArray) -> FloatArray:
+    """Right-hand sides of all coefficients, (n + 3, M, C), of blocks (n, 4 M, C)."""
+    n, size, C = right.shape
+    M = size // 4
+    out = np.zeros(((n + 3) * M, C))
+    for p in range(size):
+        out[p : p + n * M : M] += right[:, p]
+    return out.reshape(n + 3, M, C)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +132,8 @@ class Smoothing:
 
 def third_differences(penalty: FloatArray) -> FloatArray:
     """Dᵀ diag(penalty) D, lower band (4, n + 3), D of third differences."""
-    n, d = len(penalty), (-1.0, 3.0, -3.0, 1.0)
-    band = np.zeros((4, n + 3))
-    for a in range(4):
-        for b in range(a + 1):
-            band[a - b, b : b + n] += d[a] * d[b] * penalty
-    return band
+    d = np.array((-1.0, 3.0, -3.0, 1.0))
+    return band_of(np.multiply.outer(penalty, np.outer(d, d)))
 
 
 def times(band: FloatArray, c: AnyArray) -> AnyArray:

@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from rotorid.base.arrays import AnyArray, FloatArray, IntArray
 from rotorid.base.text import counted
-from rotorid.waveforms.penalised_spline import Smoothing, moments, smooth, spline
+from rotorid.waveforms.penalised_spline import Smoothing, band_of, moments, smooth, spline, sums_of
 from rotorid.waveforms.record import Channel, Edge, TachoSettings
 
 if TYPE_CHECKING:
@@ -396,8 +396,8 @@ def _fitted(times: FloatArray, turns: FloatArray, variance: FloatArray) -> Angle
     fastest = np.percentile(np.gradient(turns, times), 99)
     intervals = max(1, int(np.ceil((times[-1] - start) * fastest / KNOT)))
     step = (float(times[-1]) - start) / intervals
-    found = moments([((times - start) / step, 1 / size[:, None], left[:, None])], intervals)
-    smoothing, c = smooth(found.band(), found.sums()[:, 0, 0].copy(), float(left @ left), len(left))
+    gram, right = moments([((times - start) / step, 1 / size[:, None], left[:, None])], intervals)
+    smoothing, c = smooth(band_of(gram), sums_of(right)[:, 0, 0].copy(), float(left @ left), len(left))
     return Angle(start, step, trend, spline(start, step, c), smoothing)
 
 
