@@ -14,13 +14,10 @@ from rotorid.cli.commands import (
     calibrate,
     demo,
     fit,
-    modes,
     motion,
     periodic,
     reduce,
-    runup,
     schema,
-    vectors,
 )
 from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
@@ -30,12 +27,15 @@ from rotorid.commands import (
     critical,
     identify,
     influence,
+    modes,
     response,
+    runup,
     simulate,
     split,
     tolerance,
     trial_weight,
     unbalance,
+    vectors,
 )
 from rotorid.commands.app import run, typer_command, written_help
 from rotorid.commands.terminal import markup_mode
@@ -53,7 +53,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Balance rotors": {
         "balance": balance.balance,
         "worksheet": worksheet,
-        "vectors": vectors.vectors,
+        "vectors": typer_command(vectors),
         "trial-weight": typer_command(trial_weight),
         "split": typer_command(split),
         "tolerance": typer_command(tolerance),
@@ -77,8 +77,8 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "identify": typer_command(identify),
         "fit": fit.fit,
         "simulate": typer_command(simulate),
-        "modes": modes.modes,
-        "runup": runup.runup,
+        "modes": typer_command(modes),
+        "runup": typer_command(runup),
         "calibrate": calibrate.calibrate,
     },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema},

@@ -9,13 +9,16 @@ from rotorid.commands.critical import CriticalOptions, critical
 from rotorid.commands.fit import FitOptions, RecordFit, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.influence import InfluenceOptions, influence
+from rotorid.commands.modes import ModesOptions, modes
 from rotorid.commands.outcome import Outcome
 from rotorid.commands.response import ResponseOptions, response
+from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
+from rotorid.commands.vectors import VectorsOptions, vectors
 
 __all__ = [
     "Balance",
@@ -25,25 +28,31 @@ __all__ = [
     "FitOptions",
     "IdentifyOptions",
     "InfluenceOptions",
+    "ModesOptions",
     "Outcome",
     "RecordFit",
     "ResponseOptions",
+    "RunUpOptions",
     "SimulateOptions",
     "SplitOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
     "TrialWeights",
     "UnbalanceOptions",
+    "VectorsOptions",
     "balance",
     "campbell",
     "critical",
     "fit",
     "identify",
     "influence",
+    "modes",
     "response",
+    "runup",
     "simulate",
     "split",
     "tolerance",
     "trial_weight",
     "unbalance",
+    "vectors",
 ]

@@ -287,6 +287,7 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
         first = not hints or one.default is not one.empty
         declared = typer.Argument(**told) if first else typer.Option(f"--{name}", **told)
         taken: Any = Path if "Path" in str(one.annotation) and first else str
+        taken = list[Path] if str(one.annotation).startswith("Sequence[Path") else taken
         hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
         parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
     parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]

@@ -11,26 +11,32 @@ from rotorid.commands import (
     FitOptions,
     IdentifyOptions,
     InfluenceOptions,
+    ModesOptions,
     RecordFit,
     ResponseOptions,
+    RunUpOptions,
     SimulateOptions,
     SplitOptions,
     ToleranceOptions,
     TrialWeightOptions,
     TrialWeights,
     UnbalanceOptions,
+    VectorsOptions,
     balance,
     campbell,
     critical,
     fit,
     identify,
     influence,
+    modes,
     response,
+    runup,
     simulate,
     split,
     tolerance,
     trial_weight,
     unbalance,
+    vectors,
 )
 from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.identify import Coefficients
@@ -45,11 +51,6 @@ from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
-from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
-from rotorid.workflows.vibration.runup import RunUpOptions, runup
-from rotorid.workflows.vibration.runup_result import RunUp
-from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
-from rotorid.workflows.vibration.vectors_result import VectorsOfRecords
 
 __all__ = [
     "Balance",
@@ -71,7 +72,6 @@ __all__ = [
     "FleetShown",
     "IdentifyOptions",
     "InfluenceOptions",
-    "ModesOfReadings",
     "ModesOptions",
     "Motion",
     "MotionOptions",
@@ -81,7 +81,6 @@ __all__ = [
     "ReduceOptions",
     "ReducedRotor",
     "ResponseOptions",
-    "RunUp",
     "RunUpOptions",
     "SimulateOptions",
     "SplitOptions",
@@ -92,7 +91,6 @@ __all__ = [
     "TrialWeightOptions",
     "TrialWeights",
     "UnbalanceOptions",
-    "VectorsOfRecords",
     "VectorsOptions",
     "balance",
     "bearings",

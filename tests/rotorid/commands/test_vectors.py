@@ -9,8 +9,7 @@ from scipy.io import wavfile
 
 from rotorid.samples import sample_data
 from rotorid.tables.reader.problems import InputError
-from rotorid.workflows import BalanceOptions, balance
-from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
+from rotorid.workflows import BalanceOptions, VectorsOptions, balance, vectors
 
 SAMPLE = sample_data() / "waveforms"
 RATE = 2048
@@ -122,7 +121,7 @@ def test_what_cannot_be_is_told_in_one_message(cli, words, message):
 def test_pulses_that_are_alike_do_not_compare_records(tmp_path):
     files = [write(tmp_path / f"{name}.wav", pulses=2) for name in "ab"]
     options = VectorsOptions(tacho="1", unit="um", pulses=2)
-    (one,) = vectors(files[:1], options).found
+    (one,) = vectors(files[:1], options).result
     assert "multiples of 180°" in one.warnings[0]
     with pytest.raises((ValueError, InputError), match="vectors of different records cannot be compared"):
         vectors(files, options)

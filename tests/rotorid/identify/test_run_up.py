@@ -8,8 +8,8 @@ from run_ups import drawn
 
 from balancing import Labels
 from rotorid.base.rpm import RPM
-from rotorid.harmonic.modal.run_up import (
-    SweepVectors,
+from rotorid.identify.modes_readings import Readings
+from rotorid.identify.run_up import (
     constant_vectors,
     fit_sweep,
     slow_vectors,
@@ -107,6 +107,6 @@ def test_noise_alone_is_no_mode():
     for stated in (True, False):
         Z = 1e-6 * (5 + random.standard_normal((200, 2, 2)) @ (1, 1j))
         own = np.broadcast_to(1e-12 * np.eye(2), (200, 2, 2, 2)) if stated else None
-        sweep = SweepVectors("a", time, 30 + 10 * time, ("x", "y"), Z, own, Labels())
+        sweep = Readings("a", time, 30 + 10 * time, ("x", "y"), Z, own, Labels())
         with pytest.raises(ValueError, match="no peak stands"):
             fit_sweep(sweep)

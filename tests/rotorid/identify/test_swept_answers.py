@@ -5,8 +5,7 @@ import pytest
 from run_ups import example
 from scipy.integrate import solve_ivp
 
-from rotorid.harmonic.modal.modal_readings import SteadyAnswers
-from rotorid.harmonic.modal.swept_answers import swept_answers
+from rotorid.identify.answers import SteadyAnswers, swept_answers
 
 OMEGA, ZETA = np.array([100.0, 150.0]), np.array([0.02, 0.03])
 Q = np.concatenate((OMEGA, ZETA))

@@ -86,8 +86,7 @@ def test_acceleration_may_be_an_option(cli, rotor_and_sweep, tmp_path):
         (("--slow-roll", "100"), "no vector at or below 100 rpm"),
         (("--slow-roll", "no.csv"), "no.csv"),
         (("--bands", "700"), "--bands '700' is not a range: use LOWEST:HIGHEST, in rpm"),
-        (("--save-runs", "runs.csv"), "--save-runs needs --speeds"),
-        (("--save-runs", "runs.csv", "--speeds", "100"), "goes from 300 rpm to"),
+        (("--speeds", "100"), "goes from 300 rpm to"),
     ],
 )
 def test_options_that_cannot_be(cli, vectors, monkeypatch, tmp_path, words, message):
@@ -105,7 +104,7 @@ def test_of_several_runs_one_is_chosen(cli, rotor_and_sweep, tmp_path):
     assert found.code == 2
     assert "say with --run whose modes to fit, A or B" in found.err
     runs = tmp_path / "runs.csv"
-    words = ("--phase", "lag", "--run", "A", "--speeds", "1400,1500", "--save-runs", runs)
+    words = ("--phase", "lag", "--run", "A", "--speeds", "1400,1500", "--output", runs)
     document = cli("runup", path, *words, "--json").json
     assert [row["run"] for row in document["vectors"]] == ["A"] * 4 + ["B"] * 4
     written = {sweep.run: sweep for sweep in read_vectors(runs, "lag")}
@@ -160,3 +159,12 @@ def test_vectors_of_python(rotor_and_sweep):
     found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])], slow_roll=47.0))
     assert len(found.to_dict()["modes"]) == 1
     assert json.dumps(found.document)
+
+
+def test_a_mode_that_is_passed_within_few_turns_is_said(tmp_path, cli):
+    """ζω²/(πα): of this rotor 5 turns at 300 rpm a second, 16 at 100."""
+    for rate, many in ((300.0, True), (100.0, False)):
+        rotor, sweep = drawn(rate=rate)
+        warnings = cli("runup", table(tmp_path / "v.csv", [sweep]), "--json").json["warnings"]
+        turns = rotor.zeta * rotor.omega**2 / (np.pi * rate / RPM)
+        assert any("is passed within" in words for words in warnings) == many == (turns.min() < 6)
