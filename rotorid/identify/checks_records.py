@@ -37,8 +37,8 @@ PEAK = 10.0
 SHARE, FAR = 0.3, 5.0
 """Of the variance, or standard deviations of a parameter: what a cause takes or moves if it is named."""
 HINT = (
-    "a local minimum or an unsuitable model; try other starting values, bounds, several starts or multiple "
-    "shooting. No intervals are given"
+    "a local minimum or an unsuitable model; try other starting values, bounds or several "
+    "starts. No intervals are given"
 )
 
 

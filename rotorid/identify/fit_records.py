@@ -1,7 +1,7 @@
 """Fit a model in time to records: the methods behind one function.
 
-Levenberg–Marquardt from the start, over pieces that join where the method says so, or where the model at the
-first minimum does not describe the record; from other starts, too, there. The methods of [Q] and [F] stand
+Levenberg–Marquardt from the start, and from others where the model at the first minimum does not describe the
+record. The methods of [Q] and [F] stand
 beside it as they are printed.
 """
 
@@ -24,8 +24,8 @@ from rotorid.identify.record_residuals import RTOL, Iterations, Problem
 from rotorid.identify.records import Record, for_copies, inputs_of, recorded_starts, refined
 from rotorid.identify.result_records import Fit, Minimum
 from rotorid.identify.sensitivity_steps import sensitivity_steps
-from rotorid.identify.shooting import measured_states, shoot
 from rotorid.identify.simulation import simulate
+from rotorid.regression import gain
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
@@ -129,8 +129,6 @@ def fit(  # noqa: PLR0913
         if method == "quasilinearization":
             first = [_trajectory(problem, theta, k, trajectory) for k in range(len(several))]
             return quasilinearization(problem, theta, first, max_iterations=max_iterations, epsilon=tolerance)
-        if method == "multiple-shooting":
-            return minimum(problem, _shot(problem, theta), limits, loss, max_iterations).after(theta[None])
         return minimum(problem, theta, limits, loss, max_iterations)
 
     begins = spread_starts(begin, limits, starts or 1, seed)
@@ -182,9 +180,6 @@ METHODS: tuple[Method[None], ...] = (
     Method("levenberg-marquardt", "safeguarded, with bounds and robust losses", None),
     Method("gauss-newton", "whole steps without safeguards, as [F]", None),
     Method("quasilinearization", "linear fits about the last trajectory, as [Q]", None),
-    Method(
-        "multiple-shooting", "for long or oscillating records and bad starts; then levenberg-marquardt", None
-    ),
 )
 OF_TEXTS = ("gauss-newton", "quasilinearization")
 
@@ -257,15 +252,12 @@ def _searched(
 def _from_elsewhere(
     problem: Problem, begin: FloatArray, first: Iterations, search: Searching, seed: int
 ) -> tuple[list[Iterations], str]:
-    """A better minimum than the first, from pieces that join or other starts, and words; or the first."""
+    """A better minimum than the first, from other starts, and words; or the first."""
     if not (first.converged or first.iterations > LONG):
         return [first], ""
 
-    def shot(problem: Problem, theta: FloatArray) -> Iterations:
-        return search(problem, _shot(problem, theta)).after(theta[None])
-
     others = spread_starts(begin, problem.model.bounds, OTHERS, seed)[1:]
-    paths = [first, *_searched(shot, problem, [begin], []), *_searched(search, problem, others, [])]
+    paths = [first, *_searched(search, problem, others, [])]
     best = min(paths, key=lambda path: _cost(problem, path))
     if _cost(problem, first) <= BETTER * _cost(problem, best):
         return [first], ""
@@ -273,11 +265,6 @@ def _from_elsewhere(
         "from the starting values the search ends where the model does not describe the record; this is from "
         f"another of {counted(len(paths), 'start')} (--start names better ones)"
     )
-
-
-def _shot(problem: Problem, theta: FloatArray) -> FloatArray:
-    states = [measured_states(problem, theta, k) for k in range(len(problem.records))]
-    return shoot(problem, theta, states, problem.model.bounds)
 
 
 def _trajectory(
@@ -290,13 +277,41 @@ def _trajectory(
         x = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False).x
         return x, model.f(finer.t, x, theta, inputs_of(model, finer))[..., 0]
     if isinstance(kind, str):
-        states = measured_states(problem, theta, number)
+        states = _measured_states(problem, theta, number)
     else:
         columns = [np.broadcast_to(np.asarray(kind[x], dtype=float), record.t.shape) for x in model.states]
         states = np.array(columns).reshape(-1, len(record)).T
     columns = [np.interp(finer.t, record.t, column) for column in states.T]
     x = np.array(columns).reshape(-1, len(finer)).T
     return x, np.asarray(np.gradient(x, finer.t, axis=0)) if len(finer) > 1 else np.zeros_like(x)
+
+
+def _measured_states(problem: Problem, theta: FloatArray, number: int) -> FloatArray:
+    """States (n, n_x) of a record that explain its measured outputs at each time, gaps filled straight.
+
+    Solves h(t, x, θ) = y at each time by Gauss–Newton steps of smallest change, beginning at the initial
+    values; what the outputs do not tell stays there.
+    """
+    model, record = problem.models[number], problem.records[number]
+    t, n = record.t, len(model.states)
+    x = np.tile(model.x0(theta)[:, 0], (len(t), 1))
+    y = problem.measured[number].copy()
+    for column in y.T:
+        known = ~np.isnan(column)
+        if known.any():
+            column[:] = np.interp(t, t[known], column[known])
+    seen = ~np.isnan(y)
+    for _ in range(20 if n else 0):
+        outputs = model.h(t, x, theta, problem.inputs[number])
+        miss = np.where(seen, y - outputs[..., 0], 0.0)
+        slopes = np.where(seen[..., None], outputs[..., 1 : 1 + n], 0.0)
+        if not (np.isfinite(slopes).all() and np.isfinite(miss).all()):
+            raise SimulationError(f"{record.name}: no states explain the measured outputs")
+        step = np.einsum("tij,tj->ti", gain(slopes, rcond=1e-8), miss)
+        x = x + step
+        if np.abs(step).max() <= 1e-9 * (1 + np.abs(x).max()):
+            break
+    return x
 
 
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:

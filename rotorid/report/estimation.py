@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from rotorid.identify import Identification
     from rotorid.identify.result_records import Fit
-    from rotorid.regression.d_optimal import Design
     from rotorid.regression.prior import PriorEffect
 
 READINGS = 40
@@ -66,31 +65,27 @@ def fit_report(
 
 def identification_report(
     document: Mapping[str, Any],
-    result: Identification | None,
-    design: Design | None,
+    result: Identification,
     *,
     provenance: Mapping[str, Any],
     model: str,
 ) -> bytes:
-    """Make the sheet of an identification, of frequencies to measure next, or of both; see `fit_report`."""
+    """Make the sheet of an identification; see `fit_report`."""
     from rotorid.identify.plots import figure_identification
 
     document = Document(document)
-    about: Facts = []
-    parts = _model(model)
-    if result is not None:
-        about, columns = _experiments(result), result.misfit
-        count = len(columns[0].values)
-        rows = evenly(count, READINGS)
-        note = f"{len(rows)} of {count} readings; --table prints all." if len(rows) < count else ""
-        left = Part("What the model leaves", tables=(Grid("Each reading", shown(columns, rows), note),))
-        drawn = _picture(figure_identification(result), "Amplitudes or shapes")
-        first = _estimate(document, result.answer, result.combinations, result.prior)
-        parts = [first, *[left][:count], *parts, drawn]
-    if design is not None:
-        told = design.answer
-        parts.append(Part("Which frequencies to measure next", (told.judgement,), listing=told.found))
-    return _sheet("Coefficients from harmonic tests", document, provenance, about, parts)
+    columns = result.misfit
+    count = len(columns[0].values)
+    rows = evenly(count, READINGS)
+    note = f"{len(rows)} of {count} readings; --table prints all." if len(rows) < count else ""
+    left = Part("What the model leaves", tables=(Grid("Each reading", shown(columns, rows), note),))
+    parts = [
+        _estimate(document, result.answer, result.combinations, result.prior),
+        *[left][:count],
+        *_model(model),
+        _picture(figure_identification(result), "Amplitudes or shapes"),
+    ]
+    return _sheet("Coefficients from harmonic tests", document, provenance, _experiments(result), parts)
 
 
 def _sheet(

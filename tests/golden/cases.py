@@ -252,7 +252,6 @@ reduce-order                reduce {ROTOR23} --nodes 12,7
 identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --amplitude-error 2 --phase-error 1
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
 identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --loss soft_l1
-identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
 identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --amplitude-error 2 --phase-error 1
 identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
@@ -274,12 +273,10 @@ fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
-fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
 fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
-fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
 fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
 fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
 fit-tolerance-coarse        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 0.9
@@ -527,13 +524,11 @@ STORED = (
     "fit-equations",
     "fit-prior",
     "fit-run-down-plot",
-    "fit-shooting",
     "fleet-add",
     "fleet-fit",
     "fleet-show-type",
     "holes-minmax",
     "holes-report",
-    "identify-design",
     "identify-equations",
     "identify-modes",
     "identify-output-error",

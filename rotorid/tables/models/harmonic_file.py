@@ -246,6 +246,6 @@ HARMONIC = (
     Key("known", NUMBERS, "names with their numbers"),
     BOUNDS,
     PRIOR,
-    Key("start", NUMBERS, "guesses, for output error, `--design`, and models with several solutions"),
+    Key("start", NUMBERS, "guesses, for output error, and models with several solutions"),
     STATED_ERRORS,
 )

@@ -158,32 +158,3 @@ def test_bad_options_end_with_one_message(cli, args, message):
     assert outcome.code == 2
     assert message in outcome.err
     assert "Traceback" not in outcome.err
-
-
-def test_design_chooses_frequencies_with_and_without_data(cli, tmp_path):
-    folder = FOLDER / "task_5_1"
-    options = ("--amplitude-error", 2, "--phase-error", 1, "--design", "5:40:1", "--choose", 2)
-    found = cli("identify", folder / "model.toml", folder / "data.csv", *options, "--json").json
-    assert set(found) >= KEYS
-    chosen = found["design"]["frequencies_rad_s"]
-    assert len(chosen) == 2
-    assert min(abs(w - 10.0) for w in chosen) <= 1.0  # near the resonance lies what tells the damping
-    model = tmp_path / "model.toml"
-    text = (folder / "model.toml").read_text(encoding="utf-8")
-    model.write_text(text + "\n[start]\nc = 999.935\nalpha = 10.0014\n", encoding="utf-8")
-    alone = cli("identify", model, *options, "--json").json
-    assert alone["design"]["frequencies_rad_s"] == chosen
-    for args, message in (
-        ((folder / "model.toml", *options), "needs a guess of c, alpha"),
-        ((model, "--design", "5:40:1"), "needs the errors"),
-        ((model, "--choose", 2), "belongs to --design"),
-        ((model, folder / "data.csv", "--choose", 2), "belongs to --design"),
-        ((model, *options[:-4], "--design", "5:40"), "--design '5:40' is not a range"),
-        ((model, *options[:-2], "--choose", 99), "36"),
-        ((model, *options, "--plot", tmp_path / "p.png"), "table of measured amplitudes"),
-        ((FOLDER / "section_1_7" / "model.toml", *options), "guess of c, b, q"),
-        ((FOLDER / "task_7_1" / "model.toml", FOLDER / "task_7_1" / "data.csv", *options), "free vibrations"),
-    ):
-        outcome = cli("identify", *args)
-        assert outcome.code == 2, args
-        assert message in outcome.err

@@ -135,8 +135,6 @@ def test_what_did_not_converge_has_no_intervals_and_says_nothing_of_what_is_dete
         method=method,
         max_iterations=1,
     )
-    if found.converged:  # multiple shooting ended nearby
-        return
     assert found.std is None
     assert all(
         part["ci95"] is None and part["std"] is None for part in found.to_dict()["parameters"].values()
