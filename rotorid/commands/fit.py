@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.logs import workflows as log
-from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.commands.input_checks import check_choices, file_of, refuse
 from rotorid.commands.outcome import Found, command, phase, provenance, text_of
@@ -53,8 +52,6 @@ class FitOptions:
     tolerance : X
         ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β),
         the sum of squares times Δt, is below it; default: where no step matters.
-    trajectory : model|data
-        Where quasilinearization begins: the model's own solution (default), or the measured outputs.
     rtol : X
         Relative tolerance of the integration; default: 1e-10.
     allow_missing
@@ -75,7 +72,6 @@ class FitOptions:
     seed: int | None = None
     max_iterations: int = 100
     tolerance: float | None = None
-    trajectory: str | None = None
     rtol: float | None = None
     allow_missing: bool = False
     ridge: float | None = None
@@ -173,7 +169,6 @@ def fit(
             seed=options.seed or 0,
             max_iterations=options.max_iterations,
             tolerance=options.tolerance,
-            trajectory=options.trajectory or "model",
             rtol=RTOL if options.rtol is None else options.rtol,
             weigh=weigh,
             ridge=options.ridge or 0.0,
@@ -186,10 +181,6 @@ def fit(
 def _check(options: FitOptions) -> None:
     """Refuse names that are not known, and options that the method or the integrator would not look at."""
     check_choices(options, choices())
-    if options.trajectory is not None:
-        one_of(options.trajectory, "--trajectory", ("model", "data"))
-    if options.method != "quasilinearization":
-        refuse(options, ("trajectory",), "belongs to --method quasilinearization")
     if options.method not in ("gauss-newton", "quasilinearization"):
         refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
     if options.rtol is None:

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
-from rotorid.base.suggestions import one_of
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
 from rotorid.identify.integrators import HEUN
@@ -25,7 +24,6 @@ from rotorid.identify.records import Record, for_copies, inputs_of, recorded_sta
 from rotorid.identify.result_records import Fit, Minimum
 from rotorid.identify.sensitivity_steps import sensitivity_steps
 from rotorid.identify.simulation import simulate
-from rotorid.regression import gain
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
@@ -39,7 +37,7 @@ BETTER = 1.5
 MOST_STARTS = 10_000
 SAME = 1e-3
 """Relative difference of parameters below which two minima are one."""
-Trajectories = str | Mapping[str, ArrayLike]
+Trajectories = Mapping[str, ArrayLike]
 Searching = Callable[[Problem, FloatArray], Iterations]
 
 
@@ -53,7 +51,7 @@ def fit(  # noqa: PLR0913
     start: Mapping[str, float] | None = None,
     loss: str = "linear",
     starts: int | None = None,
-    trajectory: Trajectories = "model",
+    trajectory: Trajectories | None = None,
     max_iterations: int = 100,
     tolerance: float | None = None,
     rtol: float = RTOL,
@@ -81,8 +79,7 @@ def fit(  # noqa: PLR0913
         Number of starts: the first is `start`, the others spread over the bounds, or around it. None: others
         where levenberg-marquardt ends at a minimum that does not describe the record.
     trajectory
-        First trajectory of quasilinearization: "model" (its own solution), "data" (from the measured
-        outputs), or {state: number, or one value per time}.
+        First trajectory of quasilinearization: {state: number, or one value per time}; None: its solution.
     max_iterations
         At most.
     tolerance
@@ -268,50 +265,18 @@ def _from_elsewhere(
 
 
 def _trajectory(
-    problem: Problem, theta: FloatArray, number: int, kind: Trajectories
+    problem: Problem, theta: FloatArray, number: int, given: Trajectories | None
 ) -> tuple[FloatArray, FloatArray]:
     """States to begin quasilinearization with, at the times of `refined`, and their slopes."""
     model, record = problem.models[number], problem.records[number]
     finer = refined(record, FINER if problem.integrator not in HEUN else 1)
-    if kind == "model":
+    if given is None:
         x = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False).x
         return x, model.f(finer.t, x, theta, inputs_of(model, finer))[..., 0]
-    if isinstance(kind, str):
-        states = _measured_states(problem, theta, number)
-    else:
-        columns = [np.broadcast_to(np.asarray(kind[x], dtype=float), record.t.shape) for x in model.states]
-        states = np.array(columns).reshape(-1, len(record)).T
-    columns = [np.interp(finer.t, record.t, column) for column in states.T]
+    states = [np.broadcast_to(np.asarray(given[x], dtype=float), record.t.shape) for x in model.states]
+    columns = [np.interp(finer.t, record.t, column) for column in states]
     x = np.array(columns).reshape(-1, len(finer)).T
     return x, np.asarray(np.gradient(x, finer.t, axis=0)) if len(finer) > 1 else np.zeros_like(x)
-
-
-def _measured_states(problem: Problem, theta: FloatArray, number: int) -> FloatArray:
-    """States (n, n_x) of a record that explain its measured outputs at each time, gaps filled straight.
-
-    Solves h(t, x, θ) = y at each time by Gauss–Newton steps of smallest change, beginning at the initial
-    values; what the outputs do not tell stays there.
-    """
-    model, record = problem.models[number], problem.records[number]
-    t, n = record.t, len(model.states)
-    x = np.tile(model.x0(theta)[:, 0], (len(t), 1))
-    y = problem.measured[number].copy()
-    for column in y.T:
-        known = ~np.isnan(column)
-        if known.any():
-            column[:] = np.interp(t, t[known], column[known])
-    seen = ~np.isnan(y)
-    for _ in range(20 if n else 0):
-        outputs = model.h(t, x, theta, problem.inputs[number])
-        miss = np.where(seen, y - outputs[..., 0], 0.0)
-        slopes = np.where(seen[..., None], outputs[..., 1 : 1 + n], 0.0)
-        if not (np.isfinite(slopes).all() and np.isfinite(miss).all()):
-            raise SimulationError(f"{record.name}: no states explain the measured outputs")
-        step = np.einsum("tij,tj->ti", gain(slopes, rcond=1e-8), miss)
-        x = x + step
-        if np.abs(step).max() <= 1e-9 * (1 + np.abs(x).max()):
-            break
-    return x
 
 
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
@@ -370,7 +335,7 @@ def _check(  # noqa: PLR0913
     integrator: str,
     loss: str,
     starts: int | None,
-    trajectory: Trajectories,
+    trajectory: Trajectories | None,
     max_iterations: int,
     tolerance: float | None,
     weigh: bool,
@@ -382,9 +347,7 @@ def _check(  # noqa: PLR0913
             "file"
         )
     find(METHODS, method, "method")
-    if isinstance(trajectory, str):
-        one_of(trajectory, "trajectory", ("model", "data"))
-    elif set(trajectory) != set(model.states):
+    if trajectory is not None and set(trajectory) != set(model.states):
         raise ValueError(
             f"a starting trajectory needs every state ({', '.join(model.states)}); got "
             f"{', '.join(trajectory)}"

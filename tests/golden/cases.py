@@ -272,7 +272,6 @@ fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
-fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
 fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1

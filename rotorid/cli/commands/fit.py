@@ -20,7 +20,7 @@ from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
         "Method": "method loss starts ridge",
         "Limits": "max_iterations tolerance",
         OUTPUT: "",
-        "Expert": "integrator rtol trajectory seed",
+        "Expert": "integrator rtol seed",
     },
     to=(*WITH_REPORT, *EQUATIONS),
 )

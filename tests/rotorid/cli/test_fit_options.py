@@ -75,8 +75,6 @@ def test_seeds_choose_other_places(cli, tmp_path):
         (("--start", "lambda="), "lambda = '' is no number"),
         (("--start", "x0=1,x0=2"), "x0 stands twice"),
         (("--method", "gauss-newtom"), "did you mean 'gauss-newton'?"),
-        (("--method", "quasilinearization", "--trajectory", "dat"), "did you mean 'data'?"),
-        (("--trajectory", "data"), "--trajectory belongs to --method quasilinearization"),
         (("--rtol", "0"), "--rtol takes a number from 1e-13 to 0.01, not 0"),
         (("--rtol", "nan"), "--rtol takes a finite number, not nan"),
         (("--rtol", "1e-8", "--integrator", "rk4"), "rk4 has none"),
