@@ -25,19 +25,6 @@ Refit = Callable[[Experiments], Sequence[FloatArray]]
 """Solutions of the linear estimate from other experiments."""
 
 
-def misfit(estimate: Estimate) -> tuple[str, ...]:
-    """A warning where residuals this large are improbable (0.1 %) for the stated errors."""
-    from scipy.special import chdtrc
-
-    if estimate.chi_square is None or estimate.dof < 1 or chdtrc(estimate.dof, estimate.chi_square) > 1e-3:
-        return ()
-    ratio = float(np.sqrt(estimate.chi_square / estimate.dof))
-    return (
-        f"residuals are {ratio:.2g} times as large as the stated errors explain: the model, a reading, or "
-        "the errors stated are wrong, or a better minimum lies elsewhere (try another start)",
-    )
-
-
 def unexplained(
     comparison: Comparison, theta: FloatArray, estimate: Estimate, refit: Refit, *, converged: bool
 ) -> tuple[str, ...]:
@@ -46,7 +33,12 @@ def unexplained(
     Stated errors: residuals that these explain with a probability below 0.1 %. Otherwise more than a share
     of the readings; that it is ordered over the frequency shows that it is no noise.
     """
-    words, left = [*misfit(estimate)] if converged else [], comparison.left(theta)
+    words, left = [], comparison.left(theta)
+    if converged and (why := estimate.misfit()):
+        words.append(
+            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies "
+            "elsewhere (try another start)"
+        )
     if converged and not estimate.errors_stated and left > LARGE:
         gap = (comparison.predict(theta)[0] - comparison.measured) / np.abs(comparison.measured)
         seen = np.isfinite(gap)

@@ -373,13 +373,10 @@ def _against_stated(estimate: Estimate) -> str:
     chi_square, dof = estimate.chi_square, estimate.dof
     if not estimate.errors_stated or dof <= 0 or chi_square is None:
         return ""
-    ratio, chance = np.sqrt(chi_square / dof), _chance(chi_square, dof)
-    if chance < 1e-3:
-        return (
-            f"residuals are {ratio:.2g} times as large as the stated errors explain: intervals are too "
-            "narrow, or the model does not quite describe the record"
-        )
-    if chance > 1 - CHANCE and ratio < 0.7:
+    if why := estimate.misfit():
+        return f"{why}: intervals are too narrow, or the model does not quite describe the record"
+    ratio = np.sqrt(chi_square / dof)
+    if ratio < 0.7 and _chance(chi_square, dof) > 1 - CHANCE:
         return f"residuals are only {ratio:.2g} times as large as the stated errors: these are too large"
     return ""
 

@@ -138,12 +138,10 @@ class FittedModes:
     @cached_property
     def _misfits(self) -> tuple[str, ...]:
         """Why what is left is more than errors."""
-        from scipy.special import chdtrc, ndtr
+        from scipy.special import ndtr
 
         estimate, Z, words = self.fit.estimate, self.readings.vectors, []
-        if estimate.chi_square and estimate.dof > 0 and chdtrc(estimate.dof, estimate.chi_square) < RARE:
-            ratio = np.sqrt(estimate.chi_square / estimate.dof)
-            words.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
+        words += [why] if (why := estimate.misfit()) else []
         gap = np.nan_to_num(Z - self.whitened.model(estimate.solution))
         left = np.einsum("npij,npj->npi", self.whitened.root, np.stack((gap.real, gap.imag), -1)) @ (1, 1j)
         i, p = np.unravel_index(np.abs(left).argmax(), left.shape)
