@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.timing import Row, against_numpy, best_of, relative_difference
-from rotorid.harmonic import HarmonicModel, harmonic_model, identify
-from rotorid.harmonic.experiments import Experiments, experiments
+from rotorid.identify import HarmonicModel, harmonic_model, identify
+from rotorid.identify.amplitudes import Experiments, experiments
 
 MASSES = 20
 

@@ -9,9 +9,7 @@ import sys
 
 import numpy as np
 
-from rotorid import harmonic_model, identify
-from rotorid.harmonic import AmplitudeErrors
-from rotorid.harmonic.experiments import Experiments, experiments
+from rotorid.identify import AmplitudeErrors, Experiments, experiments, harmonic_model, identify
 from rotorid.plots import plot
 
 EQUATIONS = (
@@ -46,14 +44,14 @@ def tests(directions: str) -> Experiments:
 def main(picture: str | None = None) -> dict[str, float]:
     """Print estimates and intervals; return them with the truth inside or not."""
     # Two directions: all eight are determined.
-    found = identify(MODEL, tests("xy"), method="output-error")
+    found = identify(MODEL, tests("xy"))
     print(found.summary(), end="\n\n")
     assert found.ci95 is not None
     inside = [bool(low <= TRUTH[name] <= high) for name, (low, high) in zip(NAMES, found.ci95, strict=True)]
     print(f"{sum(inside)} of {len(inside)} intervals hold the true value", end="\n\n")
 
     # One direction: the readings of x and y move together at each frequency, errors are magnified.
-    one = identify(MODEL, tests("x"), method="output-error")
+    one = identify(MODEL, tests("x"))
     print("one direction only:", one.summary(), sep="\n")
 
     if picture is not None:
@@ -63,7 +61,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     return {
         **{name: float(value) for name, value in zip(NAMES, found.values, strict=True)},
         "intervals_that_hold_the_truth": sum(inside),
-        "condition_number": found.condition_number,
+        "condition_number": found.estimate.condition_number,
         "worse_kyy_std": float(one.std[3] / found.std[3]),
     }
 

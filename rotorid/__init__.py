@@ -10,10 +10,15 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False  # typing takes longer than all before the command line's answer to Ctrl-C
 if TYPE_CHECKING:
-    from rotorid.harmonic import Experiments as Experiments
-    from rotorid.harmonic import Identification as Identification
-    from rotorid.harmonic import harmonic_model as harmonic_model
-    from rotorid.harmonic import identify as identify
+    from rotorid.identify import Experiments as Experiments
+    from rotorid.identify import Fit as Fit
+    from rotorid.identify import Identification as Identification
+    from rotorid.identify import Record as Record
+    from rotorid.identify import fit as fit
+    from rotorid.identify import harmonic_model as harmonic_model
+    from rotorid.identify import identify as identify
+    from rotorid.identify import ode_model as ode_model
+    from rotorid.identify import simulate as simulate
     from rotorid.plots import plot as plot
     from rotorid.reduction import InputErrors as InputErrors
     from rotorid.reduction import Reduction as Reduction
@@ -46,11 +51,6 @@ if TYPE_CHECKING:
     from rotorid.tables import read_unbalance as read_unbalance
     from rotorid.tables import write_influence as write_influence
     from rotorid.tables import write_rotor as write_rotor
-    from rotorid.timedomain import Record as Record
-    from rotorid.timedomain import ode_model as ode_model
-    from rotorid.timedomain.fit import fit as fit
-    from rotorid.timedomain.integration.simulate import simulate as simulate
-    from rotorid.timedomain.result import Fit as Fit
 
 __version__ = "0.1.0"
 
@@ -63,16 +63,16 @@ _HOME = {
     "Estimate": "regression",
     "Combination": "regression",
     # harmonic tests, natural frequencies and shapes
-    "harmonic_model": "harmonic",
-    "identify": "harmonic",
-    "Experiments": "harmonic",
-    "Identification": "harmonic",
+    "harmonic_model": "identify",
+    "identify": "identify",
+    "Experiments": "identify",
+    "Identification": "identify",
     # time records
-    "ode_model": "timedomain",
-    "Record": "timedomain",
-    "simulate": "timedomain.integration.simulate",
-    "fit": "timedomain.fit",
-    "Fit": "timedomain.result",
+    "ode_model": "identify",
+    "Record": "identify",
+    "simulate": "identify",
+    "fit": "identify",
+    "Fit": "identify",
     # a rotor as a few masses
     "reduce": "reduction",
     "reduce_measured": "reduction",

@@ -75,24 +75,20 @@ def _reduction() -> Pictures:
     }
 
 
-def _harmonic() -> Pictures:
-    from rotorid.harmonic.plots import figure_identification
-    from rotorid.harmonic.result import Identification
+def _identify() -> Pictures:
+    from rotorid.identify import Fit, Identification
+    from rotorid.identify.plots import figure_identification
+    from rotorid.identify.plots_records import figure_fit
 
-    return {Identification: lambda found, ax: figure_identification(found)}
-
-
-def _timedomain() -> Pictures:
-    from rotorid.timedomain.plots import figure_fit
-    from rotorid.timedomain.result import Fit
-
-    return {Fit: lambda found, ax: figure_fit(found)}
+    return {
+        Identification: lambda found, ax: figure_identification(found),
+        Fit: lambda found, ax: figure_fit(found),
+    }
 
 
 _ROOMS: dict[str, Callable[[], Pictures]] = {
     "fem": _rotors,
     "balancing": _balancing,
     "rotorid.reduction": _reduction,
-    "rotorid.harmonic": _harmonic,
-    "rotorid.timedomain": _timedomain,
+    "rotorid.identify": _identify,
 }

@@ -23,12 +23,12 @@ from balancing import (
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.fleet import fit_type, update
-from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
-from rotorid.harmonic.experiments import experiments
+from rotorid.identify import AmplitudeErrors, harmonic_model, identify
+from rotorid.identify.amplitudes import experiments
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 from rotorid.regression import stretch
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.ode_model import ode_model
-from rotorid.timedomain.models.record import Record
 
 RPM = np.pi / 30
 
@@ -85,9 +85,7 @@ def test_weights_and_readings_of_a_first_shot():
 def test_parameters_of_output_error(case):
     case, rng, squares = getattr(coverage_identify, case)(), np.random.default_rng(32), []
     for _ in range(40):
-        found = identify(
-            case.model, coverage_identify.simulate(case, rng), method="output-error", start=case.truth
-        )
+        found = identify(case.model, coverage_identify.simulate(case, rng), start=case.truth)
         squares.append(square(found.values - list(case.truth.values()), found.covariance))
     assert_near_one(squares)
 
@@ -100,7 +98,7 @@ def test_parameters_with_a_prior():
         noise = np.exp(0.05 * rng.standard_normal(4) + 0.05j * rng.standard_normal(4))
         X = 10 / (c - 10 * w**2 + 1j * b * w) * noise
         data = experiments(model, w, {"X": X, "F": 10.0}, errors=AmplitudeErrors(relative=0.05, phase=0.05))
-        found = identify(model, data, method="output-error", prior={"c": (1000.0, 20.0), "b": (20.0, 0.5)})
+        found = identify(model, data, prior={"c": (1000.0, 20.0), "b": (20.0, 0.5)})
         squares.append(square(found.values - [c, b], found.covariance))
     assert_near_one(squares)
 

@@ -13,13 +13,8 @@ from rotorid.cli.commands import (
     calibrate,
     demo,
     fit,
-    identify,
-    modes,
     reduce,
-    runup,
     schema,
-    simulate,
-    vectors,
 )
 from rotorid.cli.fleet import fleet
 from rotorid.cli.study import study
@@ -28,14 +23,19 @@ from rotorid.commands import (
     bearings,
     campbell,
     critical,
+    identify,
     influence,
+    modes,
     motion,
     periodic,
     response,
+    runup,
+    simulate,
     split,
     tolerance,
     trial_weight,
     unbalance,
+    vectors,
 )
 from rotorid.commands.app import run, typer_command, written_help
 from rotorid.commands.terminal import markup_mode
@@ -53,7 +53,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Balance rotors": {
         "balance": balance.balance,
         "worksheet": worksheet,
-        "vectors": vectors.vectors,
+        "vectors": typer_command(vectors),
         "trial-weight": typer_command(trial_weight),
         "split": typer_command(split),
         "tolerance": typer_command(tolerance),
@@ -74,11 +74,11 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "periodic": typer_command(periodic),
     },
     "Identify coefficients": {
-        "identify": identify.identify,
+        "identify": typer_command(identify),
         "fit": fit.fit,
-        "simulate": simulate.simulate,
-        "modes": modes.modes,
-        "runup": runup.runup,
+        "simulate": typer_command(simulate),
+        "modes": typer_command(modes),
+        "runup": typer_command(runup),
         "calibrate": calibrate.calibrate,
     },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema},

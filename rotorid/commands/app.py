@@ -271,7 +271,10 @@ def command(
 
 
 def typer_command(work: Callable[..., Delivered]) -> Command:
-    """The command of a function: what it takes before `options` is an argument, then required options."""
+    """The command of a function: its first parameter and what may be left out are arguments.
+
+    Others before `options` are required options.
+    """
     kind = options_of(work)
     about = _documentation(work)
     given = {name: one for name, one in inspect.signature(work).parameters.items() if name != "options"}
@@ -288,8 +291,10 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
     parameters = []
     for name, one in given.items():
         told: dict[str, Any] = {"metavar": about[name].metavar, "help": about[name].text}
-        declared = typer.Option(f"--{name}", **told) if hints else typer.Argument(**told)
-        taken: Any = Path if "Path" in str(one.annotation) and not hints else str
+        first = not hints or one.default is not one.empty
+        declared = typer.Argument(**told) if first else typer.Option(f"--{name}", **told)
+        taken: Any = Path if "Path" in str(one.annotation) and first else str
+        taken = list[Path] if str(one.annotation).startswith("Sequence[Path") else taken
         hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
         parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
     parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]

@@ -228,6 +228,15 @@ class Estimate(Answered, Uncertain):
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
         return frame(parameter_columns(self.names, self))
 
+    def misfit(self) -> str:
+        """Words where residuals so large are improbable (0.1 %) for the stated errors; else none."""
+        from scipy.special import chdtrc
+
+        if self.chi_square is None or self.dof < 1 or chdtrc(self.dof, self.chi_square) > 1e-3:
+            return ""
+        ratio = float(np.sqrt(self.chi_square / self.dof))
+        return f"residuals are {ratio:.2g} times as large as the stated errors explain"
+
     @property
     def answer(self) -> Answer:
         """Values ± standard deviations, intervals, and what is not determined."""

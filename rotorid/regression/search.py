@@ -20,6 +20,8 @@ TOLERANCE = 1e-9
 """The driver's tolerances on cost, step and gradient, before polishing."""
 POLISH = 25
 """Gauss–Newton steps at most after the driver."""
+NEGLIGIBLE = 1e-6
+"""Share of what the other parameters do below which one has no size of its own."""
 RCOND = 1e-10
 """Scaled singular values of a Jacobian below this count as zero: it carries more rounding than a table."""
 
@@ -124,8 +126,8 @@ def polish(
 ) -> tuple[FloatArray, Estimate, bool]:
     """Gauss–Newton to the last digits; the kernel's judgement there; whether the last step is negligible."""
     r = np.asarray(search.residual(x), dtype=np.float64)
-    step, judged = _judge(search, x, r, lower, upper, names, stated)
-    now, size = search.cost(r), _size(step, x, judged)
+    step, judged, slopes = _judge(search, x, r, lower, upper, names, stated)
+    now, size = search.cost(r), _size(step, x, judged, slopes)
     for _ in range(POLISH):
         if size < 1e-9:
             break
@@ -134,8 +136,8 @@ def polish(
             r_new = np.asarray(search.residual(new), dtype=np.float64)
         if not np.isfinite(r_new).all() or search.cost(r_new) > now * (1 + 1e-9):
             break
-        next_step, next_judged = _judge(search, new, r_new, lower, upper, names, stated, record=False)
-        next_size = _size(next_step, new, next_judged)
+        next_step, next_judged, slopes = _judge(search, new, r_new, lower, upper, names, stated, record=False)
+        next_size = _size(next_step, new, next_judged, slopes)
         if next_size > 0.9 * size:  # rounding is all that is left, or Gauss–Newton does not contract here
             break
         x, r, now, step, judged, size = new, r_new, search.cost(r_new), next_step, next_judged, next_size
@@ -153,8 +155,8 @@ def _judge(
     names: tuple[str, ...],
     stated: bool,
     record: bool = True,
-) -> tuple[FloatArray, Estimate]:
-    """The Gauss–Newton step (n,) and the kernel's estimate at x, with parameters at bounds held."""
+) -> tuple[FloatArray, Estimate, FloatArray]:
+    """The Gauss–Newton step (n,), the kernel's estimate at x, parameters at bounds held, lengths |K_j|."""
     J = search.jacobian(x) if record else np.asarray(search.slopes(x), dtype=np.float64)
     pseudo, J = pseudo_residuals(r, search.loss, search.f_scale), np.asarray(J)
     free = (x > lower) & (x < upper)
@@ -165,7 +167,7 @@ def _judge(
         judged = Estimate(
             names, x.copy(), x.copy(), empty, r, len(r), n, 1.0, np.ones(0), known, None, np.eye(n), empty
         )
-        return np.zeros(n), judged
+        return np.zeros(n), judged, np.zeros(n)
     # SVD of the free columns by the kernel; the rest of this function puts the held parameters back in
     part = least_squares(
         J[:, free],
@@ -194,7 +196,7 @@ def _judge(
         row_space=rows,
         solution_covariance=_embed(part.solution_covariance, free),
     )
-    return step, judged
+    return step, judged, np.linalg.norm(J, axis=0)
 
 
 def _embed(covariance: FloatArray | None, free: BoolArray) -> FloatArray | None:
@@ -205,11 +207,16 @@ def _embed(covariance: FloatArray | None, free: BoolArray) -> FloatArray | None:
     return full
 
 
-def _size(step: FloatArray, x: FloatArray, judged: Estimate) -> float:
-    """Largest relative change by a step, of the parameters and combinations that the data determine."""
+def _size(step: FloatArray, x: FloatArray, judged: Estimate, slopes: FloatArray) -> float:
+    """Largest relative change by a step, of the parameters and combinations that the data determine.
+
+    A parameter that moves the residuals by less than a millionth of what others do counts as so large: one
+    that is 0 has no size of its own. `slopes` (n,) are the lengths of the columns of the Jacobian.
+    """
     smallest = np.finfo(float).tiny ** 0.5
     known = ~np.isnan(judged.values)
-    change = np.abs(step[known]) / np.maximum(np.abs(x[known]), smallest)
+    least = NEGLIGIBLE * (slopes * np.abs(x)).max() / np.maximum(slopes, smallest)
+    change = np.abs(step[known]) / np.maximum(np.maximum(np.abs(x), least)[known], smallest)
     if not known.all():
         rows = judged.row_space
         change = np.append(change, np.abs(rows @ step) / np.maximum(np.abs(rows) @ np.abs(x), smallest))

@@ -71,7 +71,7 @@ class Equations:
     matrix, right
         Exactly as they were solved, (m, n) and (m,); m is 0 where the solution follows from no such rows.
     solution
-        (n,), NaN where the data do not determine it.
+        (n,), NaN where the data do not determine it; empty: without data.
     notes
         Units, weighting, and what else is to be known, in words.
     """
@@ -135,6 +135,8 @@ class Equations:
         return [text((names, *part), width=COLUMNS) for part in parts]
 
     def _solution(self) -> str:
+        if not len(self.solution):
+            return f"{self.names[1]}: {', '.join(self.columns)}"
         found = zip(self.columns, self.solution, strict=True)
         told = (f"{name} = {x:.6g}" if x == x else f"{name} not determined" for name, x in found)
         return f"{self.names[1]}: {', '.join(told)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import singledispatch
 
 import numpy as np
@@ -9,23 +10,18 @@ from sympy import Add, I, Integer, Matrix, Symbol, collect, eye, factor_terms
 
 from balancing import Correction
 from rotorid.base.text import counted
-from rotorid.expressions import names, parse
-from rotorid.harmonic import Experiments, HarmonicModel, Identification
-from rotorid.harmonic.equation_error import linear_fit, told_as_one
-from rotorid.harmonic.parameter_combinations import CONSTANT, expression
-from rotorid.harmonic.polynomial import ONE, Monomial
+from rotorid.identify import Experiments, HarmonicModel, Identification
+from rotorid.identify.combinations import CONSTANT, ONE, Monomial, Polynomial, expression, times
+from rotorid.identify.expression_functions import real, usual
+from rotorid.identify.expressions import names, parse
+from rotorid.identify.ode import OdeModel
+from rotorid.identify.result_records import Fit
 from rotorid.reduction import Reduction, design
 from rotorid.regression.linear import stretch
 from rotorid.report.equations import BEHIND, Equations, Expression, Row
-from rotorid.timedomain import OdeModel
-from rotorid.timedomain.models.compiled import real, usual
-from rotorid.timedomain.result import Fit
 
 PARTS = ("Re", "Im")
-_WEIGHTED = (
-    "the numbers are after weighting: the rows of an experiment times the inverse Cholesky factor of the "
-    "covariance that the stated errors give them; the symbols are before it"
-)
+_START = "θ here is where the search begins: the answer predicts the amplitudes, which bias it less"
 
 
 @singledispatch
@@ -35,35 +31,52 @@ def equations_of(found: object) -> Equations:
 
 
 @equations_of.register
+def _(model: HarmonicModel) -> Equations:
+    """K θ = Y of a model without data: in symbols alone."""
+    words = model.combinations.words
+    none = np.zeros((0, len(words)))
+    title = f"K θ = Y, [S] (9), at p = iω: {counted(len(words), 'unknown')}"
+    rows = _rows_in_symbols(model, None, [0.0] * len(words))
+    return Equations(title, rows, ("K", "θ", "Y"), (), words, none, none[:, 0], none[:, 0])
+
+
+@equations_of.register
 def _(found: Identification) -> Equations:
-    """K θ = Y of a linear regression: real and imaginary parts of the equations at p = iω."""
-    if found.method != "equation-error":
-        raise ValueError(f"--show equations needs linear equations, which --method {found.method} has not")
-    model, tests = found.model, found.experiments
-    fit = linear_fit(model, tests)
-    ones = told_as_one(fit.rows, fit.groups)
-    once = len({*tests.frequencies.tolist()}) == len(tests)
+    """K θ = Y of the linear regression: real and imaginary parts of the equations at p = iω."""
+    fit, tests = found.linear, found.experiments
+    if fit is None:
+        raise ValueError("--show equations needs every amplitude of the equations: one is not measured")
+    model, once = fit.model, len({*tests.frequencies.tolist()}) == len(tests)
     at = [
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)
     ]
-    labels = [f"{PARTS[part]} eq. {e + 1}, {at[i]}" for i, e, part in np.argwhere(fit.rows.used)]
-    notes = [f"{model.combinations.words[i]} = 1: the others are relative to it" for i in ones.nonzero()[0]]
-    notes += [_WEIGHTED] if tests.stated else []
-    rows, found_as = _rows_in_symbols(model, tests, ones.tolist()), fit.estimate
-    title = f"K θ = Y, [S] (9): {counted(len(labels), 'real row')}, {counted(len(found_as.names), 'unknown')}"
+    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.rows.used)]
+    notes = [
+        f"{model.combinations.words[i]} = 1: the others are relative to it" for i in fit.fixed.nonzero()[0]
+    ]
+    notes += [_START] if found.method == "output-error" else []
+    rows, solved = _rows_in_symbols(model, tests, fit.fixed.tolist()), fit.estimate
+    title = f"K θ = Y, [S] (9): {counted(len(labels), 'real row')}, {counted(len(solved.names), 'unknown')}"
     names = "K", "θ", "Y"
-    return Equations(title, rows, names, labels, found_as.names, fit.K, fit.Y, found_as.values, notes)
+    return Equations(title, rows, names, labels, solved.names, fit.K, fit.Y, solved.values, notes)
 
 
-def _rows_in_symbols(model: HarmonicModel, tests: Experiments, ones: list[float]) -> list[Row]:
-    """Parts of each equation; amplitudes that are real in all tests are one symbol, unknowns of `ones` 1."""
-    combos, free = model.combinations, bool(tests.free.all())
+def _rows_in_symbols(model: HarmonicModel, tests: Experiments | None, ones: list[float]) -> list[Row]:
+    """Parts of each equation; amplitudes that are real in all tests are one symbol, unknowns of `ones` 1.
+
+    Without tests inputs are real, and a model that nothing excites vibrates freely.
+    """
+    combos = model.combinations
+    free = bool(tests.free.all()) if tests else not (model.inputs or model.has_constant_terms)
     pivots = [combos.monomials[k] for k in combos.pivots]
     amplitude = {CONSTANT: Integer(1)}
     for name in model.signals:
         re, im, whole = (Symbol(f"{BEHIND}{BEHIND}{part}{name}") for part in ("Re ", "Im ", ""))
-        amplitude[name] = re + I * im if np.nan_to_num(tests.signals[name]).imag.any() else whole
+        turned = not free and name in model.outputs
+        if tests:
+            turned = bool(np.nan_to_num(tests.signals[name]).imag.any())
+        amplitude[name] = re + I * im if turned else whole
     signals = {symbol for each in amplitude.values() for symbol in each.free_symbols}
 
     def total(e: int, part: int, monomial: Monomial) -> Expression:
@@ -77,16 +90,21 @@ def _rows_in_symbols(model: HarmonicModel, tests: Experiments, ones: list[float]
 
     rows = []
     for e, part in np.ndindex(len(model.equations), 1 if free else 2):
-        told = zip(pivots, combos.symbolic, strict=True)
-        left = [factor_terms(total(e, part, m) / expression(by[m])) for m, by in told]
+        pairs = zip(pivots, combos.symbolic, strict=True)
+        left = [factor_terms(total(e, part, m) / expression(by[m])) for m, by in pairs]
         known = total(e, part, ONE) + sum(c for c, one in zip(left, ones, strict=True) if one)
         right = collect((-known).expand(), signals, evaluate=False)
-        unknown = zip(left, map(parse, combos.words), ones, strict=True)
+        unknown = zip(left, map(_unknown, combos.symbolic), ones, strict=True)
         terms = [(c, word) for c, word, one in unknown if not one]
         name = f"eq. {e + 1}" if free else f"{PARTS[part]} eq. {e + 1}"
         given = [(factor_terms(right[signal]), signal) for signal in sorted(right, key=str)]
         rows.append(Row(name, terms, given))
     return rows
+
+
+def _unknown(symbolic: Mapping[Monomial, Polynomial]) -> Expression:
+    """A combination of parameters, a common factor in front."""
+    return factor_terms(expression({times(m, k): x for m, part in symbolic.items() for k, x in part.items()}))
 
 
 def correction_equations(found: Correction) -> Equations:
@@ -147,10 +165,45 @@ def _(found: Reduction) -> Equations:
 
 @equations_of.register
 def _(found: Fit) -> Equations:
+    """[F] (3.6), (3.7), or of quasilinearization (2.17) to (2.28) of [Q]."""
+    return _sensitivities(found) if found.regression is None else _linear_about_last(found)
+
+
+def _linear_about_last(found: Fit) -> Equations:
+    """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17)–(2.22), and M θ = Y of the last step, (2.28)."""
+    model = found.model
+    x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
+    if model.inertia:
+        raise ValueError("--show equations of quasilinearization needs a model that states its rates itself")
+    rates, _, _ = _as_written(model)
+    rows: list[Row] = []
+    for i, f in enumerate(rates):
+        rows += [Row("f_x", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in x]
+        rows += [Row("f_θ", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in thetas]
+    for i, f in enumerate(rates):
+        slopes = [usual(f.diff(by)) for by in x]
+        for j, theta in enumerate(thetas):
+            G = [Symbol(f"G{p + 1}{j + 1}") for p in range(len(x))]
+            terms = [*zip(slopes, G, strict=True), (usual(f.diff(theta)), 1)]
+            rows.append(Row("G", [(1, Symbol(f"dG{i + 1}{j + 1}/dt"))], terms))
+        D = [Symbol(f"D{p + 1}") - by for p, by in enumerate(x)]
+        known = usual(f) - Add(*(usual(f.diff(theta)) * theta for theta in thetas))
+        rows.append(Row("D", [(1, Symbol(f"dD{i + 1}/dt"))], [*zip(slopes, D, strict=True), (known, 1)]))
+    K, Y = found.regression or (np.zeros((0, 0)), np.zeros(0))
+    labels = [f"M{j + 1}" for j in range(len(thetas))]
+    title = "x = G θ + D about the last trajectory x, θ, [Q] (2.17)–(2.24), and M θ = Y, (2.28)"
+    notes = ["G and D begin with G θ + D = x(t0); M and Y are those of the last iteration"]
+    return Equations(
+        title, rows, ("M", "θ", "Y"), labels, model.parameters, K.T @ K, K.T @ Y, found.estimate.values, notes
+    )
+
+
+def _sensitivities(found: Fit) -> Equations:
     """Sensitivities ∂x/∂θ of the states and ∂y/∂θ of the outputs, [F] (3.6), (3.7), in symbols."""
     model, n = found.model, len(found.model.states)
     x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
-    E, velocities = Matrix(n, n, getattr(model, "inertia", eye(n))), [Symbol(f"d{state}/dt") for state in x]
+    E = Matrix(n, n, model.inertia) if model.inertia else eye(n)
+    velocities = [Symbol(f"d{state}/dt") for state in x]
     equations, starts, outputs = [], [], []
 
     def chain(f: Expression, by: Expression, S: list[Expression]) -> list[tuple[Expression, Expression]]:
@@ -181,6 +234,6 @@ def _as_written(model: OdeModel) -> list[list[Expression]]:
     groups = {"state": model.states, "initial": model.states, "output": model.outputs}
     read = [[real(parse(model.texts[f"{kind} {name}"])) for name in of] for kind, of in groups.items()]
     told = {name for group in read for e in group for name in names(e)}
-    if {*model.parameters} <= told and not hasattr(model, "inertia"):
+    if {*model.parameters} <= told and not model.inertia:
         return read
     return [[*model.rates], [*model.initial], [*model.observed]]

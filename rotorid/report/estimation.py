@@ -21,10 +21,9 @@ from rotorid.report.rotor_figures import Drawing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.harmonic import Identification
-    from rotorid.regression.d_optimal import Design
+    from rotorid.identify import Identification
+    from rotorid.identify.result_records import Fit
     from rotorid.regression.prior import PriorEffect
-    from rotorid.timedomain.result import Fit
 
 READINGS = 40
 """Rows at most."""
@@ -48,7 +47,7 @@ def fit_report(
     """
     from markupsafe import Markup
 
-    from rotorid.timedomain.plots import figure_fit
+    from rotorid.identify.plots_records import figure_fit
 
     document = Document(document)
     left = Markup("Residuals {} (rms, in the unit of the model)").format(document.show("residual_rms", 4))
@@ -66,31 +65,27 @@ def fit_report(
 
 def identification_report(
     document: Mapping[str, Any],
-    result: Identification | None,
-    design: Design | None,
+    result: Identification,
     *,
     provenance: Mapping[str, Any],
     model: str,
 ) -> bytes:
-    """Make the sheet of an identification, of frequencies to measure next, or of both; see `fit_report`."""
-    from rotorid.harmonic.plots import figure_identification
+    """Make the sheet of an identification; see `fit_report`."""
+    from rotorid.identify.plots import figure_identification
 
     document = Document(document)
-    about: Facts = []
-    parts = _model(model)
-    if result is not None:
-        about, columns = _experiments(result), result.misfit
-        count = len(columns[0].values)
-        rows = evenly(count, READINGS)
-        note = f"{len(rows)} of {count} readings; --table prints all." if len(rows) < count else ""
-        left = Part("What the model leaves", tables=(Grid("Each reading", shown(columns, rows), note),))
-        drawn = _picture(figure_identification(result), "Amplitudes or shapes")
-        first = _estimate(document, result.answer, result.combinations, result.prior)
-        parts = [first, *[left][:count], *parts, drawn]
-    if design is not None:
-        told = design.answer
-        parts.append(Part("Which frequencies to measure next", (told.judgement,), listing=told.found))
-    return _sheet("Coefficients from harmonic tests", document, provenance, about, parts)
+    columns = result.misfit
+    count = len(columns[0].values)
+    rows = evenly(count, READINGS)
+    note = f"{len(rows)} of {count} readings; --table prints all." if len(rows) < count else ""
+    left = Part("What the model leaves", tables=(Grid("Each reading", shown(columns, rows), note),))
+    parts = [
+        _estimate(document, result.answer, result.combinations, result.prior),
+        *[left][:count],
+        *_model(model),
+        _picture(figure_identification(result), "Amplitudes or shapes"),
+    ]
+    return _sheet("Coefficients from harmonic tests", document, provenance, _experiments(result), parts)
 
 
 def _sheet(
@@ -111,7 +106,7 @@ def _sheet(
 
 def _records(result: Fit) -> Facts:
     """What was measured, with which errors, and how it was fitted."""
-    from rotorid.timedomain.models.record import record_names
+    from rotorid.identify.records import record_names
 
     names = record_names([one.name for one in result.records])
     spans = [

@@ -10,24 +10,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.waveforms.penalised_spline import (
     ROUNDS,
     SOFTEST,
-    Moments,
     Smoothing,
-    along,
+    band_of,
     moments,
-    slopes,
     smooth,
+    spline,
+    sums_of,
     third_differences,
     times,
-    weights,
 )
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 KNOT, FINE, MOST_KNOTS = 2.0, 1.0, 8000
 """Turns between two knots, and where 1× moves too fast for these; a longer record has more between."""
@@ -71,23 +75,15 @@ class Orders:
         """Turn of the last knot."""
         return self.first + self.knot * len(self.density)
 
-    def _around(self, turns: FloatArray) -> tuple[IntArray, FloatArray]:
-        s = (turns - self.first) / self.knot
-        j = np.clip(s.astype(np.int64), 0, len(self.density) - 1)
-        return j, s - j
-
-    def at(self, turns: FloatArray) -> ComplexArray:
-        """Amplitudes at turns (P,), (P, K + 1, C)."""
-        return np.asarray(along(weights, self.coefficients, *self._around(turns)), dtype=complex)
-
-    def slope(self, turns: FloatArray) -> ComplexArray:
-        """Their change in a turn, (P, K + 1, C)."""
-        return np.asarray(along(slopes, self.coefficients, *self._around(turns)) / self.knot, dtype=complex)
+    @cached_property
+    def spline(self) -> BSpline:
+        """Over turns: amplitudes (P, K + 1, C), and by `(turns, 1)` their change in a turn."""
+        return spline(self.first, self.knot, self.coefficients)
 
     def deviation(self, turns: FloatArray, order: int) -> FloatArray:
         """Standard deviation of the real part, and of the imaginary one, (P, C), of one order."""
-        j, f = self._around(turns)
-        return np.transpose([own[order].deviation(weights(f), j) for own in self.smoothings])
+        s = (turns - self.first) / self.knot
+        return np.transpose([sensor[order].deviation(s) for sensor in self.smoothings])
 
     def mean(self) -> tuple[ComplexArray, FloatArray]:
         """Means over the record, and their standard deviations in each direction, (K + 1, C).
@@ -97,10 +93,7 @@ class Orders:
         """
         n = len(self.density)
         row = np.convolve(np.ones(n), (1 / 24, 11 / 24, 11 / 24, 1 / 24)) / n
-        filtered = [
-            [own.deviation(row[None], np.zeros(1, dtype=np.int64))[0] for own in sensor]
-            for sensor in self.smoothings
-        ]
+        filtered = [[curve.of_sums(row[:, None])[0] for curve in sensor] for sensor in self.smoothings]
         parts = np.stack([part.mean(axis=0) for part in np.array_split(self.raw, min(PARTS, n))])
         scatter = np.sqrt(
             np.mean(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / 2 / max(len(parts) - 1, 1)
@@ -111,12 +104,13 @@ class Orders:
         """Turns that count around these, (P,): as many, evenly weighed, would leave the same error."""
         noise = np.array([2 * own[order].variance for own in self.smoothings])
         samples = np.median(noise / self.deviation(turns, order) ** 2, axis=1)
-        return np.asarray(samples / self.density[self._around(turns)[0]])
+        at = ((turns - self.first) / self.knot).astype(np.int64)
+        return np.asarray(samples / self.density[np.clip(at, 0, len(self.density) - 1)])
 
     def vague(self) -> BoolArray:
         """Sensors whose largest 1× has a large error, (C,): of noise, or as it moves too fast."""
         places = np.linspace(self.first, self.last, PLACES)
-        size, error = np.abs(self.at(places)[:, 1]), self.deviation(places, 1)
+        size, error = np.abs(self.spline(places)[:, 1]), self.deviation(places, 1)
         largest = size.argmax(axis=0), np.arange(size.shape[1])
         return np.asarray(error[largest] > VAGUE * size[largest])
 
@@ -148,9 +142,9 @@ def track_orders(parts: Parts, first: float, last: float, highest: int, knot: fl
         for turns, samples in parts():
             yield np.clip((turns - first) / knot, 0, n), _columns(turns, highest), samples
 
-    sums = moments(with_columns(), n)
-    band, right = sums.band(), sums.sums()
-    alone = Moments(sums.gram[:, :, :1, :, :1], sums.right[:, :, :1]).band()
+    blocks, samples = moments(with_columns(), n)
+    of_mean = blocks[:, :: 2 * highest + 1, :: 2 * highest + 1]
+    band, alone, right = band_of(blocks), band_of(of_mean), sums_of(samples)
     loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
     M = 2 * highest + 1
     start = _solved(band, [loose] * M, right)
@@ -177,7 +171,7 @@ def track_orders(parts: Parts, first: float, last: float, highest: int, knot: fl
         raw.append(np.stack(means, axis=-1))
     c = np.stack(coefficients, axis=-1)
     complex_ones = np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)
-    density = sums.gram[:, :, 0, :, 0].sum(axis=(1, 2)) / knot
+    density = of_mean.sum(axis=(1, 2)) / knot
     found = Orders(first, knot, complex_ones, tuple(smoothings), density, np.stack(raw, axis=-1))
     return found if fine or not found.too_fast() else track_orders(parts, first, last, highest, FINE)
 

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 
-from rotorid.base.arrays import AnyArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, FloatArray
 
 TRACE, SOFTEST, STEP = -22.0, -10.0, 0.28
 """log λ, relative to the samples between two knots: what keeps knots solvable between which there are none,
@@ -30,6 +31,8 @@ LEAST_GAIN = 0.01
 """Twice the gain in log likelihood, for 1 of log λ, at which the search still goes for more."""
 ROUNDS, NEIGHBOURS = 3, 12
 """The weights of the penalty are found again so often, each from so many knots on either side."""
+CELLS = 1 << 20
+"""Numbers of a right-hand side that are solved for at a time."""
 EVENING, FEW = 0.1, 0.1
 """Share of the mean jump that is added to each, so that the weights stay finite, and share of the jump that
 is likely for λ: of a curve that hardly bends the weights are even, and not those of rounding."""
@@ -41,73 +44,54 @@ def weights(f: FloatArray) -> FloatArray:
     return np.stack((g**3, 4 - 6 * f**2 + 3 * f**3, 4 - 6 * g**2 + 3 * g**3, f**3), axis=-1) / 6
 
 
-def slopes(f: FloatArray) -> FloatArray:
-    """Their derivatives with respect to s, (…, 4)."""
-    g = 1.0 - f
-    return np.stack((-(g**2), -4 * f + 3 * f**2, 4 * g - 3 * g**2, f**2), axis=-1) / 2
+def spline(start: float, step: float, c: AnyArray) -> BSpline:
+    """The curve with coefficients c (n + 3, …) and n intervals of a step between its knots."""
+    return BSpline(start + step * np.arange(-3, len(c) + 1), c, 3)
 
 
-def along(shape: Callable[[FloatArray], FloatArray], c: AnyArray, j: IntArray, f: FloatArray) -> AnyArray:
-    """Splines (`weights`) or their slopes with coefficients c (n + 3, …) at j + f, (P,)."""
-    own = shape(f)
-    return np.asarray(sum((own[:, a] * c[j + a].T).T for a in range(4)))
+def moments(
+    parts: Iterable[tuple[FloatArray, FloatArray, FloatArray]], n: int
+) -> tuple[FloatArray, FloatArray]:
+    """All that samples say about splines: sums over the n intervals between knots.
 
-
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """All that the samples say about splines: sums over the intervals between knots.
-
-    Attributes
-    ----------
-    gram
-        Of the columns, (n, 4, M, 4, M) for n intervals.
-    right
-        Columns by samples, (n, 4, M, C).
+    Parts of a record are places s (L,), increasing, from 0 to n; columns (L, M); samples (L, C). The sums are
+    Gram matrices (n, 4 M, 4 M) of the columns, spline by spline, and columns by samples (n, 4 M, C).
     """
-
-    gram: FloatArray
-    right: AnyArray
-
-    def band(self) -> FloatArray:
-        """Gram matrix of all coefficients (knot by knot, column by column), lower band for LAPACK."""
-        n, _, M = self.gram.shape[:3]
-        band = np.zeros((4 * M, (n + 3) * M))
-        for a in range(4):
-            for b in range(a + 1):
-                for m in range(M):
-                    for k in range(M):
-                        if (below := (a - b) * M + m - k) >= 0:
-                            band[below, b * M + k : (b + n) * M : M] += self.gram[:, a, m, b, k]
-        return band
-
-    def sums(self) -> AnyArray:
-        """Right-hand sides of all coefficients, (n + 3, M, C)."""
-        n, _, M, C = self.right.shape
-        out = np.zeros((n + 3, M, C), dtype=self.right.dtype)
-        for a in range(4):
-            out[a : a + n] += self.right[:, a]
-        return out
-
-
-def moments(parts: Iterable[tuple[FloatArray, FloatArray, FloatArray]], n: int) -> Moments:
-    """Sums over parts of a record: places s (L,), increasing, from 0 to n; columns (L, M); samples (L, C)."""
-    gram = right = None
+    gram, right = np.zeros((n, 0, 0)), np.zeros((n, 0, 0))
     for s, columns, samples in parts:
-        L, M = columns.shape
-        if gram is None or right is None:
-            gram, right = np.zeros((n, 4 * M, 4 * M)), np.zeros((n, 4 * M, samples.shape[1]))
+        if not gram.size:
+            size = 4 * columns.shape[1]
+            gram, right = np.zeros((n, size, size)), np.zeros((n, size, samples.shape[1]))
         j = np.minimum(s.astype(np.int64), n - 1)
-        design = (weights(s - j)[:, :, None] * columns[:, None, :]).reshape(L, 4 * M)
+        design = (weights(s - j)[:, :, None] * columns[:, None, :]).reshape(len(s), -1)
         first, last = int(j[0]), int(j[-1])
         ends = np.searchsorted(j, np.arange(first, last + 2))
         for at, (low, high) in enumerate(pairwise(ends), start=first):
-            own = design[low:high]
-            gram[at] += own.T @ own
-            right[at] += own.T @ samples[low:high]
-    if gram is None or right is None:
-        raise ValueError("there are no samples")
-    M = gram.shape[1] // 4
-    return Moments(gram.reshape(n, 4, M, 4, M), right.reshape(n, 4, M, -1))
+            rows = design[low:high]
+            gram[at] += rows.T @ rows
+            right[at] += rows.T @ samples[low:high]
+    return gram, right
+
+
+def band_of(gram: FloatArray) -> FloatArray:
+    """The matrix of all coefficients (knot by knot, column by column) of blocks (n, 4 M, 4 M), lower band."""
+    n, size = gram.shape[:2]
+    M = size // 4
+    band = np.zeros((size, (n + 3) * M))
+    for p in range(size):
+        for q in range(p + 1):
+            band[p - q, q : q + n * M : M] += gram[:, p, q]
+    return band
+
+
+def sums_of(right: FloatArray) -> FloatArray:
+    """Right-hand sides of all coefficients, (n + 3, M, C), of blocks (n, 4 M, C)."""
+    n, size, C = right.shape
+    M = size // 4
+    out = np.zeros(((n + 3) * M, C))
+    for p in range(size):
+        out[p : p + n * M : M] += right[:, p]
+    return out.reshape(n + 3, M, C)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,27 +112,28 @@ class Smoothing:
     variance: float
     factor: FloatArray
 
-    def deviation(self, rows: FloatArray, at: AnyArray) -> FloatArray:
-        """Standard deviation of Σ rows · c from the knots `at` on, (P,), of rows (P, q)."""
-        n, out = self.factor.shape[1], np.empty(len(rows))
-        for part in range(0, len(rows), 256):
-            some = rows[part : part + 256]
-            own = np.zeros((n, len(some)))
-            index = at[part : part + 256, None] + np.arange(rows.shape[1])
-            np.add.at(own, (index, np.arange(len(some))[:, None]), some)
-            found = cho_solve_banded((self.factor, True), own)
-            out[part : part + 256] = np.sqrt(self.variance * np.einsum("np,np->p", own, found))
+    def deviation(self, s: FloatArray) -> FloatArray:
+        """Standard deviation of the curve at places s (P,), in knots from the first one."""
+        j = np.clip(s.astype(np.int64), 0, self.factor.shape[1] - 4)
+        rows, out = weights(s - j), np.empty(len(s))
+        size = max(1, CELLS // self.factor.shape[1])
+        for part in range(0, len(s), size):
+            some = rows[part : part + size]
+            sums = np.zeros((self.factor.shape[1], len(some)))
+            np.put_along_axis(sums, (j[part : part + size, None] + np.arange(4)).T, some.T, axis=0)
+            out[part : part + size] = self.of_sums(sums)
         return out
+
+    def of_sums(self, sums: FloatArray) -> FloatArray:
+        """Standard deviation of sums of the coefficients with weights (n + 3, P), (P,)."""
+        solved = cho_solve_banded((self.factor, True), sums)
+        return np.asarray(np.sqrt(self.variance * np.einsum("np,np->p", sums, solved)))
 
 
 def third_differences(penalty: FloatArray) -> FloatArray:
     """Dᵀ diag(penalty) D, lower band (4, n + 3), D of third differences."""
-    n, d = len(penalty), (-1.0, 3.0, -3.0, 1.0)
-    band = np.zeros((4, n + 3))
-    for a in range(4):
-        for b in range(a + 1):
-            band[a - b, b : b + n] += d[a] * d[b] * penalty
-    return band
+    d = np.array((-1.0, 3.0, -3.0, 1.0))
+    return band_of(np.multiply.outer(penalty, np.outer(d, d)))
 
 
 def times(band: FloatArray, c: AnyArray) -> AnyArray:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -17,8 +18,11 @@ from scipy.optimize import nnls
 
 from rotorid.base.arrays import AnyArray, FloatArray, IntArray
 from rotorid.base.text import counted
-from rotorid.waveforms.penalised_spline import Smoothing, along, moments, slopes, smooth, weights
+from rotorid.waveforms.penalised_spline import Smoothing, band_of, moments, smooth, spline, sums_of
 from rotorid.waveforms.record import Channel, Edge, TachoSettings
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 HYSTERESIS = 0.15
 """Half of the band, over the height of the pulses."""
@@ -46,7 +50,7 @@ LONGEST_MARK = (0.45, 0.55)
 KNOT = 2.0
 """Turns between two knots of the angle, at the highest speed."""
 BACKFITTING = 3
-"""Rounds in which offsets of pulses and the angle are found by turns."""
+"""Rounds in which offsets of pulses, how pulses scatter, and the angle are found by turns."""
 RARE, CLEARLY, EVEN = 0.3, 5.0, 0.02
 """A tooth that shows in fewer turns is not there; a gap is the longest if it is longer by so many standard
 deviations of the mean, and so much of an even one."""
@@ -66,29 +70,20 @@ class Angle:
     start: float
     step: float
     trend: FloatArray
-    coefficients: FloatArray
+    spline: BSpline
     smoothing: Smoothing
-
-    def _around(self, t: FloatArray) -> tuple[IntArray, FloatArray]:
-        s = (t - self.start) / self.step
-        j = np.clip(s.astype(np.int64), 0, len(self.coefficients) - 4)
-        return j, s - j
 
     def turns(self, t: FloatArray) -> FloatArray:
         """At these times."""
-        return np.asarray(
-            np.polyval(self.trend, t - self.start) + along(weights, self.coefficients, *self._around(t))
-        )
+        return np.asarray(np.polyval(self.trend, t - self.start) + self.spline(t))
 
     def speed(self, t: FloatArray) -> FloatArray:
         """Turns per s."""
-        rate = along(slopes, self.coefficients, *self._around(t)) / self.step
-        return np.asarray(np.polyval(np.polyder(self.trend), t - self.start) + rate)
+        return np.asarray(np.polyval(np.polyder(self.trend), t - self.start) + self.spline(t, 1))
 
     def deviation(self, t: FloatArray) -> FloatArray:
         """Standard deviation, turns."""
-        j, f = self._around(t)
-        return self.smoothing.deviation(weights(f), j)
+        return self.smoothing.deviation((t - self.start) / self.step)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,40 +152,52 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     """
     level, band, rests = _levels(channel, settings)
     rising, falling, sharp = _edges(channel.samples, level, band)
-    rising, falling = rising / rate, falling / rate
     least = max(LEAST_PULSES, LEAST_TURNS * settings.pulses + 1)
     if min(len(rising), len(falling)) < least:
         raise ValueError(
             f"the tacho {channel.name!r} has {min(len(rising), len(falling))} pulses across {level:.4g}: "
             f"at least {least} are needed (is this the tacho's channel, and the level right?)"
         )
-    begin, end, words = _marks(rising, falling, settings.edge, rests)
-    kept, index = _counted(begin, settings.pulses, channel.name)
-    double, begin, end = np.delete(begin, kept), begin[kept], end[kept]
-    lost = np.setdiff1d(np.arange(index[-1]), index).astype(np.float64)
+    every, ends, words = _marks(rising / rate, falling / rate, settings.edge, rests)
+    kept, index = _counted(every, settings.pulses, channel.name)
+    times, lost = every[kept], np.setdiff1d(np.arange(index[-1]), index).astype(np.float64)
     indexed = True
     if settings.pulses > 1:
-        index, indexed, lost = _from_first_of_turn(begin, index, lost, settings.pulses)
-    turns, angle, jitter = _angle(begin, end, index, settings)
-    speed = angle.speed(begin)
-    apart = ((turns - angle.turns(begin)) / speed)[index % settings.pulses == 0]
+        index, indexed, lost = _from_first_of_turn(times, index, lost, settings.pulses)
+    turns, angle, jitter = _angle(times, ends[kept], index, settings)
+    speed = angle.speed(times)
+    apart = ((turns - angle.turns(times)) / speed)[index % settings.pulses == 0]
     seen = float(np.ptp(np.percentile(apart, EXTREMES)))
-    worn = max(0.0, (jitter / np.median(speed)) ** 2 - sharp / (12 * rate**2)) / len(begin)
+    worn = max(0.0, (jitter / np.median(speed)) ** 2 - sharp / (12 * rate**2)) / len(times)
     offset = float(np.hypot(sharp * max(0.0, 1 / rate - seen) / np.sqrt(12), np.sqrt(worn)))
     if jitter > UNEVEN + np.median(speed) / rate:
-        words += (
+        words.append(
             f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks "
-            f"than {counted(settings.pulses, 'pulse')} a turn (pulses), or is it noise (tacho_level)?",
+            f"than {counted(settings.pulses, 'pulse')} a turn (pulses), or is it noise (tacho_level)?"
         )
-    words += tuple(_silent(begin, speed, len(channel.samples) / rate))
-    words += _damage(len(lost), len(double), len(index))
+    words += _silent(times, speed, len(channel.samples) / rate)
+    double = np.delete(every, kept)
+    damage = (len(lost), "missing, which were bridged"), (len(double), "too many, which were left out")
+    if damaged := " and ".join(f"{counted(n, 'pulse')} of the tacho {verb}" for n, verb in damage if n):
+        share = 100 * (len(lost) + len(double)) / len(index)
+        words.append(f"{damaged} ({share:.2g} % of {len(index)})")
     if not indexed:
-        words += (
+        words.append(
             f"the tacho's {settings.pulses} pulses a turn are alike: phases are known but for multiples of "
-            f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared",
+            f"{360 / settings.pulses:.4g}°, and those of different records cannot be compared"
         )
     return Tacho(
-        begin, turns, lost / settings.pulses, double, level, band, 360 * jitter, offset, words, angle, indexed
+        times,
+        turns,
+        lost / settings.pulses,
+        double,
+        level,
+        band,
+        360 * jitter,
+        offset,
+        tuple(words),
+        angle,
+        indexed,
     )
 
 
@@ -225,11 +232,17 @@ def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, Fl
 
     And whether the edges are so sharp that the samples do not say where between two of them they are.
     """
-    beyond = np.flatnonzero(np.abs(samples - level) > band)
-    high = samples[beyond] > level
-    turn = np.flatnonzero(high[1:] != high[:-1]) + 1
-    place, up = beyond[turn], high[turn]
-    inside = np.flatnonzero((samples[1:] > level) != (samples[:-1] > level))
+    entered, state = [], []
+    for high, beyond in ((True, samples > level + band), (False, samples < level - band)):
+        places = np.flatnonzero(beyond[1:] & ~beyond[:-1]) + 1
+        places = np.append(0, places) if beyond[0] else places
+        entered.append(places)
+        state.append(np.full(len(places), high))
+    order = np.argsort(place := np.concatenate(entered))
+    place, up = place[order], np.concatenate(state)[order]
+    turn = np.flatnonzero(up[1:] != up[:-1]) + 1
+    place, up, above = place[turn], up[turn], samples > level
+    inside = np.flatnonzero(above[1:] != above[:-1])
     before = inside[np.searchsorted(inside, place) - 1]
     x, y = (samples[before + k].astype(np.float64) for k in (0, 1))
     at = before + (level - x) / (y - x)
@@ -239,35 +252,31 @@ def _edges(samples: AnyArray, level: float, band: float) -> tuple[FloatArray, Fl
 
 def _marks(
     rising: FloatArray, falling: FloatArray, edge: Edge, rests: bool
-) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """Where each pulse has its angle 0, and its other edge; and what to say about the polarity."""
-    first, second = _paired(rising, falling)
-    share = float(np.median((second - first)[:-1] / np.diff(first)))
+) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Where each pulse has its angle 0, its other edge, and what to say about the polarity."""
+    after = falling[falling > rising[0]]
+    share = float(np.median((after - rising[: len(after)])[:-1] / np.diff(rising)[: len(after) - 1]))
     unclear = LONGEST_MARK[0] < share < LONGEST_MARK[1]
     high = unclear or share < LONGEST_MARK[0]
-    words: tuple[str, ...] = ()
-    begins, ends = ("rising", "falling") if high else ("falling", "rising")
-    name = {"leading": begins, "trailing": ends}.get(edge, edge)
+    words = []
     if edge in ("leading", "trailing", "centre") and unclear:
-        words = (
+        words.append(
             f"the tacho is high for {100 * share:.0f} % of the time, so that either level may be the mark: "
-            "high is taken (say edge = rising or falling)",
+            "high is taken (say edge = rising or falling)"
         )
     elif not (unclear or rests) and edge in ("rising", "falling") and (edge == "rising") != high:
-        words = (
+        words.append(
             f"the tacho's marks are {'high' if high else 'low'} ({100 * min(share, 1 - share):.0f} % of the "
-            f"time), and edge = {edge} is where they end",
+            f"time), and edge = {edge} is where they end"
         )
-    if edge == "centre":
-        first, second = _paired(*((rising, falling) if high else (falling, rising)))
-        return (first + second) / 2, (first + second) / 2, words
-    return *_paired(*((rising, falling) if name == "rising" else (falling, rising))), words
-
-
-def _paired(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Edges of the first kind, and those of the second that follow them."""
+    first, second = (rising, falling) if high else (falling, rising)
+    if (edge == "trailing") or edge == ("falling" if high else "rising"):
+        first, second = second, first
     second = second[second > first[0]]
-    return first[: len(second)], second
+    first = first[: len(second)]
+    if edge == "centre":
+        first = second = (first + second) / 2
+    return first, second, words
 
 
 def _usual(begin: FloatArray, pulses: int) -> FloatArray:
@@ -352,32 +361,27 @@ def _angle(
     these keep their distance.
     """
     kind, nominal = index % settings.pulses, index / settings.pulses
-    if settings.edge == "centre" or not _keeps_distance(begin, end, nominal):
-        times, base, kinds = begin, nominal, kind
-    else:
-        times = np.concatenate((begin, end))
-        base, kinds = np.concatenate((nominal, nominal)), np.concatenate((kind, settings.pulses + kind))
-    order = np.argsort(times, kind="stable")
+    slope = np.gradient(nominal, begin)
+    times, base, kinds, rate = begin, nominal, kind, slope
     offsets = np.zeros(2 * settings.pulses)
-    for k in range(settings.pulses):
-        own = kind == k
-        if own.any():
-            offsets[settings.pulses + k] = np.median((end - begin)[own] * np.gradient(nominal, begin)[own])
-    rate = np.interp(times, begin, np.gradient(nominal, begin))
-    variance = rate**2
+    if settings.edge != "centre" and _keeps_distance((end - begin) * slope):
+        times, base, rate = np.append(begin, end), np.tile(nominal, 2), np.interp(end, begin, slope)
+        kinds, rate = np.append(kind, settings.pulses + kind), np.append(slope, rate)
+        offsets[settings.pulses :] = np.median((end - begin) * slope)
+    order, variance = np.argsort(times, kind="stable"), rate**2
     for _ in range(BACKFITTING):
         angle = _fitted(times[order], (base + offsets[kinds])[order], variance[order])
         left = base + offsets[kinds] - angle.turns(times)
-        offsets[: kinds.max() + 1] -= np.bincount(kinds, left) / np.maximum(np.bincount(kinds), 1)
+        many = np.maximum(np.bincount(kinds, minlength=len(offsets)), 1)
+        offsets -= np.bincount(kinds, left, len(offsets)) / many
         offsets -= offsets[0]
         jitter = float(np.sqrt(angle.smoothing.variance * np.median(variance)))
         variance = _variance(left, rate)
     return nominal + offsets[kind], angle, jitter
 
 
-def _keeps_distance(begin: FloatArray, end: FloatArray, turns: FloatArray) -> bool:
+def _keeps_distance(apart: FloatArray) -> bool:
     """Whether the two edges of the marks are the same part of a turn apart throughout the record."""
-    apart = (end - begin) * np.gradient(turns, begin)
     parts = np.array_split(apart, min(PARTS, len(apart)))
     means, errors = (np.array([f(part) for part in parts]) for f in (np.mean, np.std))
     errors = np.maximum(errors, 1e-9) / np.sqrt([len(part) for part in parts])
@@ -392,9 +396,9 @@ def _fitted(times: FloatArray, turns: FloatArray, variance: FloatArray) -> Angle
     fastest = np.percentile(np.gradient(turns, times), 99)
     intervals = max(1, int(np.ceil((times[-1] - start) * fastest / KNOT)))
     step = (float(times[-1]) - start) / intervals
-    found = moments([((times - start) / step, 1 / size[:, None], left[:, None])], intervals)
-    smoothing, c = smooth(found.band(), found.sums()[:, 0, 0].copy(), float(left @ left), len(left))
-    return Angle(start, step, trend, c, smoothing)
+    gram, right = moments([((times - start) / step, 1 / size[:, None], left[:, None])], intervals)
+    smoothing, c = smooth(band_of(gram), sums_of(right)[:, 0, 0].copy(), float(left @ left), len(left))
+    return Angle(start, step, trend, spline(start, step, c), smoothing)
 
 
 def _variance(left: FloatArray, rate: FloatArray) -> FloatArray:
@@ -418,16 +422,3 @@ def _silent(begin: FloatArray, speed: FloatArray, end: float) -> Iterator[str]:
                 f"the tacho is silent in the {where} {span:.3g} s, about {turns:.0f} turns, which are left "
                 "out: are its pulses too low there (tacho_level)?"
             )
-
-
-def _damage(missing: int, double: int, pulses: int) -> tuple[str, ...]:
-    words = [
-        f"{counted(number, 'pulse')} of the tacho {verb}"
-        for number, verb in (
-            (missing, "missing, which were bridged"),
-            (double, "too many, which were left out"),
-        )
-        if number
-    ]
-    share = 100 * (missing + double) / pulses
-    return (f"{' and '.join(words)} ({share:.2g} % of {pulses})",) if words else ()

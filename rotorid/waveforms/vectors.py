@@ -17,8 +17,9 @@ from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
 from rotorid.waveforms.signal_path import before_path, response
 from rotorid.waveforms.tacho import Tacho, read_tacho
 
-STEADY, WINDOWS = 0.01, 20
-"""A record whose speed, in so many windows, stays within this share of it has one vector."""
+STEADY, WINDOWS, CALM = 0.01, 20, 8
+"""A record whose speed, in so many windows, stays within this share of it has one vector; windows are so long
+that jitter of the tacho is that much less."""
 PART, MOST_PLACES = 1 << 16, 500
 """Samples at a time; places at which the turns that count are found."""
 HIGHEST = 0.45
@@ -28,7 +29,7 @@ NEAR_TOP, PILED = 0.01, 0.65
 LEAST_TURNS = 2.0
 """Over which the overall level is taken."""
 MOVES = 0.1
-"""A vector that moves by more, of its size, at a steady speed is worth a word."""
+"""A vector that moves by more, of its size, at a steady speed is worth a word, beside jitter of the tacho."""
 TOLD = 3.0
 
 
@@ -149,8 +150,7 @@ def _found(
 
     first, last = tacho.turn_at(np.array([begin, end - 1]) / record.rate)
     tracked = track_orders(parts, float(first), float(last), max(orders))
-    step = max(1, len(tacho.times) // WINDOWS)
-    course = np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step])
+    course = _course(tacho, settings.pulses)
     steady = bool(np.ptp(course) < STEADY * course.mean())
     own = np.clip(own, course.min(), course.max()) if steady else own
     places = np.linspace(tracked.first, tracked.last, min(len(tracked.density), MOST_PLACES) + 1)
@@ -175,7 +175,8 @@ def _found(
     drawn = np.zeros(len(times)) if steady else tacho.angle.deviation(times)
     angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * rate)
     across = np.hypot(deviation, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None, :])
-    words += _said(record, vectors, deviation, tracked, steady)
+    moves = MOVES + TOLD * np.radians(tacho.jitter_deg) if steady else np.inf
+    words += _said(record, vectors, deviation, tracked, moves)
     same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
     overall = np.where(same[:, None], [_overall(record, *each) for each in nearby], np.nan)
     return Vectors(
@@ -196,6 +197,13 @@ def _found(
         tacho=tacho,
         warnings=tuple(words),
     )
+
+
+def _course(tacho: Tacho, pulses: int) -> FloatArray:
+    """Mean speeds of windows, turns per s."""
+    jitter = CALM / STEADY * np.sqrt(2) * tacho.jitter_deg / 360 * pulses
+    step = max(1, len(tacho.times) // WINDOWS, min(int(jitter), len(tacho.times) // 3))
+    return np.asarray(np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step]))
 
 
 def _passed(tacho: Tacho, own: FloatArray, speeds: FloatArray) -> FloatArray:
@@ -237,7 +245,7 @@ def _before_paths(
     steady: bool,
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Vectors and their deviations, (P, C, K), and means (P, C), without what the channels' paths did."""
-    read, change = tracked.at(turns), tracked.slope(turns) * speed[:, None, None]
+    read, change = tracked.spline(turns), tracked.spline(turns, 1) * speed[:, None, None]
     deviation = np.stack([tracked.deviation(turns, k) for k in orders], axis=2)
     if steady:
         means, deviations = tracked.mean()
@@ -288,9 +296,10 @@ def _checked(sensor: Channel) -> Iterator[str]:
 
 
 def _said(
-    record: WaveformRecord, vectors: ComplexArray, deviation: FloatArray, tracked: Orders, steady: bool
+    record: WaveformRecord, vectors: ComplexArray, deviation: FloatArray, tracked: Orders, moves: float
 ) -> Iterator[str]:
-    """What vectors at 1× do not tell."""
+    """What vectors at 1× do not tell; by what share one of a steady record may move, else infinite."""
+    steady = np.isfinite(moves)
     size, error = np.abs(vectors[:, :, 0]), deviation[:, :, 0]
     lost = [sensor.name for c, sensor in enumerate(record.sensors) if (size[:, c] < TOLD * error[:, c]).all()]
     if lost:
@@ -307,9 +316,9 @@ def _said(
             )
     if steady:
         places = np.linspace(tracked.first, tracked.last, 21)[1:-1]
-        course = np.abs(tracked.at(places)[:, 1] - tracked.mean()[0][1]) / np.abs(tracked.mean()[0][1])
+        course = np.abs(tracked.spline(places)[:, 1] - tracked.mean()[0][1]) / np.abs(tracked.mean()[0][1])
         for c, sensor in enumerate(record.sensors):
-            if sensor.name not in lost and course[:, c].max() > MOVES:
+            if sensor.name not in lost and course[:, c].max() > moves:
                 yield (
                     f"1× of {sensor.name!r} moves by up to {100 * course[:, c].max():.0f} % while the speed "
                     "is steady: the mean is given; has the machine settled?"

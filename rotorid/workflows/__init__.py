@@ -10,47 +10,53 @@ from rotorid.commands import (
     BearingsOptions,
     CampbellOptions,
     CriticalOptions,
+    FitOptions,
+    IdentifyOptions,
     InfluenceOptions,
+    ModesOptions,
     Motion,
     MotionOptions,
     PeriodicMotions,
     PeriodicOptions,
+    RecordFit,
     ResponseOptions,
+    RunUpOptions,
+    SimulateOptions,
     SplitOptions,
     ToleranceOptions,
     TrialWeightOptions,
     TrialWeights,
     UnbalanceOptions,
+    VectorsOptions,
     balance,
     bearings,
     campbell,
     critical,
+    fit,
+    identify,
     influence,
+    modes,
     motion,
     periodic,
     response,
+    runup,
+    simulate,
     split,
     tolerance,
     trial_weight,
     unbalance,
+    vectors,
 )
 from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
+from rotorid.commands.identify import Coefficients
 from rotorid.commands.outcome import Delivered
 from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.commands.reduce_result import ReducedRotor
 from rotorid.workflows.demo import Demo, DemoOptions, demo
-from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.fleet.fleet_add import FleetAdded, FleetAddOptions, fleet_add
 from rotorid.workflows.fleet.fleet_show import FleetShown, FleetShowOptions, fleet_show
-from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
-from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.studies.study import StudyOptions, study
 from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
-from rotorid.workflows.vibration.modes import ModesOfReadings, ModesOptions, modes
-from rotorid.workflows.vibration.runup import RunUpOptions, runup
-from rotorid.workflows.vibration.runup_result import RunUp
-from rotorid.workflows.vibration.vectors import VectorsOptions, vectors
-from rotorid.workflows.vibration.vectors_result import VectorsOfRecords
 
 __all__ = [
     "Balance",
@@ -72,7 +78,6 @@ __all__ = [
     "FleetShown",
     "IdentifyOptions",
     "InfluenceOptions",
-    "ModesOfReadings",
     "ModesOptions",
     "Motion",
     "MotionOptions",
@@ -82,10 +87,8 @@ __all__ = [
     "ReduceOptions",
     "ReducedRotor",
     "ResponseOptions",
-    "RunUp",
     "RunUpOptions",
     "SimulateOptions",
-    "Simulation",
     "SplitOptions",
     "StudiedMachines",
     "StudiedStarts",
@@ -94,7 +97,6 @@ __all__ = [
     "TrialWeightOptions",
     "TrialWeights",
     "UnbalanceOptions",
-    "VectorsOfRecords",
     "VectorsOptions",
     "balance",
     "bearings",

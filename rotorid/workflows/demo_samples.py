@@ -157,8 +157,8 @@ SAMPLES = {
             Step(
                 "undetermined",
                 "Three unknowns, of which the data tell two",
-                "identify {}/identify/task_4_1/model.toml {}/identify/task_4_1/data.csv --method "
-                "output-error --amplitude-error 2 --phase-error 1",
+                "identify {}/identify/task_4_1/model.toml {}/identify/task_4_1/data.csv "
+                "--amplitude-error 2 --phase-error 1",
             ),
         ),
     ),

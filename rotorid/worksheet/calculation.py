@@ -122,14 +122,14 @@ def balanced(job: str, version: int, kind: str) -> dict[str, Any]:
 
 def so_far(job: str, version: int) -> dict[str, Any]:
     """What the finished rows of a job say."""
-    from rotorid.workflows.vibration.runs_so_far import runs_so_far
+    from rotorid.worksheet.runs_so_far import runs_so_far
 
     return runs_so_far(Path(job)).to_dict()
 
 
 def channel(job: str, version: int, speed: str, sensor: str) -> str:
     """Polar picture of the runs of one sensor at one speed."""
-    from rotorid.workflows.vibration.runs_so_far import runs_so_far
+    from rotorid.worksheet.runs_so_far import runs_so_far
 
     return _svg(runs_so_far(Path(job)).figure(speed, sensor), f"Runs of {sensor} at {speed}")
 

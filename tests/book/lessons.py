@@ -13,10 +13,10 @@ import sympy
 
 import fem
 from book.printed import below, lines, parts, read
-from rotorid.expressions import parse_equation
-from rotorid.harmonic import Experiments, harmonic_model, identify
-from rotorid.harmonic.natural_frequencies import natural_modes
-from rotorid.harmonic.regression_rows import build_rows
+from rotorid.identify import Experiments, harmonic_model
+from rotorid.identify.expressions import parse_equation
+from rotorid.identify.linear_start import build_rows, linear_fit
+from rotorid.identify.operator_model import natural_modes
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_measurements
 
@@ -36,11 +36,11 @@ def exercise(folder, data="data.csv"):
 
 
 def _estimates(folder, units, data="data.csv", words="estimate of {}"):
-    """What is found, and the largest error of some parameters in percent of those of the direct problem."""
+    """What K θ = Y gives, and the largest error of some parameters in percent of the direct problem's."""
     model, readings, truth = exercise(folder, data)
-    found = identify(model, readings)
-    values = {c.words: c.value for c in found.combinations}
-    values |= {name: found.value(name) for name in model.parameters}
+    fit = linear_fit(model, readings)
+    values = dict(zip(fit.words, fit.system.values, strict=True))
+    values |= dict(zip(model.parameters, fit.values, strict=True))
     numbers = {words.format(f"{n}{units.get(n, '')}"): value for n, value in values.items()}
     return numbers, lambda *names: 100 * max(abs(values[n] / truth[n] - 1) for n in names)
 
@@ -73,7 +73,7 @@ def section_1_8():
     re_1, im_1, re_2, im_2 = (float(book[source, quantity].printed) for quantity in amplitudes)
     signals = {"S": np.array([complex(re_1, im_1), complex(re_2, im_2)]), "F": np.ones(2, dtype=complex)}
     tests = Experiments(("1", "2"), np.array([1.0, 2.0]), signals, np.zeros(2, dtype=bool))
-    K, Y, _ = build_rows(exercise("task_6_1")[0], tests).real_rows()
+    K, Y = build_rows(exercise("task_6_1")[0], tests).real_rows()
     numbers = {f"K({i + 1},{j + 1})": x for (i, j), x in np.ndenumerate(K)} | parts("Y({})", Y)
     found, worst = _estimates("section_1_8", {})
     return below(source, amplitudes | numbers | found | {"largest error, %": worst("T1", "T2")})

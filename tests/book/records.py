@@ -9,13 +9,15 @@ import math
 import numpy as np
 
 from book.printed import below, read
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.quasilinearization import linear_solutions
+from rotorid.identify.record_residuals import RTOL, Problem
+from rotorid.identify.records import Record
+from rotorid.identify.simulation import simulate
 from rotorid.regression import solution
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
-from rotorid.timedomain import Record, ode_model, simulate
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
-from rotorid.timedomain.methods.quasilinearization import linear_solutions
 
 THETA = ("theta1", "theta2", "theta3")
 C = np.array([[1.0, 2.0], [2.0, 1.0]])
@@ -70,10 +72,11 @@ def _iterations(model, record):
 
 def _normal_equations(problem, theta, x):
     """[Q] (2.25) to (2.28): M and Y of M θ = Y, from the equations linearised about a trajectory (31, 2)."""
-    table, _ = linear_solutions(problem, theta, lambda _: x, 0)
+    record = problem.records[0]
+    table, _ = linear_solutions(problem.model, theta, record, x, x, "sequential-heun")
     seen = C @ table
     F = seen[..., 1:].reshape(-1, 3)
-    y = np.column_stack(list(problem.records[0].outputs.values())) - seen[..., 0]
+    y = np.column_stack(list(record.outputs.values())) - seen[..., 0]
     M, Y = F.T @ F, F.T @ (y.ravel() + F @ theta)
     numbers = {f"M({i + 1},{j + 1})": value for (i, j), value in np.ndenumerate(M)}
     return numbers | {f"Y({i + 1})": value for i, value in enumerate(Y)}

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorid.harmonic import AmplitudeErrors, Experiments, HarmonicModel, harmonic_model, identify
-from rotorid.harmonic.experiments import experiments
+from rotorid.identify import AmplitudeErrors, Experiments, HarmonicModel, harmonic_model, identify
+from rotorid.identify.amplitudes import experiments
+from rotorid.identify.linear_start import linear_fit
+from rotorid.regression import coverage_factor
 
 FloatArray = NDArray[np.float64]
 TWO_MASSES = (
@@ -91,7 +93,7 @@ class Figures:
 
 
 def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, seed: int = 1) -> Figures:
-    """Identify many simulated repetitions.
+    """Identify many simulated repetitions, by output error or by the linear regression that it starts from.
 
     Output error begins at the truth, which changes nothing but the time: every start leads to the
     same minimum.
@@ -99,13 +101,17 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, se
     rng = np.random.default_rng(seed)
     truth = np.array(list(case.truth.values()))
     values, inside = np.zeros((repetitions, len(truth))), np.zeros((repetitions, len(truth)))
-    start = dict(case.truth) if method == "output-error" else None
     for i in range(repetitions):
-        found = identify(case.model, simulate(case, rng, stated=stated), method=method, start=start)
-        values[i] = found.values
-        interval = found.ci95
-        if interval is not None:
-            inside[i] = (interval[:, 0] <= truth) & (truth <= interval[:, 1])
+        data = simulate(case, rng, stated=stated)
+        if method == "output-error":
+            found = identify(case.model, data, start=dict(case.truth))
+            values[i], deviations, factor = found.values, found.std, found.coverage_factor
+        else:
+            fit = linear_fit(case.model, data)
+            values[i] = fit.values
+            deviations = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
+            factor = coverage_factor(None if stated else fit.estimate.dof)
+        inside[i] = np.abs(values[i] - truth) <= factor * deviations
     std = values.std(axis=0)
     return Figures(inside.mean(axis=0), (values.mean(axis=0) - truth) / std, std / np.abs(truth))
 

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from scipy.special import wofz
 
 from balancing import Labels
-from rotorid.harmonic.modal.run_up import SweepVectors, fit_sweep
+from rotorid.identify.modes_readings import Readings
+from rotorid.identify.run_up import fit_sweep
 
 RPM = np.pi / 30
 ACCELERATIONS = (20.0, 60.0, 180.0, -60.0)
@@ -86,7 +87,7 @@ def swept(
     return np.asarray((both[0] - both[1]) / (2j * s.imag) * np.exp(-1j * (first * time + rate * time**2 / 2)))
 
 
-def draw_sweep(random: np.random.Generator, rotor: Rotor, rate: float, noise: float = NOISE) -> SweepVectors:
+def draw_sweep(random: np.random.Generator, rotor: Rotor, rate: float, noise: float = NOISE) -> Readings:
     """Read a run-up, or a run-down, of a rotor; rate in rad/s²; without noise speeds are exact, too."""
     ends = 300 * RPM, 1.25 * float(rotor.omega[1])
     first = ends[0] if rate > 0 else ends[1]
@@ -99,7 +100,7 @@ def draw_sweep(random: np.random.Generator, rotor: Rotor, rate: float, noise: fl
     if noise:
         speeds = np.round(speeds / RPM, 1) * RPM
     covariances = np.broadcast_to((noise or NOISE) ** 2 * np.eye(2), (*exact.shape, 2, 2))
-    return SweepVectors("run-up", time, speeds, ("A", "B"), exact + noise * errors, covariances, Labels())
+    return Readings("run-up", time, speeds, ("A", "B"), exact + noise * errors, covariances, Labels())
 
 
 def one_rotor(random: np.random.Generator, rate: float) -> Outcome:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.integration.simulate import simulate
-from rotorid.timedomain.models.ode_model import ode_model
-from rotorid.timedomain.models.record import Record
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
+from rotorid.identify.simulation import simulate
 
 FROM_RECORD = {"x": "record", "v": "record"}
 
@@ -45,14 +45,14 @@ def test_intervals_hold_with_the_error_of_the_start(sigma):
     inside, squares, naive = [], [], []
     for seed in range(n):
         record = drawn(seed, sigma)
-        found = fit(model, record, max_seconds=600)
+        found = fit(model, record)
         assert found.reliable
         inside.append((found.ci95[:, 0] <= truth) & (truth <= found.ci95[:, 1]))
         squares.append(((found.values - truth) / found.std) ** 2)
         if seed >= n / 4 and not FULL:
             continue
         first = {name: float(record.outputs[name][0]) for name in ("x", "v")}
-        plain = fit(oscillator(first), record, max_seconds=600).estimate
+        plain = fit(oscillator(first), record).estimate
         if plain.ci95 is not None:
             naive.append((plain.ci95[:, 0] <= truth[:2]) & (truth[:2] <= plain.ci95[:, 1]))
     # four standard deviations of a share of n, and of a mean of n squares

@@ -3,8 +3,8 @@
 import numpy as np
 from repetitions import FULL
 
-from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
-from rotorid.harmonic.experiments import experiments
+from rotorid.identify import AmplitudeErrors, harmonic_model, identify
+from rotorid.identify.amplitudes import experiments
 
 
 def test_recovered_parameters_have_the_spread_that_simulation_shows():

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
-from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
-from rotorid.harmonic.experiments import experiments
-from rotorid.timedomain import Record, ode_model
-from rotorid.timedomain.fit import fit
+from rotorid.identify import AmplitudeErrors, harmonic_model, identify
+from rotorid.identify.amplitudes import experiments
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 
 T = np.linspace(0.0, 3.0, 25)
 
@@ -57,7 +58,7 @@ def test_output_error_covers_parameters_drawn_from_their_prior():
         X = 10 / (c - 10 * w**2 + 1j * b * w)
         noise = np.exp(0.05 * (rng.standard_normal(4) + 1j * rng.standard_normal(4)))
         data = experiments(model, w, {"X": X * noise, "F": 10.0}, errors=errors)
-        found = identify(model, data, method="output-error", prior={"c": (1000.0, 20.0), "b": (20.0, 0.5)})
+        found = identify(model, data, prior={"c": (1000.0, 20.0), "b": (20.0, 0.5)})
         shares.append(found.prior.share)
         warned += bool(found.warnings)
         if not found.warnings:

@@ -3,8 +3,8 @@
 import numpy as np
 from repetitions import FULL
 
-from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
-from rotorid.harmonic.simulated_measurements import as_read, forced_vibration
+from rotorid.identify import AmplitudeErrors, harmonic_model, identify
+from rotorid.identify.direct_problem import as_read, forced_vibration
 
 
 def test_stated_errors_cover_the_truth():
@@ -16,7 +16,7 @@ def test_stated_errors_cover_the_truth():
     inside = []
     for seed in range(tables):
         data = as_read(exact, ["X"], errors, seed=seed)
-        low, high = identify(model, data, method="output-error", start={"c": 1000.0, "b": 10.0}).ci95.T
+        low, high = identify(model, data, start={"c": 1000.0, "b": 10.0}).ci95.T
         inside.append((low <= truth) & (truth <= high))
     shares = np.mean(inside, axis=0)
     assert np.all(np.abs(shares - 0.95) < 3 * np.sqrt(0.95 * 0.05 / tables)), shares

@@ -8,7 +8,7 @@ from cases import each_of
 from keys_in_files import with_tables
 
 import rotorid
-from rotorid.expressions import FUNCTIONS
+from rotorid.identify.expressions import FUNCTIONS
 from rotorid.samples import sample_data
 from rotorid.tables.data import modes_table as modes
 from rotorid.tables.job import job_from_excel as jobbook

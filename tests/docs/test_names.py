@@ -12,7 +12,7 @@ import pytest
 from cases import each_of
 
 PACKAGES = ("fem", "balancing", "rotorid")
-ROOMS = ("harmonic", "timedomain", "reduction", "calibration", "tables")
+ROOMS = ("identify", "reduction", "calibration", "tables")
 LISTS = (*PACKAGES, *(f"rotorid.{room}" for room in ROOMS))
 
 

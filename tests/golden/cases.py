@@ -249,16 +249,13 @@ reduce-place-compromise     reduce {ROTOR23} --place compromise --candidates 5,8
 reduce-model-job            reduce sample_data/model_job/rotor.csv --nodes 6,12,19 --modes 2 --stability 0:9000rpm
 reduce-without-nodes        reduce {ROTOR23}
 reduce-order                reduce {ROTOR23} --nodes 12,7
-identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
+identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --amplitude-error 2 --phase-error 1
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
-identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
-identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
-identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
+identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --loss soft_l1
+identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --amplitude-error 2 --phase-error 1
 identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
-identify-two-models         identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1
-identify-two-designs        identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --design 5:40:1
 simulate-lesson-5           simulate {IDENTIFY}/task_5_1/model.toml --with c=1000,alpha=10 --frequencies 10,20,30 --inputs F=10 --digits 2 --output x.csv --verbose
 simulate-errors             simulate {IDENTIFY}/section_1_7/model.toml --with c=1e5,b=200,q=5000 --frequencies 600:1400:200rpm --inputs Ux=0.001,Uy=0.001@-90 --amplitude-error 2 --phase-error 1 --seed 1
 simulate-modes              simulate {IDENTIFY}/task_7_1/model.toml --with c1=1e4,c2=2e4,c3=5e3 --modes --digits 3
@@ -275,13 +272,10 @@ fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
-fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
-fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
 fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
-fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
 fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
 fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
 fit-tolerance-coarse        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 0.9
@@ -293,12 +287,12 @@ fit-prior                   fit prior.toml {FIT}/quasilinearization/record_noisy
 fit-prior-auto              fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma auto
 fit-prior-unweighed         fit prior.toml {FIT}/quasilinearization/record_noisy.csv
 fit-ridge                   fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --ridge 0.001 --table
-fit-design                  fit {FIT}/quasilinearization/model.toml --start theta1=1,theta2=-1,theta3=-1 --sigma 0.02 --design 0:10:0.5 --choose 4
 identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
 identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
-identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
+identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml --show equations
 identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
 reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
+fit-printed                 fit {FIT}/three_masses/model.toml {FIT}/three_masses/printed.csv --allow-missing --method gauss-newton --integrator rk4
 fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 """
 
@@ -390,13 +384,6 @@ PRIOR = {
         "[prior]\ntheta1 = [1.0, 0.004]\ntheta2 = [-0.9, 0.02]\n\n[estimate]",
     )
 }
-MASS = {
-    "mass.toml": (
-        f"{IDENTIFY}/task_5_1/model.toml",
-        'known = { m = 10.0 }\nestimate = ["c", "alpha"]',
-        'estimate = ["c", "alpha", "m"]',
-    )
-}
 EDITS = {
     "fit-prior": PRIOR,
     "fit-prior-auto": PRIOR,
@@ -414,8 +401,6 @@ EDITS = {
     "identify-misspelt": {
         "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
     },
-    "identify-two-models": MASS,
-    "identify-two-designs": MASS,
     "simulate-resonance": {
         "undamped.toml": (
             f"{IDENTIFY}/task_5_1/model.toml",
@@ -535,22 +520,18 @@ STORED = (
     "critical-rotor23",
     "critical-rotor23-mesh",
     "demo-list",
-    "fit-design",
     "fit-equations",
     "fit-prior",
     "fit-run-down-plot",
-    "fit-shooting",
     "fleet-add",
     "fleet-fit",
     "fleet-show-type",
     "holes-minmax",
     "holes-report",
-    "identify-design",
     "identify-equations",
     "identify-modes",
     "identify-output-error",
     "identify-task_3_3",
-    "identify-two-models",
     "influence-coarse",
     "model-job-ridge",
     "modes-chain",

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
-from rotorid.harmonic.experiments import experiments as gather
-from rotorid.harmonic.operator_equations import harmonic_model
-from rotorid.harmonic.operator_model import HarmonicModel
+from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
+from rotorid.identify.amplitudes import experiments as gather
+from rotorid.identify.equations import harmonic_model
+from rotorid.identify.operator_model import HarmonicModel
 
 STATED = AmplitudeErrors(relative=0.02, phase=np.deg2rad(1.0))
 

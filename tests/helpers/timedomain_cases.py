@@ -5,9 +5,9 @@ import tomllib
 import numpy as np
 
 import fem
-from rotorid.timedomain.integration.simulate import simulate
-from rotorid.timedomain.models.ode_model import ode_model
-from rotorid.timedomain.models.record import Record
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
+from rotorid.identify.simulation import simulate
 
 CHAIN_STATES = {
     "y1": "v1",

@@ -3,12 +3,11 @@
 import pytest
 
 from rotorid.base.registry import Method, described, find, names
-from rotorid.harmonic.identification import METHODS as IDENTIFICATIONS
+from rotorid.identify.fit_records import METHODS
+from rotorid.identify.simulation import INTEGRATORS
 from rotorid.regression.robust import LOSSES
-from rotorid.timedomain.integration.simulate import INTEGRATORS
-from rotorid.timedomain.methods.fit_methods import METHODS
 
-KINDS = (METHODS, INTEGRATORS, LOSSES, IDENTIFICATIONS)
+KINDS = (METHODS, INTEGRATORS, LOSSES)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,8 +27,8 @@ from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
-    from rotorid.harmonic.operator_model import HarmonicModel
+    from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
+    from rotorid.identify.operator_model import HarmonicModel
 
 
 _SPEED = one_of(units.SPEED)
@@ -73,7 +74,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     TableWarning
         Where an amplitude of the model is nowhere in the table, and where few repeats tell the errors.
     """
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.identify.amplitudes import Experiments
 
     file = model if isinstance(model, HarmonicFile) else None
     equations = model.model if isinstance(model, HarmonicFile) else model
@@ -87,7 +88,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     frequency = _frequency(table)
     read = {name: _amplitude(table, name, unclear=unclear) for name in equations.signals}
     if not unclear:
-        _complain_about_missing(table, equations, read)
+        _complain_about_missing(table, equations, read, file.unmeasured if file else ())
         for name in equations.varying:
             if name not in table:
                 expected = f"a column {name}: the equations multiply amplitudes by it"
@@ -106,9 +107,39 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     varying = {name: table.numbers(name) for name in equations.varying}
     axis, shown = _shown(table, signals)
     rows = Experiments(names, frequency, signals, free, errors, varying=varying, axis=axis, units=shown)
+    rows = replace(rows, rounding=_rounding(table, rows, equations.outputs))
     if "repeat" in table:
         rows = merge_repeats(table, rows, equations)
     return rows
+
+
+def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[str, FloatArray]:
+    """Covariances (n, 2, 2) that the digits of readings give, and under "" variances (n,) of frequencies.
+
+    Frequencies of excitation are set, not read; a shape that is 1 everywhere is the reference of the others.
+    Nothing where a cell of a reading is blank, or a natural frequency shows no end of its digits.
+    """
+    found: dict[str, FloatArray] = {}
+    for name in outputs:
+        there = [f"{name}_{part}" for part in ("amplitude", "phase", "re", "im") if f"{name}_{part}" in table]
+        if any(table.is_blank(stem).any() for stem in there):
+            return {}
+        z = rows.signals[name]
+        if not there or (rows.free.all() and (z == 1).all()):
+            found[name] = (1e-12 * np.maximum(np.nan_to_num(np.abs(z)), 1e-12))[:, None, None] ** 2 * np.eye(
+                2
+            )
+            continue
+        first, last = (table.steps(stem) for stem in (there[0], there[-1]))
+        polar = there[0] == f"{name}_amplitude"
+        u = np.exp(1j * np.angle(z)) if polar else np.ones(len(z))
+        turn = np.stack((np.stack((u.real, -u.imag), -1), np.stack((u.imag, u.real), -1)), -2)
+        spread = turn * (np.stack((first, last * np.abs(z) if polar else last), -1) / np.sqrt(12.0))[:, None]
+        found[name] = spread @ np.swapaxes(spread, 1, 2)
+    steps = table.steps(next(stem for stem in FREQUENCIES if stem in table))
+    if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such
+        return {}
+    return {**found, "": np.where(rows.free, steps**2 / 12.0, 0.0)}
 
 
 def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experiments:
@@ -116,7 +147,7 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
 
     Velocities and accelerations, known by their units, become displacements. Repeated readings stay apart.
     """
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.identify.amplitudes import Experiments
 
     problems = Problems()
     grid = problems.need(read_grid(path, "measurements", problems, first=True))
@@ -145,7 +176,7 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
 
 def _free_vibrations(path: str | Path, model: HarmonicModel, file: HarmonicFile | None) -> Experiments:
     """A table of modes, whose nodes are amplitudes of the model."""
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.identify.amplitudes import Experiments
 
     modes, problems = read_modes(path), Problems()
     nodes, k = [str(node) for node in modes.nodes], len(modes.frequencies)
@@ -285,7 +316,9 @@ def _amplitude(table: Table, name: str, *, unclear: bool) -> ComplexArray | None
     return value
 
 
-def _complain_about_missing(table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None]) -> None:
+def _complain_about_missing(
+    table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None], unmeasured: Sequence[str]
+) -> None:
     parts = ("amplitude", "phase", "re", "im")
     absent = [name for name in model.outputs if not any(f"{name}_{part}" in table for part in parts)]
     if len(absent) == len(model.outputs):
@@ -293,9 +326,8 @@ def _complain_about_missing(table: Table, model: HarmonicModel, read: dict[str, 
             [f"{name}_amplitude and {name}_phase_deg, or {name}_re and {name}_im" for name in absent]
         )
         table.in_header(None, f"measured amplitudes: columns {forms}")
-    elif absent and not len(table.problems):
-        lost = listing(absent, "and")
-        message = f"{table.source}: the table has no {lost}: eliminated from the equations, or predicted"
+    elif (lost := [name for name in absent if name not in unmeasured]) and not len(table.problems):
+        message = f"{table.source}: the table has no {listing(lost, 'and')}: predicted"
         warnings.warn(message, TableWarning, stacklevel=3)
     for name, values in read.items():
         if values is not None and np.isnan(values).all() and not len(table.problems):

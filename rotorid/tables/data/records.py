@@ -20,8 +20,8 @@ from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, one_of
 
 if TYPE_CHECKING:
-    from rotorid.timedomain.models.ode_model import OdeModel
-    from rotorid.timedomain.models.record import Record
+    from rotorid.identify.ode import OdeModel
+    from rotorid.identify.records import Record
 
 TIME = {
     "s": Unit("s", "time"),
@@ -78,7 +78,7 @@ def read_record(
     TableWarning
         Where an evenly sampled record has gaps.
     """
-    from rotorid.timedomain.models.record import Record
+    from rotorid.identify.records import Record
 
     problems = Problems()
     grid = problems.need(read_grid(Path(path), "record", problems, first=True))

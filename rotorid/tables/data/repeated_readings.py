@@ -14,8 +14,8 @@ from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import TableWarning
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
-    from rotorid.harmonic.operator_model import HarmonicModel
+    from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
+    from rotorid.identify.operator_model import HarmonicModel
 
 FREQUENCIES = ("frequency", "speed")
 """Stems of the columns that may hold the frequency."""
@@ -59,6 +59,7 @@ def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel) -> Expe
         signals=signals,
         free=np.array([rows.free[m].all() for m in members]),
         varying={name: np.array([v[m].mean() for m in members]) for name, v in rows.varying.items()},
+        rounding={},
     )
     errors = rows.errors or _scatter(table.source, rows, merged, members, model)
     if errors is None:
@@ -111,7 +112,7 @@ def _scatter(
     source: str, rows: Experiments, merged: Experiments, members: list[list[int]], model: HarmonicModel
 ) -> AmplitudeErrors | None:
     """Errors of one reading, relative to its amplitude, pooled over all repeated ones; None without any."""
-    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.identify.amplitudes import AmplitudeErrors
 
     along = across = 0.0
     dof, dof_across = 0, 0

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
-from rotorid.expressions import ExpressionError, parse_equation
+from rotorid.identify.expressions import ExpressionError, parse_equation
 from rotorid.tables.models.ode_file import read_time_form
 from rotorid.tables.models.shared_keys import (
     BOUNDS,
@@ -31,8 +31,8 @@ from rotorid.tables.reader.settings_keys import Key, Kind, take
 from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.harmonic.operator_model import HarmonicModel
+    from rotorid.identify.amplitudes import AmplitudeErrors
+    from rotorid.identify.operator_model import HarmonicModel
 
 _IN_TIME = ("M", "C", "K", "states")
 """Keys of models in time; such a file is read by `read_ode_model`, too."""
@@ -86,9 +86,8 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     without both have a force amplitude f_x7 on every coordinate x7, and those not in the table are 0. An
     output that is a number times a displacement or velocity is measured in place of it; other linear outputs
     add equations. `[initial]` plays no part, `speed_rad_s` neither; a parameter of initial values alone is
-    left out, with a warning. Explicit time, constant loads and nonlinear terms are refused. What
-    `[outputs]` do not show is eliminated if no parameter stands at it; another amplitude that is not measured
-    is predicted by output error, while equation error needs it.
+    left out, with a warning. Explicit time, constant loads and nonlinear terms are refused. An
+    amplitude that `[outputs]` do not show, or that is not measured, is predicted.
 
     Parameters
     ----------
@@ -136,7 +135,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
             section.complain("start", f"{name} within its bounds, {low:g} to {high:g}")
     prior = priors(said["prior"], estimate or ())
     problems.stop()
-    from rotorid.harmonic.operator_equations import harmonic_model
+    from rotorid.identify.equations import harmonic_model
 
     try:
         model = harmonic_model(
@@ -159,8 +158,7 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
 
     form = read_time_form(section, problems, initial=False)
     problems.stop()
-    from rotorid.harmonic.operator_equations import harmonic_model
-    from rotorid.harmonic.unmeasured_amplitudes import without
+    from rotorid.identify.equations import harmonic_model
 
     try:
         operators = operator_form(form)
@@ -168,10 +166,6 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         model = harmonic_model(
             operators.equations, known=form.known, estimate=list(start), inputs=operators.inputs
         )
-        own = operators.unseen
-        parametric = {f.equation for f in model.features if f.signal in own and set(f.exact) != {()}}
-        plain = {name: i for name, i in own.items() if i not in parametric}
-        model = (without(model, plain, plain) if plain else None) or model
         if model.has_constant_terms:
             raise ValueError(
                 "a load or output without any amplitude stands in it: a constant one has no influence on "
@@ -187,7 +181,7 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         message = f"{path}: {lost} {stand} in initial values only, which amplitudes do not show: left out"
         warnings.warn(message, TableWarning, stacklevel=3)
     bounds, prior = ({n: two for n, two in each.items() if n in start} for each in (form.bounds, form.prior))
-    unmeasured = tuple({*own} & {*model.outputs})
+    unmeasured = tuple({*operators.unseen} & {*model.outputs})
     return HarmonicFile(model, bounds, start, form.errors, path, unmeasured, prior)
 
 
@@ -253,6 +247,6 @@ HARMONIC = (
     Key("known", NUMBERS, "names with their numbers"),
     BOUNDS,
     PRIOR,
-    Key("start", NUMBERS, "guesses, for output error, `--design`, and models with several solutions"),
+    Key("start", NUMBERS, "guesses, for output error, and models with several solutions"),
     STATED_ERRORS,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rotorid.expressions import is_name
+from rotorid.identify.expressions import is_name
 from rotorid.tables.reader.settings_keys import Key, Kind, Said
 from rotorid.tables.reader.toml_file import Section
 

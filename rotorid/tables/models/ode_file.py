@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid import expressions
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.expressions import LARGEST, ExpressionError
+from rotorid.identify import expressions
+from rotorid.identify.expressions import LARGEST, ExpressionError
 from rotorid.tables.models.matrix_form import MATRICES, Matrices, has_matrices, matrices_of
 from rotorid.tables.models.shared_keys import (
     BOUNDS,
@@ -32,8 +32,8 @@ from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.value_kinds import FLAG, number, table
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.timedomain.models.ode_model import OdeModel
+    from rotorid.identify.amplitudes import AmplitudeErrors
+    from rotorid.identify.ode import OdeModel
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,8 @@ def read_ode_model(path: str | Path) -> OdeModel:
     problems.stop()
     form = read_time_form(section, problems)
     problems.stop()
-    from rotorid.timedomain.models.ode_model import ode_model
-    from rotorid.timedomain.models.second_order import second_order
-    from rotorid.timedomain.models.sensor_offset_drift import with_nuisance
+    from rotorid.identify.ode import ode_model, with_nuisance
+    from rotorid.identify.second_order import second_order
 
     names = form.states if form.matrices is None else form.matrices.coordinates
     outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotorid import expressions
+from rotorid.identify import expressions
 from rotorid.tables.models.matrix_form import Matrices
 
 if TYPE_CHECKING:

@@ -7,14 +7,14 @@ from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.expressions import is_name
+from rotorid.identify.expressions import is_name
 from rotorid.tables.reader import value_kinds
 from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.identify.amplitudes import AmplitudeErrors
 
 _LIMITS = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 NAMES = {"type": "array", "items": {"type": "string"}}
@@ -39,7 +39,7 @@ def _errors(section: Section) -> AmplitudeErrors | None:
             "at least one of amplitude_percent, phase_deg and floor above 0, or no [errors] at all"
         )
         return None
-    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.identify.amplitudes import AmplitudeErrors
 
     return AmplitudeErrors(percent / 100.0, math.radians(phase), floor)
 

@@ -14,7 +14,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import turned
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
-from rotorid.harmonic.modal.run_up import SweepVectors as SweepVectors
+from rotorid.identify.modes_readings import Readings
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
@@ -34,7 +34,7 @@ _BESIDE = re.compile(r"(order\d+_|overall|gap|turns).*")
 _SAME = 1e-9
 
 
-def read_vectors(source: Source, phase: Phase) -> tuple[SweepVectors, ...]:
+def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     """Read the vectors of each run over speed.
 
     The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
@@ -104,7 +104,7 @@ def _covariances(table: Table, vectors: ComplexArray) -> FloatArray:
 
 def _sweep(
     table: Table, rows: IntArray, vectors: ComplexArray, covariances: FloatArray | None, labels: Labels
-) -> SweepVectors:
+) -> Readings:
     """The rows of one run as vectors of its sensors, by rising time or, without times, speed."""
     instants, place = np.unique(_instants(table)[rows], return_inverse=True)
     names = np.array(table.texts("sensor"))[rows].tolist()
@@ -119,11 +119,11 @@ def _sweep(
         stated = np.full((*Z.shape, 2, 2), np.nan)
         stated[place, column] = covariances[rows]
     timed = instants if "time" in table else None
-    return SweepVectors(table.texts("run")[rows[0]], timed, speeds, sensors, Z, stated, labels)
+    return Readings(table.texts("run")[rows[0]], timed, speeds, sensors, Z, stated, labels)
 
 
 def runs_columns(
-    found: Sequence[tuple[SweepVectors, FloatArray, ComplexArray, FloatArray]],
+    found: Sequence[tuple[Readings, FloatArray, ComplexArray, FloatArray]],
 ) -> tuple[Told, ...]:
     """A runs table with errors: of each sweep speeds (M,), vectors (M, C), covariances of their parts."""
     labels = found[0][0].labels
@@ -155,7 +155,7 @@ def runs_columns(
     )
 
 
-def read_slow_roll(path: Path, sweep: SweepVectors) -> tuple[ComplexArray, tuple[str, ...]]:
+def read_slow_roll(path: Path, sweep: Readings) -> tuple[ComplexArray, tuple[str, ...]]:
     """Slow-roll vectors (C,) of the sensors of a sweep, of a runs table at one speed, and warnings.
 
     Raises

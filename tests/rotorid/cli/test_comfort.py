@@ -67,8 +67,8 @@ def test_usage_with_the_nearest_name(cli, args, message):
             "no station is called 'prob DE' (did you mean 'probe DE'?)",
         ),
         (
-            ["identify", TASK / "model.toml", TASK / "data.csv", "--method", "output-eror"],
-            "'output-eror' is not known (did you mean 'output-error'?)",
+            ["identify", TASK / "model.toml", TASK / "data.csv", "--loss", "hubr"],
+            "'hubr' is not known (did you mean 'huber'?)",
         ),
         (["demo", "--sample", "hols"], "--sample 'hols' is not known (did you mean 'holes'?)"),
     ],

@@ -15,7 +15,7 @@ NUMBERS = {
     "rig": ["disk 1    33.49  250.5°", "its angle is not determined"],
     "rotor": ["4375.19", "10932.4 rpm", "4409.93"],
     "reduction": ["134.203", "IRS", "three_masses.toml"],
-    "identification": ["999.935", "Only c and b*(1 - delta) are determined"],
+    "identification": ["10.0108", "Only c and b*(1 - delta) are determined"],
     "record": ["880.814", "The model leaves 3.4 % of the record"],
     "calibration": ["The model explains the data", "rms 26.2 → 2.29 µm pp"],
     "waveforms": ["1× of 3 sensors in 3 records; phases lag.", "rms 80.1 → "],

@@ -101,3 +101,24 @@ def test_json_has_no_nan(cli, tmp_path):
     assert outcome.code == 0, outcome.err
     assert json.loads(outcome.out)["rank"] == 1
     assert "NaN" not in outcome.out
+
+
+def test_iterations_of_the_texts_are_written_as_tables(cli, tmp_path):
+    """Tables 2.2 and 2.3 of [Q]; beta and I(beta) by step of [F]; the default method writes parameters."""
+    import openpyxl
+
+    scheme = ("--method", "quasilinearization", "--integrator", "sequential-heun")
+    book, table = tmp_path / "q.xlsx", tmp_path / "f.csv"
+    found = cli("fit", *files("quasilinearization"), *scheme, "--json", "--output", book).json
+    sheets = openpyxl.load_workbook(book)
+    assert sheets.sheetnames == ["iterations", "x1 by iteration", "x2 by iteration"]
+    rows = [row[1:4] for row in sheets["iterations"].iter_rows(min_row=2, values_only=True)]
+    steps = [[*step["parameters"].values()] for step in found["history"]]
+    np.testing.assert_allclose(np.array(rows, dtype=float), steps, rtol=1e-14)
+    assert sheets["x2 by iteration"].max_row == 32
+    cli("fit", *files("three_masses"), "--method", "gauss-newton", "--integrator", "rk4", "--output", table)
+    assert table.read_text(encoding="utf-8-sig").splitlines()[0] == "iteration,c1,m1,m2,I(β)"
+    shown = cli("fit", *files("three_masses"), "--method", "gauss-newton", "--table").out
+    assert "Iterations:" in shown
+    cli("fit", *files("three_masses"), "--output", table)
+    assert table.read_text(encoding="utf-8").startswith("parameter,value,std")

@@ -11,9 +11,9 @@ from scipy.io import loadmat
 import fem
 from rotorid import read_ode_model, read_rotor, small_model
 from rotorid import reduce as reduce_rotor
+from rotorid.identify.second_order import state_space
 from rotorid.samples import sample_data
 from rotorid.tables import read_small_model
-from rotorid.timedomain.models.linear_system import state_space
 
 ROTOR = sample_data() / "rotor23.csv"
 BOOK = sample_data() / "book_task_9"

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
-from rotorid.harmonic.experiments import experiments
+from rotorid.commands.fit import FitOptions
+from rotorid.commands.fit import fit as work
+from rotorid.commands.identify import IdentifyOptions
+from rotorid.commands.identify import identify as work_harmonic
+from rotorid.identify import AmplitudeErrors, harmonic_model, identify
+from rotorid.identify.amplitudes import experiments
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
+from rotorid.identify.records import Record
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import prior_rows
-from rotorid.report.equations_of_results import equations_of
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_ode_model
-from rotorid.timedomain import Record, ode_model
-from rotorid.timedomain.fit import fit
-from rotorid.workflows.fit import FitOptions
-from rotorid.workflows.fit import fit as work
-from rotorid.workflows.identify import IdentifyOptions, compare
-from rotorid.workflows.identify import identify as work_harmonic
 
 T = np.linspace(0.0, 3.0, 25)
 K = np.column_stack((np.ones(25), T, np.exp(-T)))
@@ -49,9 +49,7 @@ def bayes(y, known=KNOWN, sigma=SIGMA):
     return C @ (K.T @ y / sigma**2 + P @ v), C
 
 
-@pytest.mark.parametrize(
-    "method", ["levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting"]
-)
+@pytest.mark.parametrize("method", ["levenberg-marquardt", "gauss-newton", "quasilinearization"])
 def test_a_fit_with_a_prior_is_bayesian_linear_regression(method):
     y = readings()
     found = fit(line(KNOWN), record(y), method=method)
@@ -203,10 +201,8 @@ def test_a_ridge_of_output_error_goes_from_the_estimate_to_the_start():
     w, start = np.array([8.0, 9.0, 11.0]), {"c": 1200.0, "b": 30.0}
     X = 10 / (1000 - 10 * w**2 + 20j * w) * np.array([1.01, 1 + 0.02j, 0.98])
     data = experiments(model, w, {"X": X, "F": 10.0})
-    plain = identify(model, data, method="output-error")
-    found = [
-        identify(model, data, method="output-error", start=start, ridge=ridge) for ridge in (1e-10, 0.1, 1e8)
-    ]
+    plain = identify(model, data)
+    found = [identify(model, data, start=start, ridge=ridge) for ridge in (1e-10, 0.1, 1e8)]
     c, b = np.array([one.values for one in found]).T
     assert (c[0], b[0]) == pytest.approx(plain.values, rel=1e-6)
     assert (c[2], b[2]) == pytest.approx((1200.0, 30.0), rel=1e-6)
@@ -219,14 +215,10 @@ def test_a_ridge_of_output_error_goes_from_the_estimate_to_the_start():
 def test_identify_says_what_it_needs():
     model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
     data = experiments(model, [9.0, 11.0], {"X": [0.05 - 0.05j, -0.02 - 0.03j], "F": 10.0})
-    with pytest.raises(ValueError, match="belong to --method output-error"):
-        identify(model, data, prior={"c": (1.0, 1.0)})
-    with pytest.raises(ValueError, match="belong to --method output-error"):
-        identify(model, data, ridge=0.1)
     with pytest.raises(ValueError, match="weighed against the errors of the amplitudes"):
-        identify(model, data, method="output-error", prior={"c": (1.0, 1.0)})
+        identify(model, data, prior={"c": (1.0, 1.0)})
     with pytest.raises(ValueError, match="prior: d is no parameter"):
-        identify(model, data, method="output-error", prior={"d": (1.0, 1.0)})
+        identify(model, data, prior={"d": (1.0, 1.0)})
 
 
 def test_a_prior_chooses_among_values_that_can_be_exchanged():
@@ -235,26 +227,10 @@ def test_a_prior_chooses_among_values_that_can_be_exchanged():
     w = np.array([0.5, 1.0, 2.0])
     X = 1 / ((0.5j * w + 1) * (0.8j * w + 1))
     data = experiments(model, w, {"X": X, "F": 1.0}, errors=AmplitudeErrors(0.01, 0.01))
-    assert np.isnan(identify(model, data, method="output-error").values).all()
-    found = identify(model, data, method="output-error", prior={"T1": (0.6, 0.1)})
+    assert np.isnan(identify(model, data).values).all()
+    found = identify(model, data, prior={"T1": (0.6, 0.1)})
     assert found.values == pytest.approx([0.5, 0.8], rel=0.05)
     assert found.identifiable
-
-
-def test_leaving_out_an_experiment_keeps_the_prior():
-    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
-    w, F, errors = np.array([5.0, 9.0, 12.0]), 10.0, AmplitudeErrors(0.01, 0.01)
-    X = F / (1003.0 - 10 * w**2 + 20j * w) * np.array([1.004, 1 + 0.006j, 0.997])
-    known = {"b": (19.0, 0.3)}
-
-    def found(keep):
-        data = experiments(model, w[keep], {"X": X[keep], "F": F}, errors=errors)
-        return identify(model, data, method="output-error", prior=known)
-
-    whole = found([0, 1, 2])
-    for i in range(3):
-        others = found([j for j in range(3) if j != i])
-        assert whole.influence[i] == pytest.approx(others.values - whole.values, rel=0.1, abs=0.05)
 
 
 def test_what_the_prior_does_not_determine_either_is_no_merit_of_it():
@@ -295,7 +271,7 @@ def test_a_bound_is_no_fault_of_the_prior_and_its_misfit_is_not_hidden():
     w, errors = np.array([9.0, 11.0]), AmplitudeErrors(0.05, 0.05)
     tests = experiments(spring, w, {"X": 10 / (1000 - 10 * w**2 + 20j * w), "F": 10.0}, errors=errors)
     limits, known = {"c": (1100.0, 1200.0)}, {"c": (1000.0, 20.0)}
-    held = identify(spring, tests, method="output-error", bounds=limits, prior=known)
+    held = identify(spring, tests, bounds=limits, prior=known)
     assert "prior" not in held.summary().split("parameter ")[1]
     assert any("residuals are" in w for w in held.warnings)
 
@@ -335,29 +311,17 @@ def test_the_other_outputs_tell_of_a_prior(tmp_path):
     text = (folder / "model.toml").read_text(encoding="utf-8")
     path.write_text(f"{text}\n[prior]\ntheta1 = [1.0, 0.004]\n", encoding="utf-8")
     start = {"theta1": 1.0, "theta2": -1.0, "theta3": -1.0}
-    found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start, design="0:10:1"))
+    found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start))
     sheet = found.sheet().decode()
     assert "% from the data" in sheet.partition("<script")[0].partition("What was found")[2][:20_000]
-    words = "the expected deviations are those of the readings alone, without [prior]"
-    assert words in found.summary().replace("\n  ", " ")
-    assert found.design.notes
-    assert not work(
-        folder / "model.toml", options=FitOptions(sigma=1, start=start, design="0:9:1")
-    ).design.notes
-    assert any("rows of [prior]" in note for note in equations_of(found.fit).notes)
-    assert not equations_of(work(folder / "model.toml", folder / "record_noisy.csv").fit).notes
+    assert any("rows of [prior]" in note for note in found.equations.notes)
+    assert not work(folder / "model.toml", folder / "record_noisy.csv").equations.notes
 
 
-@pytest.mark.parametrize(
-    "more", [{"ridge": 0.1}, {"method": "gauss-newton"}, {"starts": 3}, {"allow_missing": True}]
-)
-def test_a_design_without_a_record_refuses_what_it_would_not_look_at(more):
-    path, start = sample_data() / "fit" / "quasilinearization" / "model.toml", "theta1=1,theta2=-1,theta3=-1"
-    with pytest.raises(ValueError, match=r"--[a-z-]+ belongs to a record: nothing is fitted without one"):
-        work(path, options=FitOptions(sigma=0.02, start=start, design="0:10:1", **more))
+def test_without_data_options_are_refused_that_nothing_would_look_at():
     harmonic = sample_data() / "identify" / "task_5_1" / "model.toml"
-    with pytest.raises(ValueError, match="--method belongs to DATA"):
-        work_harmonic(harmonic, None, IdentifyOptions(method="output-error", design="5:40:5"))
+    with pytest.raises(ValueError, match="--loss belongs to DATA"):
+        work_harmonic(harmonic, None, IdentifyOptions(loss="huber"))
 
 
 def test_no_rows_change_nothing():
@@ -407,14 +371,6 @@ def test_a_prior_in_a_file_is_that_of_the_model(tmp_path):
     path.write_text('inputs = ["u"]\n' + time + more, encoding="utf-8")
     with pytest.warns(UserWarning, match="x0 stands in initial values only"):
         assert read_harmonic_model(path).prior == {"c": (2.0, 0.1)}
-
-
-def test_two_models_are_compared_without_a_prior(tmp_path):
-    folder, path = sample_data() / "identify" / "task_5_1", tmp_path / "prior.toml"
-    text = (folder / "model.toml").read_text(encoding="utf-8")
-    path.write_text(f"{text}\n[prior]\nc = [1000, 10]\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"by the data alone, without \[prior\]"):
-        compare([folder / "model.toml", path], folder / "data.csv")
 
 
 def test_the_normal_matrix_of_the_last_step_is_the_one_that_q_prints():

@@ -314,3 +314,24 @@ def test_a_half_order_beside_1x_is_no_reason_for_finer_knots(run):
     inside = (found.times > 2) & (found.times < 58)
     error = np.abs(found.vectors[:, 0, 0] - run.vector(found.times))[inside]
     assert np.sqrt(np.mean(error**2)) < 0.003 * 95e-6
+
+
+@pytest.mark.parametrize("rate", [1024.0, 2048.0, 2560.0, 25600.0])
+def test_a_short_record_of_a_steady_speed_is_one_vector(rate):
+    """2,924 to 2,940 rpm in a second: edges between coarse samples scatter by more than the speed changes."""
+    t = np.arange(int(rate)) / rate
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        turns = 2924 / 60 * t + 16 / 60 * t**2 / 2 + rng.uniform()
+        found = find_vectors(noisy(turns, VECTOR, 1e-6, seed, rate), TachoSettings())
+        assert found.steady
+        assert len(found.times) == 1
+        error = abs(found.vectors[0, 0, 0] - VECTOR)
+        assert error < 4 * np.hypot(found.radial[0, 0, 0], found.tangential[0, 0, 0])
+        assert found.warnings == ()
+
+
+def test_a_short_run_up_is_none(run):
+    t = np.arange(int(RATE)) / RATE
+    turns = 49 * t + 1.0 * t**2  # 2940 to 3060 rpm
+    assert not find_vectors(noisy(turns, VECTOR, 1e-6, 0), TachoSettings()).steady

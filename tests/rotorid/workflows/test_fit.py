@@ -1,12 +1,12 @@
-"""`rotorid.workflows.fit` from Python: what the command prints, with options as numbers instead of texts."""
+"""`rotorid.commands.fit` from Python: what the command prints, with options as numbers instead of texts."""
 
 import json
 
 import pytest
 
+from rotorid.commands.fit import FitOptions, choices, fit
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
-from rotorid.workflows.fit import FitOptions, choices, fit
 
 FOLDER = sample_data() / "fit" / "quasilinearization"
 FILES = FOLDER / "model.toml", FOLDER / "record_noisy.csv"

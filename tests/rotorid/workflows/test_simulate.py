@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from rotorid.harmonic import AmplitudeErrors, harmonic_model
+from rotorid.identify import AmplitudeErrors, harmonic_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_measurements, read_ode_model, read_record
 from rotorid.workflows import SimulateOptions, simulate

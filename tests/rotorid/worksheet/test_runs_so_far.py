@@ -8,7 +8,7 @@ import pytest
 from balancing import reading_of
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, read_job
-from rotorid.workflows.vibration.runs_so_far import runs_so_far
+from rotorid.worksheet.runs_so_far import runs_so_far
 
 TURBO = sample_data() / "turbo_job" / "job.toml"
 

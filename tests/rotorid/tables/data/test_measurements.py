@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorid import InputError, read_harmonic_model, read_measurements
-from rotorid.harmonic.operator_equations import harmonic_model
+from rotorid.identify.equations import harmonic_model
 from rotorid.tables import TableWarning
 
 MODEL = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])

@@ -56,8 +56,8 @@ def test_a_model_file_with_everything(model):
     assert model.inputs == ("u",)
     np.testing.assert_array_equal(model.start, [2.0, 0.1, 1.0])
     np.testing.assert_array_equal(model.bounds[1], [0.0, np.inf])
-    np.testing.assert_allclose(model.f(0.0, [1.0, 2.0], [2.0, 0.1, 1.0], [3.0]), [2.0, 0.8])
-    np.testing.assert_allclose(model.x0([2.0, 0.1, 7.0]), [7.0, 0.0])
+    np.testing.assert_allclose(model.f(0.0, [1.0, 2.0], [2.0, 0.1, 1.0], [3.0])[:, 0], [2.0, 0.8])
+    np.testing.assert_allclose(model.x0([2.0, 0.1, 7.0])[:, 0], [7.0, 0.0])
 
 
 def test_without_states_the_outputs_are_functions_of_time(tmp_path):
@@ -187,11 +187,11 @@ def test_a_model_of_matrices(tmp_path):
     model = read_ode_model(saved(tmp_path, "m.toml", MATRICES))
     assert model.states == ("a", "v_a", "b", "v_b")
     assert model.outputs == ("a", "b")
-    rates = model.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)
+    rates = model.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)[:, 0]
     np.testing.assert_allclose(rates, [0.3, (-2 + 2) / 4, 0.4, (1 + 1 - 6) / 2], atol=1e-15)
-    np.testing.assert_array_equal(model.x0(model.start), [0.5, 0, 0, 0])
+    np.testing.assert_array_equal(model.x0(model.start)[:, 0], [0.5, 0, 0, 0])
     damped = read_ode_model(saved(tmp_path, "d.toml", 'C = [["m1", 0], [0, 0]]' + MATRICES))
-    assert damped.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)[1] == pytest.approx(-0.3)
+    assert damped.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)[1, 0] == pytest.approx(-0.3)
 
 
 @each_of(

@@ -1,0 +1,284 @@
+"""`fit`: parameters of ordinary differential equations from time records."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.base.logs import workflows as log
+from rotorid.base.text import listing
+from rotorid.commands.input_checks import check_choices, file_of, refuse
+from rotorid.commands.outcome import Found, command, phase, provenance, text_of
+from rotorid.commands.quantities import check_names, number, pairs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rotorid.base.registry import Method
+    from rotorid.identify.ode import OdeModel
+    from rotorid.identify.records import Record
+    from rotorid.identify.result_records import Fit
+
+WITHOUT_CONTROL = ("expm", "taylor", "heun", "sequential-heun", "rk4")
+"""Integrators that know no tolerance."""
+Values = str | Mapping[str, float]
+"""As "k=2,d=0.1", or by name."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of `fit`.
+
+    Attributes
+    ----------
+    method : METHOD
+        How the parameters are searched.
+    integrator : NAME
+        How the equations are solved.
+    loss : LOSS
+        What a residual counts.
+    start : LIST
+        Starting values instead of the model's: k=2,d=0.1; the others stay.
+    starts : N from 1
+        Begin from so many places; default: from others where the first minimum does not describe the record.
+    seed : N from 0
+        Other places to start from; default: 0.
+    max_iterations : N from 1
+        At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
+    tolerance : X
+        ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β),
+        the sum of squares times Δt, is below it; default: where no step matters.
+    rtol : X
+        Relative tolerance of the integration; default: 1e-10.
+    allow_missing
+        Blank cells, NaN and absent outputs were not measured.
+    ridge : LAMBDA
+        Regularise: add λ times the diagonal of the normal matrix at the start, which pulls towards it; no
+        intervals.
+    sigma : LIST
+        Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
+        from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
+    """
+
+    method: str = "levenberg-marquardt"
+    integrator: str = "auto"
+    loss: str = "linear"
+    start: Values | None = None
+    starts: int | None = None
+    seed: int | None = None
+    max_iterations: int = 100
+    tolerance: float | None = None
+    rtol: float | None = None
+    allow_missing: bool = False
+    ridge: float | None = None
+    sigma: Values | float | None = None
+
+
+def choices() -> dict[str, tuple[Method[Any], ...]]:
+    """What the options of these names choose from."""
+    from rotorid.identify.fit_records import METHODS
+    from rotorid.identify.simulation import INTEGRATORS
+    from rotorid.regression.robust import LOSSES
+
+    return {"method": METHODS, "integrator": INTEGRATORS, "loss": LOSSES}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordFit(Found):
+    """What the fit found, and the text of the model."""
+
+    found: Fit
+    model: str = ""
+
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
+        """Parameters; of the methods of the texts every iteration, in a workbook the states of each, too."""
+        from rotorid.base.tables import csv, excel
+
+        iterations = self.found.tables()
+        if not self.found.integrals:
+            return super().table_file(path)
+        return excel(*iterations) if path.suffix.lower() == ".xlsx" else csv(iterations[0])
+
+    def figure(self) -> Figure:
+        """Each signal with the model and its residuals, the inputs, the parameters."""
+        from rotorid.identify.plots_records import figure_fit
+
+        return figure_fit(self.found)
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        from rotorid.report.estimation import fit_report
+
+        return fit_report(self.to_dict(), self.found, provenance=self.provenance, model=self.model)
+
+
+@command
+def fit(
+    model: OdeModel | Path | str,
+    records: Sequence[Record | Path | str] | Path | str,
+    options: FitOptions | None = None,
+) -> RecordFit:
+    """Estimate parameters of differential equations from time records, with intervals.
+
+    Parameters
+    ----------
+    model
+        A model, or its file.
+    records
+        Records, or their files; or one file.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For files, options or records that cannot be.
+    """
+    from rotorid.identify.fit_records import fit as estimate
+    from rotorid.identify.ode import OdeModel
+    from rotorid.identify.record_residuals import RTOL
+    from rotorid.tables import read_ode_model
+
+    options = options or FitOptions()
+    _check(options)
+    if isinstance(records, Path | str) or not isinstance(records, Collection):
+        records = [file_of(records, "records")]
+    if not records:
+        raise ValueError("give a record after the model file")
+    paths = [Path(given) for given in records if isinstance(given, Path | str)]
+    _check_once(paths)
+    files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
+    equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
+    begin = None if options.start is None else _start(options.start, equations, len(records))
+    weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
+    deviations = None if weigh or options.sigma is None else sigmas(options.sigma, equations.outputs)
+    data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
+    with phase("fit"):
+        result = estimate(
+            equations,
+            data,
+            method=options.method,
+            integrator=options.integrator,
+            loss=options.loss,
+            start=begin,
+            starts=options.starts,
+            seed=options.seed or 0,
+            max_iterations=options.max_iterations,
+            tolerance=options.tolerance,
+            rtol=RTOL if options.rtol is None else options.rtol,
+            weigh=weigh,
+            ridge=options.ridge or 0.0,
+        )
+    log.info("degrees_of_freedom = %s", result.estimate.dof)
+    log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in result.estimate.singular_values))
+    return RecordFit(found=result, model=text_of(model), provenance=provenance(files, options))
+
+
+def _check(options: FitOptions) -> None:
+    """Refuse names that are not known, and options that the method or the integrator would not look at."""
+    check_choices(options, choices())
+    if options.method not in ("gauss-newton", "quasilinearization"):
+        refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
+    if options.rtol is None:
+        return
+    if not 1e-13 <= options.rtol <= 0.01:
+        raise ValueError(f"--rtol takes a number from 1e-13 to 0.01, not {options.rtol:g}")
+    if options.integrator in WITHOUT_CONTROL:
+        raise ValueError(
+            f"--rtol belongs to --integrator dop853, lsoda or auto: {options.integrator} has none"
+        )
+
+
+def _check_once(records: Sequence[Path]) -> None:
+    """Refuse a file that is given twice, perhaps by another name: its samples would count double."""
+    for i, path in enumerate(records):
+        for other in records[:i]:
+            same = path.samefile(other) if path.exists() and other.exists() else path == other
+            if same:
+                also = "" if path == other else f" (it is {other}, too)"
+                raise ValueError(f"{path}: this record is given twice{also}; its samples would count double")
+
+
+def _read(
+    given: Sequence[Record | Path | str],
+    model: OdeModel,
+    sigma: dict[str, float] | None,
+    *,
+    allow_missing: bool,
+    weigh: bool,
+) -> list[Record]:
+    """All records, with standard deviations for all of them or for none."""
+    from rotorid.identify.records import Record
+    from rotorid.tables import read_record
+    from rotorid.tables.data.records import STD
+
+    records = [
+        replace(one, sigma=one.sigma if sigma is None else sigma)
+        if isinstance(one, Record)
+        else read_record(file_of(one, "a record"), model, allow_missing=allow_missing, sigma=sigma)
+        for one in given
+    ]
+    stated = [record for record in records if record.sigma is not None]
+    if stated and weigh:
+        raise ValueError(f"{stated[0].name}: leave out either the columns NAME{STD} or --sigma auto")
+    if 0 < len(stated) < len(records):
+        bare = next(record for record in records if record.sigma is None)
+        raise ValueError(
+            f"{bare.name} has no columns NAME{STD}, but {stated[0].name} has: all records or none"
+        )
+    return records
+
+
+def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
+    """Starting values inside their bounds; x0_2 is that of the second record, where each has its own."""
+    from rotorid.identify.records import models_of
+
+    copy = models_of(model, count)[0]
+    limits = {
+        name: (float(low), float(high))
+        for one in (copy, model)
+        for name, (low, high) in zip(one.parameters, one.bounds, strict=True)
+    }
+
+    def inside(name: str, text: str) -> float:
+        check_names((name,), "--start", limits, "parameter")
+        value, (low, high) = number(text), limits[name]
+        if math.isnan(value):
+            raise ValueError(f"--start: {name} = {text!r} is no number, such as 2 or 1e-3")
+        if not low <= value <= high:
+            raise ValueError(f"--start: {name} = {value:g} is outside its bounds {low:g} to {high:g}")
+        return value
+
+    values = pairs(_texts(given), "--start", inside, "k=2,d=0.1")
+    # what holds for all records first: a value for one of them replaces it
+    return dict(sorted(values.items(), key=lambda item: item[0] not in model.parameters))
+
+
+def sigmas(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
+    """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
+    from rotorid.tables.reader.decimal_numbers import NotANumber, check_size
+
+    def positive(name: str, text: str) -> float:
+        check_names((name,), "--sigma", outputs, "output")
+        value = number(text)
+        with contextlib.suppress(NotANumber):
+            check_size(value)
+            if value > 0:
+                return value
+        raise ValueError(f"--sigma: {name} = {text} is no number above 0; use y1=0.01,y2=0.02")
+
+    if isinstance(given, float | int) or (isinstance(given, str) and not {"=", ","} & set(given)):
+        given = ",".join(f"{name}={given}" for name in outputs)
+    deviations = pairs(_texts(given), "--sigma", positive, "y1=0.01,y2=0.02")
+    if lost := [name for name in outputs if name not in deviations]:
+        raise ValueError(f"--sigma: the standard deviation of {listing(lost, 'and')} is missing")
+    return deviations
+
+
+def _texts(given: Values) -> str | dict[str, str]:
+    """Values by name as texts, so that they are read and checked as those of the command line."""
+    return {key: str(value) for key, value in given.items()} if isinstance(given, Mapping) else given

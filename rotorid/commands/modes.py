@@ -1,0 +1,196 @@
+"""`modes`: natural frequencies, damping and shapes from amplitudes measured around resonances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted, error_figures, listing
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.outcome import USUAL, Outcome, command, phase, provenance
+from rotorid.commands.quantities import Band, band, one_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from rotorid.base.arrays import ComplexArray
+    from rotorid.identify.modes_readings import Readings
+    from rotorid.identify.modes_result import FittedModes
+
+Excitation = Literal["force", "unbalance"]
+"""What excites: the same, or as F, at every frequency; or growing with its square."""
+NO_MODES = Table("modes", (Column("mode", ()),))
+
+
+@dataclass(frozen=True)
+class ModesOptions:
+    """Options of `modes`.
+
+    Attributes
+    ----------
+    excitation
+        A force (constant or in columns F; or a shaken base), or an unbalance, whose force grows with the
+        square of the speed; default: force, where there are columns F.
+    bands : LIST
+        Around each resonance, one mode in each: 120:150,500:580 in rad/s, or 20:25Hz,80:90Hz; default:
+        around each peak.
+    amplitude_error : PERCENT from 0
+        One standard deviation of an amplitude.
+    phase_error : DEGREES from 0
+        One standard deviation of a phase.
+    """
+
+    excitation: Excitation | None = None
+    bands: str | Sequence[Band] | None = None
+    amplitude_error: float | None = None
+    phase_error: float | None = None
+    to: ClassVar[Sequence[str]] = USUAL
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModesOutcome(Outcome):
+    """With a table for `reduce`, `identify` and `calibrate`, or why there is none."""
+
+    lacking: str = ""
+
+    def _check(self) -> None:
+        if self.lacking:
+            raise ValueError(f"there is no table of modes: {self.lacking}")
+
+    def to_frame(self) -> pd.DataFrame:
+        """The main table; ValueError without it."""
+        self._check()
+        return super().to_frame()
+
+    def table_file(self, path: Path) -> bytes:
+        """The same as a file."""
+        self._check()
+        return super().table_file(path)
+
+
+@command
+def modes(data: Path | str, options: ModesOptions | None = None) -> ModesOutcome:
+    """Natural frequencies, damping and shapes from amplitudes around resonances, with ±.
+
+    The table of modes is for `reduce --measured`, and for `identify` in place of amplitudes.
+
+    Example: rotorid modes sample_data/modes/amplitudes.csv --excitation force --amplitude-error 2
+    --phase-error 1 --output modes.csv
+
+    Parameters
+    ----------
+    data : AMPLITUDES
+        Table, .csv or .xlsx: frequency, amplitude and phase (lead) at some points.
+    options
+        What excites, and how.
+
+    Raises
+    ------
+    ValueError
+        For a table or an option that cannot be, and for readings without a resonance.
+    """
+    from rotorid.identify.answers import SteadyAnswers
+    from rotorid.identify.modes import fit_modes
+
+    options = options or ModesOptions()
+    file = file_of(data, "a table of amplitudes")
+    readings, force = _read(file, options)
+    with phase("modes"):
+        fit = fit_modes(readings, SteadyAnswers(readings.speeds, force), bands(options.bands) or None)
+
+    def picture() -> Figure:
+        from rotorid.identify.plots_modes import figure_modes
+
+        return figure_modes(fit)
+
+    lacking = next(iter(fit.undetermined), "")
+    return ModesOutcome(
+        result=fit,
+        sentences=(_sentence(fit),),
+        tables=() if lacking else _tables(fit),
+        file=NO_MODES if lacking else fit.file_table(),
+        keys=fit.to_dict(),
+        pictures={"Readings and fit around each resonance.": picture},
+        lacking=lacking,
+        warnings=fit.warnings,
+        notes=() if lacking else fit.notes,
+        provenance=provenance([file], options),
+    )
+
+
+def bands(given: str | Sequence[Band] | None, usual: str = "rad_s") -> list[tuple[float, float]]:
+    """Read "120:150,500:580" as ranges around resonances, rad/s; nothing, where none is given."""
+    parts = given.split(",") if isinstance(given, str) else given or []
+    return [ends for part in parts if (ends := band(part, "--bands", usual)) is not None]
+
+
+def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
+    """The amplitudes, and what excites them."""
+    import numpy as np
+
+    from balancing import Labels
+    from rotorid.identify.modes_readings import Readings
+    from rotorid.tables.data.measurements import read_amplitudes
+
+    errors = options.amplitude_error, options.phase_error
+    if None in errors and any(error is not None for error in errors):
+        raise ValueError("--amplitude-error and --phase-error belong together")
+    if errors == (0, 0):
+        raise ValueError("--amplitude-error and --phase-error: one of them must be above 0")
+    table = read_amplitudes(file, None)
+    if options.excitation is not None:
+        one_of(options.excitation, "--excitation", get_args(Excitation))
+    elif "F" not in table.signals:
+        raise ValueError(
+            "--excitation force or unbalance: the table has no columns F, and an unbalance excites with the "
+            "square of the speed"
+        )
+    points = tuple(name for name in table.signals if name != "F")
+    force = table.signals.get("F", np.ones(len(table), dtype=complex))
+    power = 2 if options.excitation == "unbalance" else 0
+    unit = next((table.units[name] for name in points if name in table.units), None)
+    labels = Labels(
+        vibration_unit=unit.word if unit else "model unit",
+        vibration_scale=unit.scale if unit else 1.0,
+        speed_unit=table.axis.word.rpartition(", ")[2].replace("/", "_"),
+    )
+    shares = None
+    if None not in errors:
+        shares = (float(errors[0] or 0.0) / 100, math.radians(errors[1] or 0.0))
+    readings = Readings(
+        "", None, table.frequencies, points, table.table(points), labels=labels, shares=shares
+    )
+    return readings, force * table.frequencies**power
+
+
+def _sentence(fit: FittedModes) -> str:
+    """How many modes, and where."""
+    if fit.undetermined:
+        return "Not every mode is determined: no table of modes."
+    words = [fit.readings.words(omega) for omega in fit.values[0]]
+    unit = words[0].partition(" ")[2]
+    return (
+        f"{counted(len(words), 'mode')}: {listing([word.partition(' ')[0] for word in words], 'and')} {unit}."
+    )
+
+
+def _tables(fit: FittedModes) -> tuple[Table, Table]:
+    """Frequencies and damping, and shapes."""
+    omega, zeta, error, other = fit.values
+    shapes = [Column("point", fit.readings.sensors)]
+    for mode, (shape, std) in enumerate(zip(fit.shapes, fit.shape_std, strict=True), 1):
+        shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
+        shapes.append(Column("±", abs(shape) * std, error_figures))
+    frequencies = (
+        Column("mode", range(1, len(omega) + 1)),
+        Column("ω, rad/s", omega, "{:.7g}".format),
+        Column("±", error, error_figures),
+        Column("ζ, %", 100 * zeta, "{:.4g}".format),
+        Column("± ", 100 * other, error_figures),
+    )
+    return Table("modes", frequencies), Table("shapes", tuple(shapes))

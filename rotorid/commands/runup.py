@@ -1,0 +1,428 @@
+"""`runup`: Bode and polar plots, slow roll, critical speeds and damping of a machine that speeds up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, get_args
+
+from rotorid.base.json import plain
+from rotorid.base.rpm import RPM
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted, error_figures, figures, listing
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.modes import NO_MODES, ModesOutcome, bands
+from rotorid.commands.outcome import USUAL, command, provenance
+from rotorid.commands.outcome import phase as timed
+from rotorid.commands.quantities import Band, Names, Speeds, names, number, one_of, one_speed
+from rotorid.commands.quantities import speeds as read_speeds
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rotorid.base.arrays import ComplexArray, FloatArray
+    from rotorid.identify.modes_readings import Readings
+    from rotorid.identify.modes_result import FittedModes
+    from rotorid.identify.run_up import SweepModes
+
+FEW_TURNS = 6.0
+"""In the half-power band of a mode: vectors, means over turns, flatten one that is passed within fewer."""
+TABLES = (".csv", ".xlsx", ".txt")
+Phase = Literal["lead", "lag"]
+View = Literal["bode", "polar"]
+
+
+@dataclass(frozen=True)
+class RunUpOptions:
+    """Options of `runup`; speeds without a unit are in that of the table.
+
+    Attributes
+    ----------
+    phase
+        What a positive phase is; default: lead, and that is said.
+    run : NAME
+        Whose modes are fitted, where there are several runs; all are drawn.
+    sensors : LIST
+        Only these.
+    tacho : NAME
+        Of a record: channel of the tacho, where no waveforms file says.
+    unit : UNIT
+        Of a record: of its numbers, um, mm_s, g, likewise.
+    acceleration : A
+        Where the table has no times: 50rpm/s, or -50rpm/s down; 0: the speed is held for each vector.
+    bands : LIST
+        Around each critical speed, one mode in each and nothing else counts: 700:1200,2000:3000; default:
+        around each peak.
+    slow_roll : SPEED|FILE
+        Run-out is the mean at or below this speed, or a runs table of one run; default: fit, what no speed
+        changes.
+    speeds : SPEEDS
+        Vectors of every run when it passes these, 900,1500 or 600:3000:300; --output is then their runs
+        table, for `balance`, instead of the modes.
+    view
+        What --plot draws.
+    """
+
+    phase: Phase | None = None
+    run: str | None = None
+    sensors: Names | None = None
+    tacho: str | None = None
+    unit: str | None = None
+    acceleration: str | float | None = None
+    bands: str | Sequence[Band] | None = None
+    slow_roll: str | float | Path = "fit"
+    speeds: Speeds | None = None
+    view: View = "bode"
+    panels: ClassVar[Mapping[str, str]] = {
+        "Vectors at some speeds, to balance with": "speeds",
+        "Output": "view",
+    }
+    to: ClassVar[Sequence[str]] = USUAL
+
+
+class SlowRoll(NamedTuple):
+    """Vectors (C,), covariances of their parts, where they are from, and warnings; None: unknown."""
+
+    vectors: ComplexArray | None
+    covariances: FloatArray | None
+    words: str
+    warnings: tuple[str, ...] = ()
+
+
+@command
+def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = None) -> ModesOutcome:
+    """Critical speeds and damping of a run-up, its acceleration in the model, with ±.
+
+    The table of modes (--output) is for `reduce --measured` and `calibrate`, if sensors are named as nodes or
+    stations of the rotor.
+
+    Example: rotorid runup sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --plot bode.png
+
+    Parameters
+    ----------
+    data : RECORD|VECTORS
+        A record, .wav, .mat, .npz, .uff, .tdms, or .csv with --tacho; a waveforms file (.toml); or a runs
+        table with time_s, .csv or .xlsx: what `vectors` writes.
+    options
+        What differs from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a table or an option that cannot be.
+    """
+    from rotorid.identify.run_up import fit_sweep
+
+    options = options or RunUpOptions()
+    one_of(options.view, "--view", get_args(View))
+    files: list[Path] = []
+    notes = []
+    if isinstance(data, Path | str):
+        file = file_of(data, "a table of vectors, or a record")
+        recorded = file.suffix.lower() not in TABLES or options.tacho is not None
+        data, read = _of_records(file, options) if recorded else _of_table(file, options)
+        files = [*read]
+        if options.phase is None and not recorded:
+            notes.append("nobody says whether phases lead or lag: lead is assumed (--phase)")
+    sweeps = _ordered(data, options)
+    around = bands(options.bands, sweeps[0].labels.speed_unit)
+    rate = _rate(options.acceleration)
+    sweeps = [_timed(sweep, rate) for sweep in sweeps]
+    modes, why = None, ""
+    with timed("modes"):
+        try:
+            modes = fit_sweep(sweeps[0], steady=rate == 0.0, bands=around or None)
+        except ValueError as error:
+            why = str(error)
+    turned = () if modes is None else _turned(sweeps[0], modes)
+    fit = None if modes is None or modes.fit.undetermined or turned else modes.fit
+    roll = _slow_roll(sweeps[0], modes, options.slow_roll, files)
+    passed = None
+    if options.speeds is not None:
+        passed = _passed(sweeps, options, fit, rate == 0.0, around)
+    acceleration, time = 0.0 if rate == 0.0 else None, sweeps[0].time
+    if acceleration is None and time is not None and len(time) > 1:
+        acceleration = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
+    slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.covariances)
+    steady = None if modes is None else modes.steady
+    why = why or next(iter(turned or (() if modes is None else modes.fit.undetermined)), "")
+    warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.fit.warnings)
+    warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
+    estimate = None if modes is None else modes.fit.fit.estimate
+    document = {
+        "run": sweeps[0].run,
+        "phase": sweeps[0].labels.phase,
+        "modes": _modes(fit, steady) if fit else [],
+        "slow_roll": _rows(slow),
+        "slow_roll_from": roll.words,
+        "acceleration_rad_s2": acceleration,
+        "chi_square": estimate and estimate.chi_square,
+        "degrees_of_freedom": estimate and estimate.dof,
+        "vectors": _rows(passed),
+        "warnings": warnings,
+    }
+    of_modes = fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES
+    return ModesOutcome(
+        result=modes,
+        sentences=(_sentence(sweeps[0].run, fit),),
+        tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweeps[0])] if slow else [])),
+        more=(passed,) if passed else (),
+        file=passed or of_modes,
+        lacking="" if passed else why,
+        keys=dict(plain(document)),
+        pictures={
+            "Vectors over speed, less the slow roll.": lambda: _figure(sweeps, fit, roll, options.view)
+        },
+        warnings=warnings,
+        notes=(f"slow roll {roll.words}", *_course(acceleration), *notes, *(fit.notes if fit else ())),
+        provenance=provenance(files, options),
+    )
+
+
+def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
+    """Vectors of each run in a table, and the files that were read."""
+    from rotorid.tables.runs.vectors_table import read_vectors
+
+    return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)
+
+
+def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
+    """The same of a record, or of those of a waveforms file."""
+    from rotorid.tables.reader.problems import Problems
+    from rotorid.tables.runs.vectors_table import read_vectors
+    from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
+    from rotorid.tables.waveforms.waveforms import WaveformWishes
+
+    given = WaveformWishes(
+        tacho=options.tacho, sensors=names(options.sensors), unit=options.unit, phase=options.phase
+    )
+    problems = Problems()
+    grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given, moving=True))
+    return read_vectors(grid, phase), read
+
+
+def _ordered(sweeps: Sequence[Readings], options: RunUpOptions) -> list[Readings]:
+    """The run whose modes are fitted, then the others, of the sensors asked for."""
+    import numpy as np
+
+    runs = [sweep.run for sweep in sweeps]
+    if options.run is None and len(runs) > 1:
+        raise ValueError(f"there are {len(runs)} runs: say with --run whose modes to fit, {listing(runs)}")
+    first = runs[0] if options.run is None else options.run
+    if first not in runs:
+        hint = did_you_mean(first, runs)
+        raise ValueError(f"--run: there is no run {first!r}{hint}; there are {listing(runs, 'and')}")
+    chief = sweeps[runs.index(first)]
+    wanted = names(options.sensors) or list(chief.sensors)
+    for name in wanted:
+        if name not in chief.sensors:
+            hint, known = did_you_mean(name, chief.sensors), listing(chief.sensors, "and")
+            raise ValueError(f"--sensors: run {first!r} has no sensor {name!r}{hint}; it has {known}")
+    ordered = []
+    for sweep in (chief, *(sweep for sweep in sweeps if sweep is not chief)):
+        columns = [sweep.sensors.index(name) for name in wanted if name in sweep.sensors]
+        if columns:
+            ordered.append(sweep.take(np.arange(len(sweep.speeds)), np.array(columns)))
+    return ordered
+
+
+def _rate(given: str | float | None) -> float | None:
+    """Read "-50rpm/s", rad/s²."""
+    if given is None or not isinstance(given, str):
+        return given
+    text = given.strip()
+    size = text.lstrip("+-").removesuffix("/s")
+    if text.lstrip("+-") == size and number(size) != 0:
+        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 50rpm/s, or 0")
+    return (-1.0 if text.startswith("-") else 1.0) * one_speed(size, "--acceleration")
+
+
+def _timed(sweep: Readings, rate: float | None) -> Readings:
+    """The same with the times that a constant acceleration makes, by rising time."""
+    if not rate:
+        return sweep
+    if sweep.time is not None:
+        raise ValueError(
+            "--acceleration: the table has times, which tell it; only 0, held speeds, can be said"
+        )
+    passed = sweep.speeds / rate
+    order = passed.argsort()
+    return replace(sweep.take(order), time=passed[order] - passed[order[0]])
+
+
+def _turned(sweep: Readings, modes: SweepModes) -> tuple[str, ...]:
+    """That modes explain phases of the other sign: as they are, the damping is negative."""
+    _, zeta, _, error = (modes.steady or modes.fit).values
+    if modes.fit.explains or not (zeta + 2 * error < 0).all():
+        return ()
+    sign = "lag" if sweep.labels.phase == "lead" else "lead"
+    return (f"phases are read as {sweep.labels.phase}s; modes explain them as {sign}s (--phase {sign})",)
+
+
+def _hasty(fit: FittedModes) -> list[str]:
+    """Say which modes are passed so fast that vectors flatten them: their ± may hold in half of the cases."""
+    import numpy as np
+
+    from rotorid.identify.answers import SweptAnswers
+
+    if not isinstance(fit.answers, SweptAnswers):
+        return []
+    omega, zeta = fit.values[:2]
+    rate = np.abs(fit.answers.speed.derivative()(fit.answers.at(omega).time))
+    turns = zeta * omega**2 / np.pi / np.maximum(rate, 1e-12)  # 2ζω / rate seconds of ω / 2π turns
+    return [
+        f"mode {mode + 1} is passed within {turns[mode]:.2g} turns of its half-power band: vectors, means "
+        "over turns, flatten it, and ± of its damping are too small; let the speed change more slowly"
+        for mode in np.flatnonzero(turns < FEW_TURNS)
+    ]
+
+
+def _slow_roll(
+    sweep: Readings, modes: SweepModes | None, given: str | float | Path, files: list[Path]
+) -> SlowRoll:
+    """Run-out: of the fit, the mean at slow speeds, or of a file."""
+    from rotorid.identify.run_up import constant_vectors, slow_vectors
+    from rotorid.tables.runs.vectors_table import read_slow_roll
+
+    if isinstance(given, str) and given == "fit":
+        if modes is None or modes.fit.undetermined:
+            return SlowRoll(None, None, "unknown: there is no fit to tell it (--slow-roll SPEED does)")
+        words = "of the fit: what no speed changes, modes far below the sweep included"
+        return SlowRoll(*constant_vectors(modes.fit), words)
+    if isinstance(given, Path) or (isinstance(given, str) and Path(given).suffix.lower() in TABLES):
+        file = file_of(given, "a runs table of one run at slow speed")
+        files.append(file)
+        vectors, remarks = read_slow_roll(file, sweep)
+        return SlowRoll(vectors, None, f"of {file.name}", remarks)
+    wanted = given if isinstance(given, str) else [float(given)]
+    (speed,) = read_speeds(wanted, sweep.labels.speed_unit, "--slow-roll")
+    words = f"mean of the vectors at or below {sweep.labels.speed_words(speed)}"
+    return SlowRoll(*slow_vectors(sweep, speed), words)
+
+
+def _passed(
+    sweeps: Sequence[Readings],
+    options: RunUpOptions,
+    fit: FittedModes | None,
+    steady: bool,
+    around: Sequence[tuple[float, float]],
+) -> Table:
+    """The runs table of every run at the speeds asked for, the slow roll not taken off."""
+    from contextlib import suppress
+
+    import numpy as np
+
+    from rotorid.identify.run_up import fit_sweep, vectors_when_passing
+    from rotorid.tables.runs.vectors_table import runs_columns
+
+    speeds = np.unique(read_speeds(options.speeds or (), sweeps[0].labels.speed_unit))
+    parts = []
+    for k, sweep in enumerate(sweeps):
+        modes = None if k or around else fit  # with bands they count only there
+        if k and not around:
+            with suppress(ValueError):
+                other = fit_sweep(sweep, steady=steady).fit
+                modes = None if other.undetermined else other
+        parts.append((sweep, speeds, *vectors_when_passing(sweep, speeds, modes)))
+    columns = (Column(column.name, list(column.values)) for column in runs_columns(parts))
+    return Table("vectors when passing", tuple(columns))
+
+
+def _table(fit: FittedModes, steady: FittedModes | None) -> Table:
+    """A row a mode: with the acceleration, and as a steady fit has it."""
+    omega, zeta, error, other = fit.values
+    columns = [
+        Column("mode", range(1, len(omega) + 1)),
+        Column("critical rpm", RPM * omega, "{:.6g}".format),
+        Column("±", RPM * error, error_figures),
+        Column("ζ %", 100 * zeta, "{:.4g}".format),
+        Column("± ", 100 * other, error_figures),
+    ]
+    if steady is not None:
+        columns.append(Column("steady fit: rpm", RPM * steady.values[0], "{:.6g}".format))
+        columns.append(Column("ζ % ", 100 * steady.values[1], "{:.4g}".format))
+    return Table("critical speeds", tuple(columns))
+
+
+def _roll_table(sweep: Readings, vectors: ComplexArray, covariances: FloatArray | None) -> Table:
+    """A row a sensor."""
+    import numpy as np
+
+    labels = sweep.labels
+    unit = f"_{labels.vibration_unit}" if labels.vibration_unit else ""
+    size, angle = labels.vibration(vectors)
+    columns = [
+        Column("sensor", sweep.sensors),
+        Column(f"amplitude{unit}", size, figures),
+        Column("phase_deg", angle, "{:.1f}".format),
+    ]
+    if covariances is not None:  # of either part, as large
+        std = labels.vibration_scale * np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 2)
+        columns.insert(2, Column(f"std{unit}", std, error_figures))
+    return Table("slow roll", tuple(columns))
+
+
+def _plain(table: Table, sweep: Readings) -> Table:
+    """With headings for people."""
+    labels = sweep.labels
+    words = {"amplitude": f"slow roll, {labels.vibration_in}".rstrip(", "), "std": "±"}
+    words["phase"] = f"phase ({labels.phase}), °"
+    return table.only({name: words.get(name.partition("_")[0], name) for name in table.headings})
+
+
+def _rows(table: Table | None) -> list[dict[str, Any]]:
+    return [dict(zip(table.headings, row, strict=True)) for row in table.rows] if table else []
+
+
+def _modes(fit: FittedModes, steady: FittedModes | None) -> list[dict[str, Any]]:
+    """Of the document."""
+    names = ("frequency_rad_s", "damping_ratio")
+
+    def named(values: FloatArray) -> dict[str, Any]:
+        return dict(zip(names, values, strict=True))
+
+    k, ci95 = len(fit.ends), fit.fit.ci95
+    return [
+        {
+            "mode": r + 1,
+            **named(fit.values[:2, r]),
+            "critical_speed_rpm": RPM * fit.values[0, r],
+            "std": named(fit.values[2:, r]),
+            "ci95": dict.fromkeys(names) if ci95 is None else named(ci95[[r, k + r]]),
+            "steady": None if steady is None else named(steady.values[:2, r]),
+        }
+        for r in range(k)
+    ]
+
+
+def _sentence(run: str, fit: FittedModes | None) -> str:
+    """How many critical speeds, and where."""
+    if fit is None:
+        return f"Run {run}: no critical speed is determined."
+    speeds = [f"{RPM * omega:.0f}" for omega in fit.values[0]]
+    return f"Run {run}: {counted(len(speeds), 'critical speed')}, {listing(speeds, 'and')} rpm."
+
+
+def _course(rate: float | None) -> list[str]:
+    """What the acceleration means for the result."""
+    if rate is None:
+        return [
+            "nobody says how fast the speed changes (a column time_s, or --acceleration): the fit is of held "
+            "speeds, and a sweep shifts it"
+        ]
+    return [
+        f"the speed changes by {RPM * rate:.4g} rpm a second; critical: where the phase of the mode has "
+        "turned by 90° when the speed is held"
+    ] * bool(rate)
+
+
+def _figure(sweeps: Sequence[Readings], fit: FittedModes | None, roll: SlowRoll, view: View) -> Figure:
+    """Amplitude and phase over speed, or vectors as paths in the plane, less the slow roll."""
+    import numpy as np
+
+    from rotorid.identify.plots_modes import bode_plot, polar_plot
+
+    vectors = np.zeros(len(sweeps[0].sensors), dtype=complex) if roll.vectors is None else roll.vectors
+    return polar_plot(sweeps, vectors) if view == "polar" else bode_plot(sweeps, vectors, fit)

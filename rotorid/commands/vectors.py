@@ -1,0 +1,198 @@
+"""`vectors`: 1× and other orders of records of an instrument, as the runs table that `balance` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+
+from rotorid.base.json import plain
+from rotorid.base.result import Column as Told
+from rotorid.base.result import rows
+from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted, listing
+from rotorid.commands.outcome import USUAL, Outcome, command, phase, provenance
+from rotorid.commands.quantities import Names, Speeds, names, one_of, speeds
+
+if TYPE_CHECKING:
+    from rotorid.waveforms.vectors import Vectors
+
+Phase = Literal["lead", "lag"]
+Edge = Literal["leading", "trailing", "rising", "falling", "centre"]
+Picture = Literal["tacho", "orbit", "waterfall"]
+
+
+@dataclass(frozen=True)
+class VectorsOptions:
+    """Options of `vectors`.
+
+    Attributes
+    ----------
+    tacho : NAME
+        Channel of the tacho.
+    sensors : LIST
+        Channels of the sensors: A,B; default: all others.
+    unit : UNIT
+        Of the numbers in the records, peak values: um, mm_s, g, V; where neither a channel's name nor the
+        waveforms file says.
+    amplitude : UNIT
+        Of the vectors: um_pp, mm_s_rms; default: the sensors'. A displacement of an accelerometer is
+        integrated.
+    pulses : N
+        Of the tacho a turn; default: 1.
+    edge
+        What of a mark is angle 0; default: leading.
+    rate : HZ
+        Samples a second, where the records do not say.
+    phase
+        How phases are written; default: as the waveforms file says, else lead.
+    orders : LIST
+        Default: 1.
+    speeds : LIST
+        Vectors at these (rad/s, or 900,1200rpm), where a run-up passes them first; default: one for a steady
+        speed, else as many as are independent.
+    picture
+        What --plot draws of the first record.
+    """
+
+    tacho: str | None = None
+    sensors: Names | None = None
+    unit: str | None = None
+    amplitude: str | None = None
+    pulses: int | None = None
+    edge: Edge | None = None
+    rate: float | None = None
+    phase: Phase | None = None
+    orders: str | Sequence[int] | None = None
+    speeds: Speeds | None = None
+    picture: Picture = "tacho"
+    panels: ClassVar[Mapping[str, str]] = {
+        "Input": "tacho sensors unit amplitude phase",
+        "Tacho": "pulses edge rate",
+        "Vectors": "orders speeds",
+        "Output": "picture",
+    }
+    to: ClassVar[Sequence[str]] = USUAL
+
+
+@command
+def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None) -> Outcome:
+    """1× and other orders of waveforms with a tacho, with ±: the runs table of `balance`.
+
+    Example: rotorid vectors sample_data/waveforms/waveforms.toml --output runs.csv
+
+    Parameters
+    ----------
+    records : RECORD…
+        Records, .csv, .wav, .mat, .npz, .uff or .tdms, a run each; or one waveforms file (.toml).
+    options
+        What a waveforms file does not say, or instead of it.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read.
+    ValueError
+        For records without turns, and options that cannot be.
+    """
+    from rotorid.tables.waveforms.vectors_of_records import find_each, vectors_columns
+    from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
+    from rotorid.waveforms.plots import figure_of
+
+    options = options or VectorsOptions()
+    if options.edge is not None:
+        one_of(options.edge, "--edge", get_args(Edge))
+    one_of(options.picture, "--picture", get_args(Picture))
+    given = WaveformWishes(
+        tacho=options.tacho,
+        sensors=names(options.sensors),
+        unit=options.unit,
+        amplitude=options.amplitude,
+        pulses=options.pulses,
+        edge=options.edge,
+        phase=options.phase,
+        orders=_orders(options.orders),
+        rate=options.rate,
+        speeds=None if options.speeds is None else speeds(options.speeds),
+    )
+    with phase("reading"):
+        waveforms = read_waveforms([Path(record) for record in records], given)
+    with phase("vectors"):
+        each = find_each(waveforms)
+    columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels
+    orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
+    many = len(each) > 1
+    words = [f"run {one.run!r}: {word}" if many else word for one in each for word in one.warnings]
+    if waveforms.unstated:
+        words.append("nothing states whether phases lead or lag: lead is written (--phase)")
+    if not labels.vibration_unit:
+        words.append("nothing states the unit of the records: amplitudes are their numbers (--unit)")
+    document = {
+        "conventions": {"phase": labels.phase, "unit": labels.vibration_unit},
+        "rows": rows(columns),
+        "tacho": {
+            "pulses": sum(len(tacho.times) for tacho in tachos),
+            "missing": sum(len(tacho.missing) for tacho in tachos),
+            "double": sum(len(tacho.double) for tacho in tachos),
+            "jitter": max(tacho.jitter_deg for tacho in tachos),
+        },
+        "runs": [
+            {
+                "run": one.run,
+                "steady": one.steady,
+                "lowest_speed_rad_s": one.range[0],
+                "highest_speed_rad_s": one.range[1],
+                "turns": one.tacho.turns[-1] - one.tacho.turns[0],
+                "jitter_deg": one.tacho.jitter_deg,
+            }
+            for one in each
+        ],
+        "warnings": words,
+    }
+    return Outcome(
+        result=each,
+        sentences=(
+            f"{orders} of {counted(len(each[0].sensors), 'sensor')} in {counted(len(each), 'record')}; "
+            f"phases {labels.phase}.",
+            *map(_course, each),
+        ),
+        tables=(_table(columns, printed=True),),
+        file=_table(columns),
+        keys=dict(plain(document)),
+        pictures={"The first record.": lambda: figure_of(options.picture, waveforms.records[0], each[0])},
+        warnings=tuple(words),
+        provenance=provenance(waveforms.files, options),
+    )
+
+
+def _orders(given: str | Sequence[int] | None) -> list[int] | None:
+    """Read "1,2": 1× first, which every runs table has."""
+    if given is None:
+        return None
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else [str(k) for k in given]
+    if not all(part.isdecimal() and 0 < int(part) <= 20 for part in parts):
+        raise ValueError(f"--orders takes whole numbers from 1 to 20 with commas between them, not {given!r}")
+    return sorted({1, *map(int, parts)})
+
+
+def _table(columns: Sequence[Told], *, printed: bool = False) -> Table:
+    """The runs table, or those of its columns that people read."""
+    return Table(
+        "vectors",
+        tuple(
+            Column((printed and one.title) or one.name, list(one.values), one.shown or str)
+            for one in columns
+            if one.shown is not None or not printed
+        ),
+    )
+
+
+def _course(one: Vectors) -> str:
+    """How the speed of a record runs, and over how many turns its vectors are means."""
+    low, high = one.range * RPM
+    if one.steady:
+        return f"{one.run}: {(low + high) / 2:.1f} rpm, {one.turns[0]:.0f} turns"
+    turns = f"{one.turns.min():.0f} to {one.turns.max():.0f} turns"
+    return f"{one.run}: {low:.0f} to {high:.0f} rpm, {counted(len(one.times), 'instant')} of {turns}"

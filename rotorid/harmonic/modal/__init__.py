@@ -1,1 +1,0 @@
-"""Modes from amplitudes around resonances."""

@@ -1,0 +1,236 @@
+"""Measured amplitudes: what was excited, what was read, and how well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.unit_words import Shown
+
+if TYPE_CHECKING:
+    from rotorid.identify.operator_model import HarmonicModel
+
+RAD_PER_S = Shown("frequency, rad/s")
+
+
+@dataclass(frozen=True)
+class AmplitudeErrors:
+    """Errors of one measured amplitude, one standard deviation each.
+
+    Attributes
+    ----------
+    relative
+        Of the amplitude, as a fraction (0.02 = 2 %).
+    phase
+        Radians.
+    floor
+        In the unit of the amplitudes; added in every direction.
+    """
+
+    relative: float = 0.0
+    phase: float = 0.0
+    floor: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = (self.relative, self.phase, self.floor)
+        if not all(np.isfinite(v) and v >= 0 for v in values):
+            raise ValueError(f"errors of amplitudes must be finite and not negative; got {values}")
+        if not any(values):
+            raise ValueError("state at least one error of the amplitudes greater than zero, or none at all")
+
+    def covariance(self, amplitudes: ComplexArray, real: BoolArray | bool = False) -> FloatArray:
+        """Covariance of real and imaginary part, shape (n, 2, 2), for amplitudes (n,).
+
+        The error along the amplitude is √((relative·|Z|)² + floor²), across it √((phase·|Z|)² + floor²).
+        Where `real` (free vibration) there is no imaginary part and its variance is zero.
+        """
+        *variances, turn = self._axes(amplitudes)
+        e = np.stack((np.stack((turn.real, -turn.imag), -1), np.stack((turn.imag, turn.real), -1)), -2)
+        covariance = np.einsum("nij,nj,nkj->nik", e, np.stack(variances, -1), e)
+        covariance[np.broadcast_to(real, turn.shape)] *= np.diag([1.0, 0.0])
+        return np.asarray(covariance)
+
+    def drawn(self, amplitudes: ComplexArray, rng: np.random.Generator) -> ComplexArray:
+        """Readings (n,) of amplitudes (n,): normal errors along and across each, of that covariance."""
+        *variances, turn = self._axes(amplitudes)
+        along, across = rng.standard_normal((2, len(turn))) * np.sqrt(variances)
+        return np.asarray(amplitudes + turn * (along + 1j * across))
+
+    def _axes(self, amplitudes: ComplexArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
+        """Variances along and across each amplitude, and its direction, (n,) each."""
+        z = np.asarray(amplitudes, dtype=complex)
+        along, across = ((share * np.abs(z)) ** 2 + self.floor**2 for share in (self.relative, self.phase))
+        return along, across, np.exp(1j * np.angle(z))
+
+
+@dataclass(frozen=True, eq=False)
+class Experiments:
+    """Harmonic tests and free vibrations: n experiments.
+
+    Attributes
+    ----------
+    names
+        Of the experiments.
+    frequencies
+        Shape (n,), rad/s: of excitation, or natural.
+    signals
+        Complex amplitudes (n,) by the name they have in the model, inputs too; NaN where not measured.
+    free
+        Shape (n,): free vibration (natural frequency and shape: no input, real amplitudes).
+    errors
+        Stated errors of the measured outputs; None: not stated. Inputs count as exact.
+    covariances
+        From repeated readings: by signal (n, 2, 2), real and imaginary part; before `errors`.
+    varying
+        Known quantities (n,) that change from row to row, by name; NaN where unknown.
+    frequency_std
+        Standard deviations of the frequencies (n,), rad/s; None: exact.
+    axis, units
+        How people see frequencies, and the amplitudes of signals that are not in the unit of the model.
+    rounding
+        Covariances, as in `covariances`, that the digits in which readings are written give them; they widen
+        intervals where no errors are stated. The key "" is that of natural frequencies, (n,) variances.
+    """
+
+    names: tuple[str, ...]
+    frequencies: FloatArray
+    signals: Mapping[str, ComplexArray]
+    free: BoolArray
+    errors: AmplitudeErrors | None = None
+    covariances: Mapping[str, FloatArray] = field(default_factory=dict)
+    varying: Mapping[str, FloatArray] = field(default_factory=dict)
+    frequency_std: FloatArray | None = None
+    axis: Shown = RAD_PER_S
+    units: Mapping[str, Shown] = field(default_factory=dict)
+    rounding: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n, w = len(self.names), np.asarray(self.frequencies)
+        if not n:
+            raise ValueError("there are no experiments")
+        if w.shape != (n,) or np.shape(self.free) != (n,):
+            raise ValueError(f"{n} experiments need {n} frequencies and marks of free vibration")
+        if not np.isfinite(w).all() or (w < 0).any():
+            raise ValueError(f"frequencies must be finite and not negative; got {w.tolist()}")
+        for name, values in self.signals.items():
+            if np.shape(values) != (n,):
+                raise ValueError(f"{n} experiments need {n} amplitudes {name}; got shape {np.shape(values)}")
+            if np.isinf(values).any():
+                raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured)")
+        for name, covariance in self.covariances.items():
+            if np.shape(covariance) != (n, 2, 2):
+                raise ValueError(f"the covariance of {name} must have shape ({n}, 2, 2)")
+            if name not in self.signals:
+                raise ValueError(f"a covariance is given for {name}, but no amplitudes")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def stated(self) -> bool:
+        """Whether errors of the amplitudes are stated or known from repeated readings."""
+        return self.errors is not None or bool(self.covariances)
+
+    def covariance(self, name: str) -> FloatArray:
+        """Covariance of an amplitude's real and imaginary part, (n, 2, 2); zero where nothing is stated."""
+        if name in self.covariances:
+            return np.asarray(self.covariances[name], dtype=float)
+        if self.errors is None:
+            return np.zeros((len(self), 2, 2))
+        return self.errors.covariance(np.nan_to_num(self.table([name])[:, 0]), self.free)
+
+    def take(self, index: ArrayLike) -> Experiments:
+        """Some of the experiments, by index or by a mask (n,)."""
+        chosen = np.arange(len(self))[np.asarray(index)]
+        tables = ("signals", "covariances", "varying", "rounding")
+        parts: Any = {key: {name: x[chosen] for name, x in getattr(self, key).items()} for key in tables}
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in chosen),
+            frequencies=self.frequencies[chosen],
+            frequency_std=None if self.frequency_std is None else self.frequency_std[chosen],
+            free=self.free[chosen],
+            **parts,
+        )
+
+    def table(self, names: Sequence[str]) -> ComplexArray:
+        """Amplitudes of some signals, (n, signals), NaN where not measured."""
+        nothing = np.full(len(self), np.nan, dtype=complex)
+        columns = [self.signals.get(name, nothing) for name in names]
+        return np.array(columns, dtype=complex).reshape(-1, len(self)).T
+
+    def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
+        """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""
+        rows = np.column_stack([self.frequencies, self.free, *self.signals.values(), *self.varying.values()])
+        first: dict[bytes, int] = {}
+        same = [first.setdefault(row.tobytes(), i) for i, row in enumerate(rows)]
+        words = tuple(
+            f"experiment {self.names[i]}, in every reading a copy of experiment {self.names[j]} "
+            "(if both were measured, say so in a column repeat)"
+            for i, j in enumerate(same)
+            if i != j
+        )
+        return (self.take(list(first.values())) if words else self), words
+
+
+def experiments(
+    model: HarmonicModel,
+    frequencies: ArrayLike,
+    signals: Mapping[str, ArrayLike | complex],
+    *,
+    names: Sequence[str] | None = None,
+    free: ArrayLike | bool | None = None,
+    errors: AmplitudeErrors | None = None,
+    covariances: Mapping[str, FloatArray] | None = None,
+) -> Experiments:
+    """Gather the amplitudes of a model's signals into `Experiments`.
+
+    Parameters
+    ----------
+    model
+        Says which signals are inputs.
+    frequencies
+        Shape (n,), rad/s.
+    signals
+        Amplitudes by name, (n,) or one for all experiments; NaN: not measured. The model's varying
+        quantities, too.
+    names
+        Default 1, 2, ….
+    free
+        Which experiments are free vibrations. Default: those whose inputs are all 0, NaN or absent and whose
+        amplitudes are all real, if the model has no term without a signal. Their inputs become 0.
+    errors, covariances
+        As in `Experiments`.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit and frequencies that are not finite.
+    """
+    w = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if w.ndim != 1:
+        raise ValueError(f"frequencies must have one dimension; got shape {w.shape}")
+    table: dict[str, ComplexArray] = {}
+    for name, values in signals.items():
+        z = np.asarray(values, dtype=complex)
+        if z.shape not in ((), w.shape):
+            raise ValueError(f"{len(w)} experiments need {len(w)} amplitudes {name}; got shape {z.shape}")
+        table[name] = np.broadcast_to(z, w.shape).copy()
+    if free is None:
+        marks = np.full(w.shape, not model.has_constant_terms)
+        for name, z in table.items():
+            if name in model.signals:
+                marks &= np.isnan(z) | ((z == 0) if name in model.inputs else (z.imag == 0))
+    else:
+        marks = np.broadcast_to(np.asarray(free, dtype=bool), w.shape).copy()
+    for name in model.inputs:
+        if name in table or marks.any():
+            table[name] = np.where(marks, 0, table.get(name, np.full(w.shape, np.nan)))
+    rows = {name: np.asarray(table.pop(name).real) for name in model.varying if name in table}
+    labels = tuple(names) if names is not None else tuple(str(i + 1) for i in range(len(w)))
+    return Experiments(labels, w, table, marks, errors, dict(covariances or {}), rows)

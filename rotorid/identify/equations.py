@@ -1,0 +1,328 @@
+"""Reading operator equations: texts in p = d/dt become sums of c · Π θ^e · p^k · signal.
+
+Left minus right over the common denominator is a polynomial with exact coefficients. A denominator of one
+term stays, as negative exponents, so that 1/p**2 or 1/k needs no multiplying out; one of several terms is
+multiplied out, scaled so that its lowest term has the coefficient 1. A fractional power of a parameter, such
+as sqrt(k), has a fraction as its exponent: one more unknown of the regression, and k ≥ 0.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+
+import numpy as np
+
+from rotorid.identify.combinations import (
+    CONSTANT,
+    NAME,
+    ONE,
+    Expression,
+    Feature,
+    Monomial,
+    P,
+    Polynomial,
+    degree,
+    exact_number,
+    insert,
+    times,
+)
+from rotorid.identify.operator_model import HarmonicModel
+
+MAX_TERMS, MAX_EXPONENT = 20_000, 50
+
+
+def harmonic_model(
+    equations: Sequence[str],
+    *,
+    known: Mapping[str, float] | None = None,
+    estimate: Sequence[str],
+    inputs: Sequence[str] | None = None,
+    varying: Sequence[str] = (),
+) -> HarmonicModel:
+    """Read an operator model.
+
+    Parameters
+    ----------
+    equations
+        "left = right" in p = d/dt, known names, parameters and signals, such as "(m*p**2 + b*p + c)*X = F".
+        Every name that is neither p, known nor to be estimated is a signal, but for one that stands only as a
+        factor of signals: that is varying. A term without a signal has amplitude 1. Denominators of several
+        terms are multiplied out.
+    known
+        Numbers by name.
+    estimate
+        Names of the parameters to be estimated; they may have fractional powers, such as sqrt(k).
+    inputs
+        Signals that excite. Default: those that stand only on right sides.
+    varying
+        Further known quantities that change from row to row, [S] (4), such as a speed.
+
+    Raises
+    ------
+    ValueError
+        For equations that cannot be read, are not linear in the signals or not rational in p and powers of
+        parameters, or follow from the others; parameters that do not occur, names given twice.
+
+    Examples
+    --------
+    >>> model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    >>> model.outputs, model.inputs
+    (('X',), ('F',))
+    """
+    from rotorid.identify.expressions import names, parse_equation
+
+    texts = (equations,) if isinstance(equations, str) else tuple(equations)
+    if not texts:
+        raise ValueError("the model has no equations")
+    numbers = {name: _finite(name, value) for name, value in (known or {}).items()}
+    _check_names(tuple(estimate), numbers)
+    sides = [parse_equation(text, where=f"equation {i + 1}") for i, text in enumerate(texts)]
+    left, right = ({n for side in sides for n in names(side[i])} for i in (0, 1))
+    others = sorted((left | right) - {P, *numbers, *estimate})
+    for name in estimate:
+        if name not in left | right:
+            near = difflib.get_close_matches(name, others, 1, 0.5)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
+
+    features, changing = _features(texts, sides, numbers, estimate, others, inputs or (), varying)
+    used = {f.signal for f in features}
+    signals = tuple(dict.fromkeys(n for text in texts for n in NAME.findall(text) if n in used))
+    occurs = {name for f in features for m in f.exact for name, _ in m}
+    for name in estimate:
+        if name not in occurs:
+            raise ValueError(
+                f"the parameter {name} cancels out of the equations: nothing can be said about it"
+            )
+    chosen = tuple(inputs) if inputs is not None else tuple(n for n in signals if n not in left)
+    for name in chosen:
+        if name not in signals:
+            raise ValueError(
+                f"the input {name} is no signal of the equations; signals are {', '.join(signals)}"
+            )
+    outputs = tuple(name for name in signals if name not in chosen)
+    if not outputs:
+        raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
+    ordered = tuple(name for name in others if name in changing)
+    model = HarmonicModel(texts, tuple(estimate), numbers, signals, chosen, outputs, tuple(features), ordered)
+    _check_independent(model)
+    return model
+
+
+def _features(
+    texts: Sequence[str],
+    sides: Sequence[tuple[Expression, Expression]],
+    numbers: Mapping[str, float],
+    estimate: Sequence[str],
+    others: Sequence[str],
+    inputs: Sequence[str],
+    varying: Sequence[str],
+) -> tuple[list[Feature], frozenset[str]]:
+    """Features of all equations, and the names of quantities that change from row to row."""
+    exact = {name: exact_number(value) for name, value in numbers.items()}
+    polynomials = []
+    for i, (text, side) in enumerate(zip(texts, sides, strict=True)):
+        with _named(i, text):
+            polynomials.append(multiplied_out(side[0] - side[1], exact, estimate))
+    changing = _row_by_row([terms for terms, _ in polynomials], others, inputs, varying)
+    features: list[Feature] = []
+    for i, (text, (terms, below)) in enumerate(zip(texts, polynomials, strict=True)):
+        with _named(i, text):
+            if lost := sorted(below & set(others) - changing):
+                raise ValueError(f"it is not linear in the signals: {lost[0]} stands in a denominator")
+            of_equation = _split(i, terms, exact, frozenset(others), changing)
+            if not any(f.signal for f in of_equation):
+                raise ValueError(
+                    "it contains no signal; names that are neither known nor estimated are signals"
+                )
+            features += of_equation
+    return features, changing
+
+
+def multiplied_out(
+    expression: Expression, known: Mapping[str, Fraction], estimate: Sequence[str] = ()
+) -> tuple[Polynomial, frozenset[str]]:
+    """The numerator of an expression over its common denominator, and the names in denominators of sums.
+
+    Raises
+    ------
+    ValueError
+        With the reason, for whatever is not rational in other names than those to estimate, and for
+        expansions that are too long.
+    """
+    from sympy import QQ, Dummy, Symbol, fraction, nan, oo, ring, together, zoo
+
+    def of_known(part: Expression) -> bool:
+        plain = part.is_Function or (part.is_Pow and not (part.exp.is_Integer and part.exp > 0))
+        alone = part.is_Pow and part.base.is_Symbol and part.exp.is_Integer
+        return plain and not alone and all(s.name in known for s in part.free_symbols)
+
+    whole = expression.replace(of_known, lambda part: _number(part, known))
+    roots = {s: _root(whole, s) for s in whole.free_symbols if s.name in estimate}
+    inner = {s: Dummy(s.name, positive=True) if n > 1 else s for s, n in roots.items()}
+    whole = whole.subs({s: inner[s] ** n for s, n in roots.items() if n > 1})
+    top, bottom = fraction(together(whole))
+    if top.has(oo, nan, zoo) or bottom == 0:
+        raise ValueError("it divides by zero")
+    symbols = sorted(top.free_symbols | bottom.free_symbols, key=str)
+    R = ring(symbols, QQ)[0]
+    factors = [part.as_base_exp() for part in bottom.as_ordered_factors()]
+    size = math.prod(len(base.as_ordered_terms()) ** abs(int(n)) for base, n in factors if n.is_Integer)
+    if size > MAX_TERMS:
+        raise ValueError("it expands to too many terms")
+    _check_rational(whole)
+    place = [(s.name, roots.get(Symbol(s.name), 1)) for s in symbols]
+
+    def terms(part: Expression) -> Polynomial:
+        found: Polynomial = {}
+        for exponents, value in R.from_expr(part).terms():
+            powers = ((n, Fraction(e, root)) for (n, root), e in zip(place, exponents, strict=True) if e)
+            monomial = tuple(sorted((n, int(e) if e.denominator == 1 else e) for n, e in powers))
+            found[monomial] = Fraction(int(value.numerator), int(value.denominator))
+        return found
+
+    polynomial, scale, below = terms(top), Fraction(1), set[str]()
+    shift: Monomial = ONE
+    for base, exponent in factors:
+        pieces = terms(base)
+        lowest = min(pieces, key=lambda m: (degree(m), m))
+        if not pieces[lowest]:
+            raise ValueError("it divides by zero")
+        scale *= pieces[lowest] ** int(exponent)
+        if len(pieces) == 1:
+            shift = times(shift, tuple((n, -e * int(exponent)) for n, e in lowest))
+        else:
+            below |= {name for m in pieces for name, _ in m}
+    for name, e in shift:
+        if e < 0 and name in known and not known[name]:
+            raise ValueError(f"it divides by {name}, which is 0")
+    return {times(m, shift): x / scale for m, x in polynomial.items() if x}, frozenset(below)
+
+
+def _number(part: Expression, known: Mapping[str, Fraction]) -> Expression:
+    """A function of known names as the number that it is, such as sqrt(2*k)."""
+    from sympy import Rational
+
+    value = complex(part.subs({s: float(known[s.name]) for s in part.free_symbols}).evalf())
+    if part.is_Pow and part.exp.is_negative and (not value or not np.isfinite(value)):
+        raise ValueError("it divides by zero")
+    if not np.isfinite(value) or abs(value.imag) > 1e-12 * abs(value):
+        raise ValueError(f"'{part}' is no finite real number for the known values")
+    exact = exact_number(value.real)
+    return Rational(exact.numerator, exact.denominator)
+
+
+def _root(whole: Expression, symbol: Expression) -> int:
+    """Common denominator of the exponents that stand above a symbol."""
+    from sympy import Pow
+
+    powers = [e.exp for e in whole.atoms(Pow) if e.exp.is_Rational and e.base.has(symbol)]
+    return math.lcm(1, *(int(e.q) for e in powers))
+
+
+def _check_rational(whole: Expression) -> None:
+    """Raise ValueError for the first part that is neither a sum, a product nor a whole power."""
+    if whole.is_Symbol or whole.is_Rational:
+        return
+    power = whole.is_Pow and whole.exp.is_Integer
+    if not (whole.is_Add or whole.is_Mul or power):
+        raise ValueError(
+            f"'{whole}' is neither a polynomial nor a fraction of polynomials in p and the parameters; give "
+            "such a term a name and estimate that"
+        )
+    if power and abs(whole.exp) > MAX_EXPONENT:
+        raise ValueError(f"the exponent {whole.exp} is too large (at most {MAX_EXPONENT})")
+    for part in whole.args[:1] if power else whole.args:
+        _check_rational(part)
+
+
+def _split(
+    equation: int,
+    polynomial: Polynomial,
+    known: Mapping[str, Fraction],
+    signals: frozenset[str],
+    varying: frozenset[str],
+) -> list[Feature]:
+    """Sort an equation's terms by p^k · signal; ValueError where it is not linear in the signals."""
+    symbolic: dict[tuple[int, str, Monomial], dict[Monomial, Polynomial]] = {}
+    for monomial, value in polynomial.items():
+        shown = [(n, e) for n, e in monomial if n in signals - varying]
+        if len(shown) > 1 or any(e != 1 for _, e in shown):
+            term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals)
+            raise ValueError(
+                f"it is not linear in the signals: it contains {term} (name a quantity that is known "
+                f"in each row under varying)"
+            )
+        power = int(dict(monomial).get(P, 0))
+        factors = tuple((n, e) for n, e in monomial if n in varying)
+        numbers = tuple((n, e) for n, e in monomial if n in known)
+        rest = tuple((n, e) for n, e in monomial if n not in signals | varying | {P, *known})
+        place = power, shown[0][0] if shown else CONSTANT, factors
+        symbolic.setdefault(place, {}).setdefault(rest, {})[numbers] = value
+    features = []
+    for (k, signal, factors), parts in sorted(symbolic.items()):
+        exact = {m: x for m, part in parts.items() if (x := insert(part, known))}
+        if exact:
+            features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}, factors))
+    return features
+
+
+@contextmanager
+def _named(index: int, text: str) -> Iterator[None]:
+    """Say in which equation a problem lies."""
+    try:
+        yield
+    except ValueError as problem:
+        raise ValueError(f"equation {index + 1}, '{text}': {problem}") from None
+
+
+def _row_by_row(
+    polynomials: Sequence[Polynomial], others: Sequence[str], inputs: Sequence[str], stated: Sequence[str]
+) -> frozenset[str]:
+    """Names that stand only beside a signal, as factors of it: it stands alone somewhere, they do not."""
+    terms = [{n: e for n, e in m if n in others} for polynomial in polynomials for m in polynomial]
+    alone = {n for term in terms if len(term) == 1 for n, e in term.items() if e == 1} | set(inputs)
+    alone -= set(stated)
+    beside = {n for term in terms if len(alone.intersection(term)) == 1 for n in set(term) - alone}
+    return frozenset(beside | set(stated))
+
+
+def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
+    from rotorid.identify.expressions import is_name
+
+    if not estimate:
+        raise ValueError("no parameter is to be estimated: name at least one")
+    for name in (*estimate, *known):
+        if not is_name(name):
+            raise ValueError(f"'{name}' cannot be a name: letters, digits and _ only, and no function's name")
+        if name == P:
+            raise ValueError("p is d/dt: it can be neither known nor estimated")
+    for name in estimate:
+        if estimate.count(name) > 1:
+            raise ValueError(f"the parameter {name} is named twice")
+        if name in known:
+            raise ValueError(f"{name} is both known and to be estimated")
+
+
+def _check_independent(model: HarmonicModel) -> None:
+    """Raise ValueError for an equation that follows from those before it: its rows would count twice."""
+    rng = np.random.default_rng(1)
+    varying = {name: rng.uniform(0.5, 2.0, 1) for name in model.varying}
+    A = model.matrices(rng.uniform(0.5, 2.0, len(model.parameters)), rng.uniform(0.5, 2.0, 1), varying)[0]
+    A = A / np.linalg.norm(A, axis=1, keepdims=True)
+    for i in range(1, len(A)):
+        if np.linalg.matrix_rank(A[: i + 1], 1e-12) <= i:
+            raise ValueError(
+                f"equation {i + 1} follows from those before it and tells nothing new: leave it out, or its "
+                "rows would count twice"
+            )
+
+
+def _finite(name: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+        raise ValueError(f"the known {name} must be a finite number; got {value!r}")
+    return float(value)

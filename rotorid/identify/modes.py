@@ -1,0 +1,171 @@
+"""Modes from amplitudes around resonances, the measurements that [S] lesson 7 begins with.
+
+The search begins at the peaks and their circles; errors are those of the fitted amplitudes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.identify.answers import Answers
+from rotorid.identify.modes_readings import Readings, Whitened
+from rotorid.identify.modes_result import FittedModes
+from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
+
+PROMINENCE, SKIRT = 1.4, 4.0
+"""A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
+TRUSTED = 3.0
+"""Farther than this factor from a reading the fit does not set its error."""
+CLEARLY = 3.0
+"""By so much more likely (logarithm, of as many readings as are spare) errors must be of one size."""
+ROUNDS = 3
+"""With errors at the measured amplitudes, then at the fitted ones."""
+
+
+def fit_modes(
+    readings: Readings,
+    answers: Answers,
+    bands: Sequence[tuple[float, float]] | None = None,
+    around: Sequence[tuple[float, float]] | None = None,
+) -> FittedModes:
+    """Fit modes to amplitudes around resonances.
+
+    Parameters
+    ----------
+    readings
+        With their errors; where none are stated, these are one share of every amplitude or one size.
+    answers
+        Of modes to what excites them, reading by reading.
+    bands
+        Frequencies around each resonance, rad/s: one mode in each, and nothing else counts. None: around
+        each peak, and everything counts.
+    around
+        The same where everything counts; None: `peak_bands`.
+
+    Raises
+    ------
+    ValueError
+        Where there is no peak, bands overlap, and where readings are fewer than unknowns.
+    """
+    read = ~np.isnan(readings.vectors).all(axis=1)
+    if bands is not None:
+        read &= np.any([(readings.speeds >= low) & (readings.speeds <= high) for low, high in bands], axis=0)
+    if not read.any():
+        raise ValueError("there are no readings in --bands")
+    order = np.flatnonzero(read)[np.argsort(readings.speeds[read], kind="stable")]
+    readings, answers = readings.take(order), answers.take(order)
+    omega, Z = readings.speeds, readings.vectors
+    H = (Z.T / answers.excitation).T
+    sections = sorted(bands or around or peak_bands(omega, H))
+    if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
+        raise ValueError("--bands overlap: each holds one mode")
+    rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
+    spare = np.count_nonzero(~np.isnan(Z), axis=0) - len(rows) - 2
+    if min(spare) < 0 or sum(spare) < len(rows) or min(len(np.unique(omega[row])) for row in rows) < 3:
+        raise ValueError(
+            f"too few readings: every resonance needs 3 frequencies, and every point {len(rows) + 2} (one a "
+            "mode and two for modes beyond the range), and one more for the frequencies and damping"
+        )
+    q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel()
+    ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
+    if readings.covariances is not None or readings.shares is not None:
+        return FittedModes(readings, answers, *_search(readings, answers, q, ends)[1:], ends, "")
+    size = replace(readings, covariances=np.broadcast_to(np.eye(2), (*Z.shape, 2, 2)))
+    share, other = (_search(each, answers, q, ends, stated=False) for each in (readings, size))
+    likely = other[0] >= share[0] + CLEARLY
+    same = "size everywhere" if likely else "share of every amplitude"
+    return FittedModes(readings, answers, *(other if likely else share)[1:], ends, same)
+
+
+def _search(
+    readings: Readings,
+    answers: Answers,
+    q: FloatArray,
+    ends: Sequence[tuple[float, float]],
+    *,
+    stated: bool = True,
+) -> tuple[float, NonlinearEstimate, Whitened]:
+    """Likelihood (its logarithm but for a constant), fit, and the readings over their errors."""
+    names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(ends) + 1)]
+    # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
+    limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
+    amplitudes = Z = readings.vectors
+    for turn in range(ROUNDS):
+        whitened = Whitened(answers, Z, readings.inverse_roots(amplitudes))
+        fit = nonlinear_least_squares(
+            whitened.rest,
+            whitened.slopes,
+            q,
+            names=names,
+            sigma_stated=stated,
+            bounds=dict(zip(names, limits, strict=True)),
+            near=turn > 0,
+        )
+        q = fit.estimate.solution
+        model = whitened.model(q)
+        ratio = np.abs(model) / np.abs(Z)
+        amplitudes = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
+    r = fit.estimate.residuals
+    size = np.abs(np.linalg.det(whitened.root[~np.isnan(Z)]))
+    likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))
+    return float(likely * fit.estimate.dof / 2), fit, whitened
+
+
+def peak_bands(
+    omega: FloatArray, H: ComplexArray, noise: FloatArray | float = 0.0
+) -> list[tuple[float, float]]:
+    """Frequencies around each peak of all points together, each point in its own size.
+
+    Parameters
+    ----------
+    omega
+        Rising, rad/s, (n,).
+    H
+        Responses (n, P).
+    noise
+        Size (n, P) of what in these is no peak.
+
+    Raises
+    ------
+    ValueError
+        Where there is no peak.
+    """
+    from scipy.signal import find_peaks
+
+    size = np.hypot(np.abs(H), noise) / np.nanmax(np.abs(H), axis=0)
+    level = np.log(np.nanmean(size**2, axis=1)) / 2
+    peaks = find_peaks(level, prominence=np.log(PROMINENCE))[0]
+    if not len(peaks):
+        raise ValueError(
+            f"no peak stands {PROMINENCE:g} times above both its sides: measure on both sides of the "
+            "resonance, or say with --bands where it is"
+        )
+    valleys = [0, *(a + int(level[a:b].argmin()) for a, b in pairwise(peaks)), len(omega) - 1]
+    sections = []
+    for peak, (first, last) in zip(peaks, pairwise(valleys), strict=True):
+        rows = np.arange(first, last + 1)
+        near = rows[(level[rows] > level[peak] - np.log(SKIRT)) | (np.abs(rows - peak) < 2)]
+        sections.append((float(omega[near[0]]), float(omega[near[-1]])))
+    return sections
+
+
+def _circle(omega: FloatArray, H: ComplexArray) -> tuple[float, float]:
+    """ω_r and ζ_r of the circles through responses (n, P): H (s − ω²) = c + a ω² with s = ω_r² (1 + 2 i ζ_r).
+
+    It is linear in s, which all points share, and in c and a of each (Kennedy and Pancu, 1947).
+    """
+    H = H[:, ~np.isnan(H).all(axis=0)]
+    H = np.where(np.isnan(H), np.nanmean(H, axis=0), H)
+    v = omega**2
+    line = np.stack((np.ones_like(v), v / v.mean()), axis=1)
+    rest = H - line @ (np.linalg.pinv(line) @ H)
+    s = np.vdot(rest, H * v[:, None]) / (np.vdot(rest, rest).real or 1.0)
+    if not v[0] < s.real < v[-1]:
+        return float(omega[np.abs(H).sum(axis=1).argmax()]), 0.01
+    damping = s.imag / (2 * s.real)
+    return float(np.sqrt(s.real)), float(np.copysign(np.clip(abs(damping), 1e-6, 0.5), damping))

@@ -1,0 +1,350 @@
+"""Operator models: equations linear in the amplitudes with coefficients in p = d/dt, what they predict.
+
+Forced vibration: A(iω; θ) Z = b with the outputs on one side, so Z = A⁻¹ b and dZ/dθ = A⁻¹ (db/dθ − dA/dθ Z),
+[S] (17), (18). Free vibration: A(z; θ) v = 0 with z = ω² = −p² and even powers of p only. With A′ = dA/dz
+
+    A dv + A′ v dz = −dA/dθ v,    dv[reference] = 0
+
+gives the derivatives of z and of the shape v, whose entry `reference` is kept at 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.identify.combinations import (
+    CONSTANT,
+    ONE,
+    Combinations,
+    Feature,
+    Monomial,
+    exact_number,
+    merge,
+    monomials_of,
+)
+
+MAC_SLACK = 0.02
+"""Modes whose MAC is this near to the best count as equally like; the nearest frequency decides."""
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicModel:
+    """Linear operator equations; made by `harmonic_model`: sums of terms c · Πθ^e · p^k · signal.
+
+    Attributes
+    ----------
+    equations
+        As written.
+    parameters
+        Names to be estimated, in their order.
+    known
+        Numbers by name.
+    signals, inputs, outputs
+        Names of all amplitudes, of the exciting ones and of the others.
+    features
+        The coefficients of p^k · signal in each equation.
+    varying
+        Names of known quantities that change from row to row, [S] (4): columns of the measurements.
+    """
+
+    equations: tuple[str, ...]
+    parameters: tuple[str, ...]
+    known: Mapping[str, float]
+    signals: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    features: tuple[Feature, ...] = field(repr=False)
+    varying: tuple[str, ...] = ()
+
+    @property
+    def has_constant_terms(self) -> bool:
+        """Whether a term stands without a signal (amplitude 1), such as a known force."""
+        return any(f.signal == CONSTANT for f in self.features)
+
+    @cached_property
+    def monomials(self) -> tuple[Monomial, ...]:
+        """Products and powers of parameters, lifted into unknowns of the regression."""
+        return monomials_of(self.features, self.parameters)
+
+    @cached_property
+    def combinations(self) -> Combinations:
+        """What data can determine at best: the row space of the coefficients."""
+        exact = {name: exact_number(value) for name, value in self.known.items()}
+        return merge(self.features, self.monomials, exact)
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """Of the features in 1 and the monomials, (features, 1 + monomials)."""
+        return np.array([[float(f.exact.get(m, 0)) for m in (ONE, *self.monomials)] for f in self.features])
+
+    @cached_property
+    def exponents(self) -> FloatArray:
+        """Exponents of the parameters, (1 + monomials, parameters); row 0 is the constant 1."""
+        powers = [dict(m) for m in (ONE, *self.monomials)]
+        return np.array([[float(one.get(name, 0)) for name in self.parameters] for one in powers])
+
+    @cached_property
+    def equation(self) -> IntArray:
+        """Of each feature (f,)."""
+        return np.array([f.equation for f in self.features], dtype=np.int_)
+
+    @cached_property
+    def power(self) -> IntArray:
+        """Of p in each feature (f,)."""
+        return np.array([f.power for f in self.features], dtype=np.int_)
+
+    @cached_property
+    def column(self) -> IntArray:
+        """Signal of each feature (f,): outputs, then inputs, at last the amplitude 1 of constant terms."""
+        names = (*self.outputs, *self.inputs, CONSTANT)
+        return np.array([names.index(f.signal) for f in self.features], dtype=np.int_)
+
+    @cached_property
+    def _place(self) -> FloatArray:
+        """Where the features stand in the equations, (f, equations · (1 + signals))."""
+        columns = 1 + len(self.signals)
+        return np.asarray(np.eye(len(self.equations) * columns)[self.equation * columns + self.column])
+
+    def multipliers(
+        self, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> ComplexArray:
+        """(iω)^k and the varying quantities of each feature (n, f), for frequencies (n,)."""
+        w, k, rows = np.asarray(frequencies, dtype=float), self.power, varying or {}
+        if (k < 0).any() and (w == 0).any():
+            raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
+        # exact powers of i, so that a real row has no imaginary dust
+        factors = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
+        for j, feature in enumerate(self.features):
+            for name, exponent in feature.varying:
+                if name not in rows:
+                    raise ValueError(
+                        f"{name} stands as a factor in the equations and is neither known nor estimated: "
+                        f"the measurements must have its value in every row (a column {name})"
+                    )
+                value = np.asarray(rows[name], dtype=float)
+                if exponent < 0 and (value == 0).any():
+                    raise ValueError(
+                        f"an equation divides by {name}, which is 0 in a row of the measurements"
+                    )
+                factors[:, j] *= value ** float(exponent)
+        return np.asarray(factors, dtype=complex)
+
+    def polynomials(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values (f,) and derivatives (f, n) of the features' coefficients at parameters (n,)."""
+        products, slopes = products_of_powers(self.exponents, values)
+        return self.coefficients @ products, self.coefficients @ slopes
+
+    def matrices(
+        self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> ComplexArray:
+        """Coefficients A(iω; θ) of outputs, inputs and 1, (n, equations, 1 + signals).
+
+        Parameters
+        ----------
+        values
+            Of the parameters.
+        frequencies
+            (n,), rad/s.
+        varying
+            Known quantities (n,) that change from row to row, by name.
+        """
+        terms = self.multipliers(frequencies, varying) * self.polynomials(values)[0]
+        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
+
+    def sizes(
+        self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray]
+    ) -> FloatArray:
+        """Sums of the sizes of the terms of each coefficient, shape as of `matrices`."""
+        products = np.abs(products_of_powers(self.exponents, values)[0])
+        terms = np.abs(self.multipliers(frequencies, varying)) * (np.abs(self.coefficients) @ products)
+        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
+
+    def predict(
+        self,
+        values: FloatArray,
+        frequencies: FloatArray,
+        inputs: Mapping[str, ComplexArray],
+        varying: Mapping[str, FloatArray] | None = None,
+    ) -> dict[str, ComplexArray]:
+        """Amplitudes of the outputs at frequencies (n,) for inputs and varying quantities (n,).
+
+        Raises
+        ------
+        ValueError
+            If there are not as many outputs as equations.
+        """
+        self.check_square()
+        table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
+        for j, name in enumerate(self.inputs):
+            table[:, j] = inputs[name]
+        amplitudes, _ = self.forced(values, frequencies, table, False, varying)
+        return dict(zip(self.outputs, amplitudes.T, strict=True))
+
+    def forced(
+        self,
+        values: FloatArray,
+        frequencies: FloatArray,
+        inputs: ComplexArray,
+        slopes: bool = True,
+        varying: Mapping[str, FloatArray] | None = None,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters), if asked for.
+
+        Parameters
+        ----------
+        values
+            Of the parameters.
+        frequencies
+            ω, shape (n,).
+        inputs
+            Amplitudes of the inputs, (n, inputs).
+        slopes
+            False: without derivatives (an empty array).
+        varying
+            Known quantities (n,) that change from row to row, by name.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            At a resonance without damping.
+        """
+        n, e = len(frequencies), len(self.outputs)
+        multipliers = self.multipliers(frequencies, varying)
+        P, dP = self.polynomials(values)
+        whole = (multipliers * P @ self._place).reshape(n, e, -1)
+        given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
+        A = whole[:, :, :e]
+        Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
+        if not slopes:
+            return Z, np.zeros((n, e, 0), dtype=complex)
+        load = multipliers * np.concatenate((Z, given), axis=1)[:, self.column]
+        rows = [np.flatnonzero(self.equation == i) for i in range(e)]
+        G = -np.stack([load[:, f] @ dP[f] for f in rows], axis=1)
+        return Z, np.asarray(np.linalg.solve(A, G))
+
+    def dynamic_stiffness(
+        self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n).
+
+        Of free vibration: odd powers of p, which would need imaginary amplitudes, are left out. Varying
+        quantities (1,) have the values of one row.
+        """
+        P, dP = self.polynomials(values)
+        row = np.real(self.multipliers(np.ones(1), varying)[0] / np.array([1, 1j, -1, -1j])[self.power % 4])
+        P, dP = P * row, dP * row[:, None]
+        e = len(self.outputs)
+        use = (self.column < e) & (self.power % 2 == 0)
+        # multiplied by p^−lowest: a compliance form written with 1/p² would have no polynomial
+        k = (self.power - min(self.power[use], default=0)) // 2
+        sign = np.where(k % 2 == 0, 1.0, -1.0)
+        degree = max(k[use], default=0) + 1
+        A, dA = np.zeros((degree, e, e)), np.zeros((degree, e, e, len(values)))
+        at = (k[use], self.equation[use], self.column[use])
+        np.add.at(A, at, sign[use] * P[use])
+        np.add.at(dA, at, sign[use, None] * dP[use])
+        return A, dA
+
+    def check_square(self) -> None:
+        """Raise ValueError if amplitudes cannot be predicted: not as many outputs as equations."""
+        if len(self.outputs) != len(self.equations):
+            raise ValueError(
+                f"predicting amplitudes needs as many equations as outputs; there are {len(self.equations)} "
+                f"equations and {len(self.outputs)} outputs ({', '.join(self.outputs) or 'none'}): say which "
+                "signals are given with inputs = [...]"
+            )
+
+
+def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Products Π θ^e (m,) of exponents (m, n), and their derivatives (m, n) by θ."""
+    theta = np.asarray(values, dtype=float)
+    products = np.prod(theta**exponents, axis=1)
+    if theta.all():
+        return products, products[:, None] * exponents / theta
+    slopes = np.zeros_like(exponents)
+    for j in range(len(theta)):
+        used = np.flatnonzero(exponents[:, j])
+        lower = exponents[used] - np.eye(len(theta))[j]
+        slopes[used, j] = exponents[used, j] * np.prod(theta**lower, axis=1)
+    return products, slopes
+
+
+def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positive real z = ω² with Σ A_k z^k singular, and shapes.
+
+    Parameters
+    ----------
+    A
+        Shape (k, e, e).
+
+    Returns
+    -------
+    z (modes,), ascending, and shapes (e, modes), each of unit length. Complex, negative and infinite
+    z are left out: they belong to no free vibration.
+    """
+    from scipy.linalg import eig
+
+    degree, e = len(A) - 1, A.shape[1]
+    if degree < 1:
+        return np.zeros(0), np.zeros((e, 0))
+    # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
+    first, last = float(np.abs(A[0]).max()), float(np.abs(A[-1]).max())
+    unit = (first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
+    scaled = A * unit ** np.arange(degree + 1)[:, None, None]
+    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
+    L[-e:] = -np.hstack([*scaled[:-1]])
+    R[-e:, -e:] = scaled[-1]
+    (alpha, beta), y = eig(L, R, homogeneous_eigvals=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = alpha / beta
+    good = np.flatnonzero(np.isfinite(z) & (np.abs(z.imag) <= 1e-8 * np.abs(z)) & (z.real > 1e-12))
+    good = good[np.argsort(z[good].real)]
+    v = y[:e, good]
+    v = (v / v[np.abs(v).argmax(axis=0), np.arange(v.shape[1])]).real
+    return z[good].real * unit, v / np.linalg.norm(v, axis=0)
+
+
+def nearest_mode(
+    z: FloatArray, v: FloatArray, frequency: float, shape: FloatArray
+) -> tuple[float, FloatArray] | None:
+    """The mode most like a measured shape (NaN: not measured) by MAC; among equals the nearest frequency."""
+    if not len(z):
+        return None
+    seen = ~np.isnan(shape)
+    u, w = shape[seen], v[seen]
+    size = (w * w).sum(axis=0) * float(u @ u)
+    mac = np.divide((u @ w) ** 2, size, out=np.zeros_like(z), where=size > 0)
+    away = np.abs(np.log(np.sqrt(z) / frequency))
+    best = int(np.argmin(np.where(mac >= mac.max() - MAC_SLACK, away, np.inf)))
+    return float(z[best]), np.asarray(v[:, best])
+
+
+def mode_slopes(
+    A: FloatArray, dA: FloatArray, z: float, v: FloatArray, reference: int
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of z (n,) and of the shape (e, n) whose entry `reference` is kept at 1.
+
+    A and dA as of `dynamic_stiffness`, z and the shape v (e,) of a mode.
+    """
+    k, e = np.arange(len(A)), len(v)
+    slope = np.tensordot(k[1:] * z ** k[:-1], A[1:], axes=1)
+    force = -np.einsum("k,keon,o->en", z**k, dA, v)
+    bordered = np.zeros((e + 1, e + 1))
+    bordered[:e, :e] = np.tensordot(z**k, A, axes=1)
+    bordered[:e, e] = slope @ v * z  # unknown: relative change of z, of the size of the others
+    bordered[e, reference] = 1.0
+    rows = np.abs(bordered).max(axis=1, keepdims=True)
+    rows[rows == 0] = 1.0
+    solved = np.linalg.solve(bordered / rows, np.vstack((force, np.zeros(force.shape[1]))) / rows)
+    return solved[e] * z, solved[:e]
+
+
+def reference_amplitude(shape: FloatArray) -> int:
+    """The first measured amplitude that is no node of the mode."""
+    size = np.nan_to_num(np.abs(shape))
+    return int(np.flatnonzero(size >= 0.1 * size.max())[0])

@@ -1,0 +1,147 @@
+"""Pictures of a fit to time records. Nothing is shown or saved: functions draw on axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, look, new_figure, plain
+from rotorid.base.text import counted
+from rotorid.identify.records import record_names, refined
+from rotorid.identify.simulation import STEPWISE, simulate
+from rotorid.regression.interval_plot import ROOM, draw_intervals
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from rotorid.identify.result_records import Fit
+    from rotorid.identify.simulation import Trajectory
+
+CURVE_POINTS, BAND = 600, "#d9dde3"
+MANY = 8
+"""Records that a legend still names."""
+
+
+def figure_fit(result: Fit) -> Figure:
+    """All about a fit: each signal with the model and its residuals, the inputs, the parameters."""
+    outputs, inputs = result.model.outputs, tuple(result.records[0].inputs)
+    heights = [1.4, 0.8] * len(outputs) + [0.9] * len(inputs)
+    parts = 0.9 + sum(heights), 0.2 + ROOM[0] + ROOM[1] * len(result.parameters)
+    figure = new_figure(sum(parts))
+    above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
+    axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    curves = fine_curves(result)
+    for name, upper, lower in zip(outputs, axes[::2], axes[1::2], strict=False):
+        draw_signal(result, name, upper, curves)
+        draw_residuals(result, name, lower)
+    for name, ax in zip(inputs, axes[2 * len(outputs) :], strict=True):
+        for k, record in enumerate(result.records):
+            ax.plot(record.axis.scale * record.t, record.inputs[name], **_line(result, k, len(record)))
+        _finish(ax, f"input {name}")
+    axes[-1].set_xlabel(result.records[0].axis.word)
+    figure.align_ylabels(axes)
+    stated = result.errors or any(record.sigma for record in result.records)
+    words = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
+    _legend(result, above, words)
+    draw_parameters(result, below.subplots())
+    return figure
+
+
+def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
+    """The model at the times of each record, and between them where the integrator allows it."""
+    curves = []
+    for model, record, run in zip(result.models, result.records, result.simulations, strict=False):
+        if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
+            finer = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
+            theta = result.estimate.solution
+            run = simulate(model, theta, finer, sensitivities=False)
+        curves.append(run)
+    return tuple(curves)
+
+
+def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory]) -> None:
+    """Measured samples (points) of an output and the fitted model (lines) over time."""
+    for k, record in enumerate(result.records):
+        if name in record.outputs:
+            axes.plot(record.axis.scale * record.t, record.outputs[name], **_mark(result, k))
+    for k, (record, curve) in enumerate(zip(result.records, curves, strict=False)):
+        y = curve.y[:, result.model.outputs.index(name)]
+        axes.plot(record.axis.scale * curve.t, y, **_line(result, k, len(y)))
+    _finish(axes, name)
+
+
+def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
+    """Model minus measured over time, in a band of ± 2σ: as stated, or twice the rms of this output."""
+    j = result.model.outputs.index(name)
+    residuals = {
+        k: run.y[:, j] - record.outputs[name]
+        for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False))
+        if not np.isnan(record.outputs.get(name, np.nan)).all()
+    }
+    if not residuals:
+        words = "nothing measured" if result.simulations else "the states diverge: no residuals"
+        axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes, fontsize=TEXT)
+    for k, r in residuals.items():
+        record = result.records[k]
+        rms = np.sqrt(np.nanmean(np.concatenate([*residuals.values()]) ** 2))
+        sigma = (record.sigma or result.errors or {}).get(name, rms)
+        t, size = record.axis.scale * record.t, np.broadcast_to(2 * np.asarray(sigma), record.t.shape)
+        axes.fill_between(t, -size, size, color=BAND, lw=0, zorder=0.5)
+        axes.plot(t, r, **_mark(result, k))
+    axes.axhline(0.0, color=QUIET, lw=0.8)
+    _finish(axes, "residual")
+
+
+def draw_parameters(result: Fit, axes: Axes) -> None:
+    """Parameters with their 95 % intervals, below how the search ended."""
+    estimate = result.estimate
+    std = np.full(len(result.parameters), np.nan) if estimate.std is None else estimate.std
+    half = (estimate.coverage_factor or np.nan) * std
+    words = ["no interval" if np.isfinite(value) else "not determined" for value in result.values]
+    draw_intervals(axes, [*zip(result.parameters, result.values.tolist(), half.tolist(), words, strict=True)])
+    state = "converged" if result.converged else "not converged"
+    axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
+
+
+def _legend(result: Fit, above: Any, title: str) -> None:  # noqa: ANN401 - a part of a figure
+    """Records by their marks and lines, above all axes."""
+    from matplotlib.lines import Line2D
+
+    names = record_names([record.name for record in result.records])
+    keys = [
+        Line2D([], [], label=name, **{**_mark(result, k), **_line(result, k, 2)})
+        for k, name in enumerate(names[:MANY])
+    ]
+    if len(names) > MANY:
+        keys.append(Line2D([], [], ls="", label=f"and {len(names) - MANY} more records"))
+    columns = max(1, min(4, 150 // (10 + max(len(str(key.get_label())) for key in keys))))
+    style = {"frameon": False, "fontsize": TEXT, "title_fontsize": TEXT}
+    above.legend(loc="outside upper center", ncols=columns, handles=keys, title=title, **style)
+
+
+def _mark(result: Fit, k: int) -> dict[str, Any]:
+    """Points of a record; of a single one in grey, so that the line of the model is seen on them."""
+    color = DARK if len(result.records) == 1 else look(k)["color"]
+    size = 5.0 if len(result.records[k]) <= 60 else 2.5
+    return {"linestyle": "", "marker": MARKERS[k % len(MARKERS)], "color": color, "ms": size, "alpha": 0.6}
+
+
+def _line(result: Fit, k: int, number: int) -> dict[str, Any]:
+    """Line of a record; a single value is a dash, as a line through it would not show."""
+    style = look(k) if len(result.records) > 1 else {"color": BLUE, "linestyle": "-"}
+    return {**style, "lw": 1.3, "alpha": 1.0, **({"marker": "_", "ms": 22.0} if number == 1 else {})}
+
+
+def _finish(axes: Axes, name: str) -> None:
+    """Name with its unit, powers of ten but no offsets, and room where all values are nearly the same."""
+    axes.set_ylabel(f"{name}, \nmodel unit", fontsize=TEXT)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True, useOffset=False)
+    axes.tick_params(labelsize=TEXT)
+    plain(axes)
+    low, high = axes.dataLim.intervaly
+    size = max(abs(low), abs(high))
+    if 0 < size < np.inf and high - low < 1e-6 * size:
+        axes.set_ylim((low + high) / 2 - 0.1 * size, (low + high) / 2 + 0.1 * size)

@@ -1,0 +1,268 @@
+"""Records: what was measured over time, and what every one of several records has for itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import FloatArray
+from rotorid.base.unit_words import Shown
+from rotorid.identify.ode import OdeModel
+
+T = TypeVar("T")
+SECONDS = Shown("time, s")
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Samples of outputs and inputs over time.
+
+    Attributes
+    ----------
+    t
+        Shape (n,), s, increasing; the initial values of a model belong to t[0].
+    outputs
+        Measured outputs by name, shape (n,) each; NaN = missing.
+    inputs
+        Measured inputs by name, shape (n,) each, without gaps; straight lines between samples.
+    sigma
+        Standard deviations of outputs by name, a number or shape (n,); None: unknown.
+    name
+        For messages.
+    axis
+        How people see the times.
+
+    Raises
+    ------
+    ValueError
+        Times that do not increase or are not numbers; columns of another length; infinite values; missing
+        inputs; standard deviations that are not above 0.
+    """
+
+    t: FloatArray
+    outputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    inputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    sigma: Mapping[str, float | FloatArray] | None = None
+    name: str = "the record"
+    axis: Shown = SECONDS
+
+    def __post_init__(self) -> None:
+        t = _column(self.t, f"{self.name}: the times")
+        _check_times(t, self.name)
+        object.__setattr__(self, "t", t)
+        for kind in ("outputs", "inputs"):
+            columns = {key: self._samples(value, key) for key, value in getattr(self, kind).items()}
+            object.__setattr__(self, kind, columns)
+        for key, value in self.inputs.items():
+            if np.isnan(value).any():
+                raise ValueError(
+                    f"{self.name}: the input {key} is missing at t = {t[np.isnan(value)][0]:g}; an input "
+                    "needs a value at every time"
+                )
+        if self.sigma is not None:
+            sigma = {key: self._deviation(value, key) for key, value in self.sigma.items()}
+            object.__setattr__(self, "sigma", sigma)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def _samples(self, value: ArrayLike, key: str) -> FloatArray:
+        column = _column(value, f"{self.name}: {key}")
+        if len(column) != len(self):
+            raise ValueError(f"{self.name}: {key} has {len(column)} values, but there are {len(self)} times")
+        if np.isinf(column).any():
+            at = np.flatnonzero(np.isinf(column))[0]
+            raise ValueError(f"{self.name}: {key} is infinite in row {at + 1}; leave missing samples empty")
+        return column
+
+    def _deviation(self, value: float | FloatArray, key: str) -> float | FloatArray:
+        if key not in self.outputs:
+            raise ValueError(f"{self.name}: a standard deviation is given for {key}, which is no output")
+        array = np.array(value, dtype=float)
+        if array.shape not in ((), self.t.shape):
+            raise ValueError(
+                f"{self.name}: the standard deviation of {key} is one number or {len(self)}, one per time"
+            )
+        missing = np.isnan(self.outputs[key]) & (array.ndim > 0)
+        if not np.all((np.isfinite(array) & (array > 0)) | missing):
+            raise ValueError(f"{self.name}: the standard deviation of {key} must be above 0")
+        return array if array.ndim else float(array)
+
+
+def from_t0(model: OdeModel, record: Record) -> Record:
+    """The record with one more time, without samples, where the initial values belong to an earlier one.
+
+    Raises
+    ------
+    ValueError
+        A record that begins before that time, or one with inputs, which are not known there.
+    """
+    if not isinstance(model.t0, float | int) or model.t0 == record.t[0] or not model.states:
+        return record
+    begins = f"{record.name} begins at t = {record.t[0]:g} s"
+    if record.t[0] < model.t0:
+        raise ValueError(f"{begins}, before t0 = {model.t0:g} s of [initial]")
+    if model.driven:
+        raise ValueError(
+            f"{begins}: its inputs are not known from t0 = {model.t0:g} s on; begin the record there"
+        )
+    sigma = record.sigma and {
+        name: np.append(np.nan, s) if isinstance(s, np.ndarray) else s for name, s in record.sigma.items()
+    }
+    outputs = {name: np.append(np.nan, column) for name, column in record.outputs.items()}
+    inputs = {name: np.append(column[0], column) for name, column in record.inputs.items()}
+    return replace(record, t=np.append(model.t0, record.t), outputs=outputs, inputs=inputs, sigma=sigma)
+
+
+def refined(record: Record, every: int) -> Record:
+    """The times of a record and others between them, with its inputs."""
+    t = np.interp(np.arange(every * (len(record) - 1) + 1) / every, np.arange(len(record)), record.t)
+    inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
+    return Record(t, {}, inputs, None, record.name)
+
+
+def inputs_of(model: OdeModel, record: Record) -> FloatArray:
+    """Inputs of the model in its order, (n, n_u)."""
+    if missing := [name for name in model.inputs if name not in record.inputs]:
+        have = ", ".join(record.inputs) or "none"
+        raise ValueError(f"{record.name}: the input {missing[0]} is missing; inputs are: {have}")
+    columns = [record.inputs[name] for name in model.inputs]
+    return np.array(columns).reshape(len(columns), len(record)).T
+
+
+def record_names(names: Sequence[str]) -> list[str]:
+    """Short names of records that tell them apart: ends of paths, numbers where they are the same.
+
+    Examples
+    --------
+    >>> record_names(["a/run_1.csv", "a/run_2.csv"]), record_names(["a/x.csv", "b/x.csv"])
+    (['run_1.csv', 'run_2.csv'], ['a/x.csv', 'b/x.csv'])
+    >>> record_names(["the record", "the record"])
+    ['record 1', 'record 2']
+    """
+    if len(set(names)) < len(names):
+        return [f"record {k + 1}" for k in range(len(names))]
+    parts = [PurePath(name).parts or (name,) for name in names]
+    for depth in range(1, max(len(part) for part in parts) + 1):
+        short = ["/".join(part[-depth:]) for part in parts]
+        if len(set(short)) == len(short):
+            return short
+    return list(names)
+
+
+def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
+    """The model of each record, all with the same parameters: x0 of the second record is called x0_2.
+
+    Parameters
+    ----------
+    model
+        With `per_record`, the names of what every record has for itself.
+    count
+        Of records; with one there is nothing to tell apart.
+    """
+    if not model.per_record or count < 2:
+        return (model,) * count
+    import sympy
+
+    copies = _copies(model, count)
+    place = [model.parameters.index(name) for name in model.parameters for _ in copies[name]]
+    one_for_all = replace(
+        model,
+        parameters=tuple(copy for name in model.parameters for copy in copies[name]),
+        start=model.start[place],
+        bounds=model.bounds[place],
+        per_record=(),
+    )
+    models = []
+    for i in range(count):
+        put = {sympy.Symbol(name): sympy.Symbol(copies[name][i]) for name in model.per_record}
+        rates, initial, observed, inertia = (
+            tuple(e.subs(put) for e in part)
+            for part in (model.rates, model.initial, model.observed, model.inertia)
+        )
+        models.append(replace(one_for_all, rates=rates, initial=initial, observed=observed, inertia=inertia))
+    return tuple(models)
+
+
+def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, float]:
+    """What the first samples say of initial states taken from the record, by name of the copies.
+
+    They are starting values alone. [F] holds y(t0) at its sample ȳ0 = y0 + e, so that the estimate of θ
+    carries e without saying so. Here y0 is estimated, too: the row of the sample, (y0 − ȳ0)/σ0, is its
+    measurement, and a prior of the same value would count it twice. With A = ∂y/∂θ and V = ∂y/∂y0 of all
+    samples over their σ the covariance of θ is the inverse of AᵀA − AᵀV (VᵀV)⁻¹ VᵀA, never less than
+    (AᵀA)⁻¹, which takes y0 as known. From an exact record this finds what [F] finds.
+
+    Raises
+    ------
+    ValueError
+        A record without that sample.
+    """
+    copies, starts = _copies(model, len(records)), {}
+    for name, output in model.recorded.items():
+        for copy, record in zip(copies[name], records, strict=True):
+            first = float(record.outputs[output][0]) if output in record.outputs else math.nan
+            if math.isnan(first):
+                raise ValueError(
+                    f"{record.name}: {output} has no sample at the first time, t = {record.t[0]:g} s, where "
+                    f"[initial] takes it from the record; give a number there, or a parameter"
+                )
+            starts[copy] = first
+    return starts
+
+
+def for_copies(model: OdeModel, count: int, given: Mapping[str, T]) -> dict[str, T]:
+    """Values by name of the model, or of a copy, as values by name of the copies."""
+    copies = _copies(model, count)
+    return {copy: value for name, value in given.items() for copy in copies.get(name, (name,))}
+
+
+def _copies(model: OdeModel, count: int) -> dict[str, tuple[str, ...]]:
+    """Copies of each parameter."""
+    taken = {*model.parameters, *model.states, *model.inputs}
+
+    def numbered(name: str, gap: str) -> Iterable[str]:
+        return (f"{name}{gap}{i + 1}" for i in range(count))
+
+    copies: dict[str, tuple[str, ...]] = {}
+    for name in model.parameters:
+        gap = "_"
+        while taken & {*numbered(name, gap)}:
+            gap += "_"
+        own = name in model.per_record and count > 1
+        copies[name] = tuple(numbered(name, gap)) if own else (name,)
+    return copies
+
+
+def _column(value: ArrayLike, what: str) -> FloatArray:
+    try:
+        column = np.array(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what} must be numbers") from error
+    if column.ndim != 1:
+        raise ValueError(f"{what} must be one column, not of shape {column.shape}")
+    return column
+
+
+def _check_times(t: FloatArray, name: str) -> None:
+    if len(t) == 0:
+        raise ValueError(f"{name} has no samples")
+    if (bad := np.flatnonzero(~np.isfinite(t))).size:
+        raise ValueError(f"{name}: the time in row {bad[0] + 1} is missing or infinite")
+    if (back := np.flatnonzero(np.diff(t) <= 0)).size:
+        i = int(back[0])
+        if t[i] == t[i + 1]:
+            raise ValueError(
+                f"{name}: the time {t[i]:g} is repeated in row {i + 2}; merge these samples, or use one "
+                "record for each run"
+            )
+        raise ValueError(
+            f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}; "
+            "sort the rows by time"
+        )

@@ -1,0 +1,185 @@
+"""Simulation of a model over a record's times with its sensitivities: chooses the integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import FloatArray, significant
+from rotorid.base.registry import Method, find
+from rotorid.identify.adaptive_steps import LARGEST, adaptive, diverged
+from rotorid.identify.integrators import HEUN, System, exact, stepwise
+from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.records import Record, from_t0, inputs_of
+
+STEPWISE = (*HEUN, "rk4")
+"""Integrators without error control, of one step from sample to sample."""
+Integrate = Callable[[System, float], tuple[FloatArray, str]]
+"""System and rtol → states and sensitivities (n, size), and the integrator used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """States and outputs over time, and their derivatives by the parameters.
+
+    Attributes
+    ----------
+    t
+        Shape (n,).
+    x, y
+        States (n, n_x) and outputs (n, n_y).
+    S, y_theta
+        Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
+    integrator
+        The one used: "none" without states.
+    steps
+        Of "dop853" or "lsoda".
+    """
+
+    t: FloatArray
+    x: FloatArray
+    S: FloatArray
+    y: FloatArray
+    y_theta: FloatArray
+    integrator: str
+    steps: int = 0
+
+
+@np.errstate(all="ignore")  # what is not finite is looked for
+def simulate(
+    model: OdeModel,
+    theta: ArrayLike,
+    record: Record | ArrayLike,
+    *,
+    integrator: str = "auto",
+    rtol: float = 1e-10,
+    sensitivities: bool = True,
+) -> Trajectory:
+    """Solve a model over the times of a record.
+
+    Parameters
+    ----------
+    model
+        The model.
+    theta
+        Parameters, shape (n_p,).
+    record
+        Times and inputs; times alone (n,) for a model without inputs.
+    integrator
+        One of `INTEGRATORS`.
+    rtol
+        Relative tolerance of "dop853" and "lsoda"; the absolute one follows the size of each state.
+    sensitivities
+        Whether to solve for the derivatives too.
+
+    Raises
+    ------
+    SimulationError
+        The solution does not exist up to the last time, or takes too many steps.
+    ValueError
+        An integrator that does not suit the model, missing inputs.
+    """
+    integrate = find(INTEGRATORS, integrator, "integrator").function
+    given = record if isinstance(record, Record) else Record(np.asarray(record), name="the times")
+    values = np.asarray(theta, dtype=float)
+    if values.shape != (len(model.parameters),) or not np.isfinite(values).all():
+        raise ValueError(
+            f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
+        )
+    whole = from_t0(model, given)
+    t, u, n = whole.t, inputs_of(model, whole), len(model.states)
+    size, used, steps = n * (1 + sensitivities * len(values)), "none", 0
+    table = np.zeros((len(t), 0))
+    if n:
+        system = System(model, values, t, u, sensitivities)
+        _check(model, t[:1], system.first[None])
+        table, used = integrate(system, rtol)
+        steps = system.steps
+        _check(model, t, table)
+    x, S = table[:, :n], table[:, n:size].reshape(len(t), n, -1) if sensitivities and n else None
+    if S is None:
+        S = np.zeros((len(t), n, len(values)))
+    outputs = model.h(t, x, values, u)
+    y, y_theta = outputs[..., 0], outputs[..., 1 : 1 + n] @ S + outputs[..., 1 + n :]
+    y_theta = y_theta if sensitivities else np.zeros_like(y_theta)
+    bad = ~(np.isfinite(y) & np.isfinite(y_theta).all(axis=-1))
+    if bad.any():
+        i, j = np.argwhere(bad)[0]
+        raise SimulationError(
+            f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
+            "the output"
+        )
+    late = len(t) - len(given)
+    return Trajectory(t[late:], x[late:], S[late:], y[late:], y_theta[late:], used, steps)
+
+
+def simulated_record(
+    model: OdeModel,
+    theta: FloatArray,
+    plan: Record,
+    sigma: Mapping[str, float] | None = None,
+    digits: int | None = None,
+    seed: int = 0,
+) -> Record:
+    """What would be read of a model's outputs at the times and with the inputs of a record.
+
+    Independent normal errors of standard deviations `sigma` are drawn, then samples are rounded to
+    significant digits. Errors as in `simulate`.
+    """
+    y = simulate(model, theta, plan, sensitivities=False).y
+    if sigma is not None:
+        errors = np.random.default_rng(seed).standard_normal(y.shape)
+        y = y + errors * [sigma[name] for name in model.outputs]
+    columns = y.T if digits is None else [significant(column, digits) for column in y.T]
+    return replace(plan, outputs=dict(zip(model.outputs, columns, strict=True)), sigma=sigma)
+
+
+def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
+    """Refuse states and sensitivities (n, size) that have diverged, with the time and the state."""
+    n = len(model.states)
+    lost = np.logical_not(np.abs(table[:, :n]) < LARGEST)
+    unsure = np.logical_not(np.isfinite(table[:, n:].reshape(len(t), n, -1)).all(axis=-1))
+    for i in np.flatnonzero((lost | unsure).any(axis=1))[:1]:
+        j = int(np.argmax(lost[i] if lost[i].any() else unsure[i]))
+        value = f"{table[i, j]:.3g}" if lost[i].any() else "not finite in its sensitivity to the parameters"
+        raise diverged(model, float(t[i]), j, value)
+
+
+def _auto(system: System, rtol: float) -> tuple[FloatArray, str]:
+    return (exact(system), "expm") if system.model.linear_driven else adaptive(system, rtol, "auto")
+
+
+def _adaptive(name: str) -> Integrate:
+    return lambda system, rtol: adaptive(system, rtol, name)
+
+
+def _stepwise(name: str) -> Integrate:
+    return lambda system, _: (stepwise(system, name), name)
+
+
+INTEGRATORS: tuple[Method[Integrate], ...] = (
+    Method("auto", "expm if possible, else dop853, and lsoda where that needs too many steps", _auto),
+    Method(
+        "expm",
+        "the exact solution of a linear model with constant coefficients",
+        lambda system, _: (exact(system), "expm"),
+    ),
+    Method("dop853", "error control, for smooth models", _adaptive("dop853")),
+    Method("lsoda", "error control, for stiff models", _adaptive("lsoda")),
+    Method(
+        "taylor",
+        "Taylor series, compiled for the model: for long or many fits, with the extra rotorid[fast]",
+        _adaptive("taylor"),
+    ),
+    Method("heun", "one step from sample to sample", _stepwise("heun")),
+    Method(
+        "sequential-heun",
+        "the scheme of [Q], to repeat its tables: heun, but each state is corrected with those before it in "
+        "the model, whose order matters",
+        _stepwise("sequential-heun"),
+    ),
+    Method("rk4", "one step from sample to sample, as [F]", _stepwise("rk4")),
+)

@@ -1,1 +1,0 @@
-"""Solutions of a model in time, with their sensitivities to the parameters."""

@@ -1,1 +1,0 @@
-"""Ways to the parameters of a model in time."""

@@ -1,1 +1,0 @@
-"""Models in time and the records that they are fitted to."""

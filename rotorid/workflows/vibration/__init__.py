@@ -1,1 +1,0 @@
-"""From measured vibration: modes and critical speeds."""

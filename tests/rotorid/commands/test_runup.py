@@ -1,0 +1,170 @@
+"""`rotorid runup`: what it prints and writes, what reads it, pictures, and options that cannot be."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_ups import drawn, table
+
+from rotorid.base.rpm import RPM
+from rotorid.samples import sample_data
+from rotorid.tables import read_modes, read_rotor
+from rotorid.tables.data.frequency_table import read_frequencies
+from rotorid.tables.runs.vectors_table import read_vectors
+from rotorid.workflows import RunUpOptions, runup
+
+
+@pytest.fixture(scope="module")
+def rotor_and_sweep():
+    return drawn()
+
+
+@pytest.fixture
+def vectors(rotor_and_sweep, tmp_path):
+    return table(tmp_path / "vectors.csv", [rotor_and_sweep[1]])
+
+
+def test_the_document(cli, rotor_and_sweep, vectors):
+    rotor, _ = rotor_and_sweep
+    document = cli("runup", vectors, "--phase", "lead", "--json").json
+    assert document["warnings"] == []
+    assert document["acceleration_rad_s2"] == pytest.approx(100 / RPM, rel=1e-3)
+    for mode, omega, zeta in zip(document["modes"], rotor.omega, rotor.zeta, strict=True):
+        assert abs(mode["frequency_rad_s"] - omega) < 4 * mode["std"]["frequency_rad_s"]
+        assert abs(mode["damping_ratio"] - zeta) < 4 * mode["std"]["damping_ratio"]
+        assert mode["critical_speed_rpm"] == pytest.approx(mode["frequency_rad_s"] * RPM)
+        low, high = mode["ci95"]["damping_ratio"]
+        assert high - low == pytest.approx(2 * 1.95996 * mode["std"]["damping_ratio"], rel=1e-4)
+        assert mode["steady"]["frequency_rad_s"] > omega * 1.002
+    for roll, exact in zip(document["slow_roll"], rotor.run_out, strict=True):
+        found = roll["amplitude_um_pp"] * np.exp(1j * np.radians(roll["phase_deg"]))
+        assert abs(found - 2e6 * exact) < 5 * roll["std_um_pp"]
+
+
+@pytest.mark.full
+def test_lag_is_the_same_and_the_wrong_way_is_told(cli, rotor_and_sweep, vectors, tmp_path):
+    lag = table(tmp_path / "lag.csv", [rotor_and_sweep[1]], lag=True)
+    known, same = (
+        cli("runup", file, "--phase", phase, "--json").json
+        for file, phase in ((vectors, "lead"), (lag, "lag"))
+    )
+    for one, other in zip(known["modes"], same["modes"], strict=True):
+        assert one["frequency_rad_s"] == pytest.approx(other["frequency_rad_s"], rel=1e-7)
+    assert same["slow_roll"][0]["phase_deg"] == pytest.approx(
+        360 - known["slow_roll"][0]["phase_deg"], rel=1e-5
+    )
+    wrong = cli("runup", lag, "--phase", "lead", "--json").json
+    assert wrong["modes"] == []
+    assert "modes explain them as lags (--phase lag)" in wrong["warnings"][0]
+    assert cli("runup", lag, "--output", tmp_path / "m.csv").code == 2
+
+
+def test_acceleration_may_be_an_option(cli, rotor_and_sweep, tmp_path):
+    rotor, sweep = rotor_and_sweep
+    once = np.unique(sweep.speeds, return_index=True)[1]  # two may be written alike
+    bare = table(tmp_path / "bare.csv", [sweep.take(once)], time=False)
+    held = cli("runup", bare, "--json").json
+    assert held["acceleration_rad_s2"] is None
+    assert held["modes"][0]["steady"] is None
+    assert "nobody says how fast the speed changes" in " ".join(cli("runup", bare).out.split())
+    told = cli("runup", bare, "--acceleration", "100rpm/s", "--json").json
+    mode = told["modes"][0]
+    assert abs(mode["frequency_rad_s"] - rotor.omega[0]) < 4 * mode["std"]["frequency_rad_s"]
+    down = cli("runup", bare, "--acceleration=-100rpm/s", "--json").json
+    assert down["acceleration_rad_s2"] == pytest.approx(-100 / RPM, rel=1e-3)
+    assert down["warnings"]  # the rotor ran up
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--acceleration", "50rpm/s"), "--acceleration: the table has times"),
+        (("--acceleration", "50"), "a speed a second is needed"),
+        (("--run", "run-upp"), "there is no run 'run-upp' (did you mean 'run-up'?)"),
+        (("--sensors", "C"), "run 'run-up' has no sensor 'C'"),
+        (("--slow-roll", "100"), "no vector at or below 100 rpm"),
+        (("--slow-roll", "no.csv"), "no.csv"),
+        (("--bands", "700"), "--bands '700' is not a range: use LOWEST:HIGHEST, in rpm"),
+        (("--speeds", "100"), "goes from 300 rpm to"),
+    ],
+)
+def test_options_that_cannot_be(cli, vectors, monkeypatch, tmp_path, words, message):
+    monkeypatch.chdir(tmp_path)
+    found = cli("runup", vectors, *words)
+    assert found.code == 2
+    assert message in found.err
+
+
+def test_of_several_runs_one_is_chosen(cli, rotor_and_sweep, tmp_path):
+    _, sweep = rotor_and_sweep
+    both = [replace(sweep, run="A"), replace(sweep, run="B", vectors=sweep.vectors * 1.3j)]
+    path = table(tmp_path / "both.csv", both, lag=True)
+    found = cli("runup", path, "--phase", "lag")
+    assert found.code == 2
+    assert "say with --run whose modes to fit, A or B" in found.err
+    runs = tmp_path / "runs.csv"
+    words = ("--phase", "lag", "--run", "A", "--speeds", "1400,1500", "--output", runs)
+    document = cli("runup", path, *words, "--json").json
+    assert [row["run"] for row in document["vectors"]] == ["A"] * 4 + ["B"] * 4
+    written = {sweep.run: sweep for sweep in read_vectors(runs, "lag")}
+    np.testing.assert_allclose(written["A"].speeds * RPM, [1400, 1500])
+    ratio = written["B"].vectors / written["A"].vectors
+    np.testing.assert_allclose(ratio, 1.3j, atol=0.1)
+
+
+def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
+    """By `reduce` and `calibrate`, as critical speeds and not as frequencies at rest."""
+    _, sweep = rotor_and_sweep
+    path, output = table(tmp_path / "v.csv", [replace(sweep, sensors=("7", "18"))]), tmp_path / "modes.csv"
+    assert cli("runup", path, "--output", output).code == 0
+    rotor = read_rotor(sample_data() / "rotor23.csv")
+    modes = read_modes(output, rotor)
+    assert modes.critical
+    assert modes.nodes == (7, 18)
+    data = read_frequencies(output, rotor).data
+    assert not data.rest
+    np.testing.assert_allclose(data.frequencies, modes.frequencies)
+    reduced = cli("reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json")
+    assert reduced.code == 0
+
+
+def test_slow_roll_of_a_speed_and_of_a_file(cli, vectors, tmp_path):
+    found = cli("runup", vectors, "--slow-roll", "450", "--json").json
+    assert found["slow_roll_from"] == "mean of the vectors at or below 450 rpm"
+    file = tmp_path / "slow.csv"
+    file.write_text("run,speed_rpm,sensor,amplitude_um_pp,phase_deg\ns,200,A,8,10\ns,200,B,6,20\n")
+    document = cli("runup", vectors, "--slow-roll", file, "--json").json
+    assert [row["amplitude_um_pp"] for row in document["slow_roll"]] == pytest.approx([8, 6])
+    assert len(document["provenance"]["inputs"]) == 2
+    for one, other in zip(document["modes"], found["modes"], strict=True):
+        assert one["frequency_rad_s"] == other["frequency_rad_s"]  # the fit has its own
+
+
+def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
+    _, sweep = rotor_and_sweep
+    path = table(tmp_path / "v.csv", [sweep], lag=True)
+    found = runup(path, RunUpOptions(phase="lag"))
+    above, below = found.figure().axes
+    assert above.get_ylabel() == "amplitude, µm pp"
+    assert below.get_ylabel() == "phase (lag), degrees"
+    bottom, top = below.get_ylim()
+    assert bottom > top
+    phase = np.concatenate([line.get_ydata() for line in below.lines[:1]])
+    assert np.abs(np.diff(phase)).max() < 180
+
+
+def test_vectors_of_python(rotor_and_sweep):
+    rotor, sweep = rotor_and_sweep
+    found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])], slow_roll=47.0))
+    assert len(found.to_dict()["modes"]) == 1
+    assert json.dumps(found.document)
+
+
+def test_a_mode_that_is_passed_within_few_turns_is_said(tmp_path, cli):
+    """ζω²/(πα): of this rotor 5 turns at 300 rpm a second, 16 at 100."""
+    for rate, many in ((300.0, True), (100.0, False)):
+        rotor, sweep = drawn(rate=rate)
+        warnings = cli("runup", table(tmp_path / "v.csv", [sweep]), "--json").json["warnings"]
+        turns = rotor.zeta * rotor.omega**2 / (np.pi * rate / RPM)
+        assert any("is passed within" in words for words in warnings) == many == (turns.min() < 6)

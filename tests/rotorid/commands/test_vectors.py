@@ -1,0 +1,137 @@
+"""`vectors` and jobs that read waveforms: one answer, whichever way they go."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import wavfile
+
+from rotorid.samples import sample_data
+from rotorid.tables.reader.problems import InputError
+from rotorid.workflows import BalanceOptions, VectorsOptions, balance, vectors
+
+SAMPLE = sample_data() / "waveforms"
+RATE = 2048
+
+
+def write(path: Path, *, turns=None, phase=0.6, size=0.2, offset=0.0, pulses=1):
+    """A WAV file of 6 s: a tacho, and a sensor that reads size·cos(θ + phase)."""
+    t = np.arange(6 * RATE) / RATE
+    turns = 17.3 * t if turns is None else turns(t)
+    x = size * np.cos(2 * np.pi * turns + phase) + offset
+    x += 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    tacho = np.where(turns * pulses % 1 < 0.05 * pulses, 0.5, 0.0)
+    wavfile.write(path, RATE, np.stack((tacho, x), axis=1).astype(np.float32))
+    return path
+
+
+def test_the_table_is_what_balance_reads(tmp_path):
+    found = vectors([SAMPLE / "waveforms.toml"], VectorsOptions())
+    table = tmp_path / "runs.csv"
+    found.to_frame().to_csv(table, index=False)
+    job = tmp_path / "job.toml"
+    slow = vectors([SAMPLE / "slow_roll.toml"], VectorsOptions())
+    slow.to_frame().to_csv(tmp_path / "slow.csv", index=False)
+    text = (SAMPLE / "job.toml").read_text(encoding="utf-8")
+    text = text.replace("waveforms.toml", "runs.csv").replace("slow_roll.toml", "slow.csv")
+    job.write_text(text, encoding="utf-8")
+    (tmp_path / "weights.csv").write_bytes((SAMPLE / "weights.csv").read_bytes())
+    direct = balance(SAMPLE / "job.toml", BalanceOptions()).to_dict()
+    typed = balance(job, BalanceOptions()).to_dict()
+    assert direct["corrections"] == typed["corrections"]
+    assert direct["warnings"] == typed["warnings"]
+    other = balance(job, BalanceOptions(waveforms=SAMPLE / "waveforms.toml")).to_dict()
+    assert other["corrections"] == typed["corrections"]
+
+
+def test_the_sample_is_balanced_by_its_records():
+    """The unbalances of make_data.py are 9 g at 75° and 6 g at 200°; the slow roll holds some of them."""
+    found = balance(SAMPLE / "job.toml", BalanceOptions()).to_dict()
+    weights = [row["mass"] * np.exp(1j * np.radians(row["angle_deg"])) for row in found["corrections"]]
+    exact = -9 * np.exp(1j * np.radians(75)), -6 * np.exp(1j * np.radians(200))
+    assert np.abs(np.array(weights) - exact) == pytest.approx([0, 0], abs=0.6)
+    assert found["conventions"]["phase"] == "lag"
+    assert {Path(entry["file"]).suffix for entry in balance(SAMPLE / "job.toml").provenance["inputs"]} == {
+        ".toml",
+        ".csv",
+        ".wav",
+    }
+
+
+@pytest.mark.parametrize("word", ["lead", "lag"])
+def test_phase_is_written_as_asked(tmp_path, word):
+    """Lag: the angle that the rotor turns from the mark to the positive peak."""
+    file = write(tmp_path / "a.wav", phase=0.6)
+    (row,) = vectors([file], VectorsOptions(tacho="1", unit="um", phase=word)).to_dict()["rows"]
+    expected = np.degrees(0.6) if word == "lead" else 360 - np.degrees(0.6)
+    assert row["phase_deg"] == pytest.approx(expected, abs=0.5)
+    assert row["amplitude_um"] == pytest.approx(0.2, rel=1e-3)
+    assert row["speed_rpm"] == pytest.approx(17.3 * 60, rel=1e-4)
+
+
+def test_units_of_vectors(tmp_path):
+    file = write(tmp_path / "a.wav", offset=1.5)
+    options = VectorsOptions(tacho="1", unit="um", phase="lead", amplitude="um_pp")
+    (row,) = vectors([file], options).to_dict()["rows"]
+    assert row["amplitude_um_pp"] == pytest.approx(0.4, rel=1e-3)
+    assert row["overall_um_pp"] == pytest.approx(0.4, rel=0.03)
+    assert row["gap_um"] == pytest.approx(1.5, rel=1e-3)
+    speed = 2 * np.pi * 17.3
+    options = VectorsOptions(tacho="1", unit="um", phase="lead", amplitude="mm_s_rms")
+    (row,) = vectors([file], options).to_dict()["rows"]
+    assert row["amplitude_mm_s_rms"] == pytest.approx(0.2e-3 * speed / np.sqrt(2), rel=1e-3)
+    assert row["phase_deg"] == pytest.approx(np.degrees(0.6) + 90, abs=0.5)
+    assert row["gap_mm_s"] is None
+
+
+def test_command_line(cli, tmp_path):
+    result = cli("vectors", SAMPLE / "waveforms.toml", "--json", "--output", tmp_path / "runs.csv")
+    assert result.code == 0, result.err
+    document = result.json
+    assert document["tacho"]["missing"] == document["tacho"]["double"] == 0
+    assert document["tacho"]["pulses"] == 389
+    assert document["warnings"] == []
+    table = pd.read_csv(tmp_path / "runs.csv")
+    assert table["amplitude_um_pp"].tolist() == [row["amplitude_um_pp"] for row in document["rows"]]
+    assert {entry["run"] for entry in document["runs"]} == {"as_found", "trial_left", "trial_right"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--unit", "um"), "a tacho channel, without which there is no phase: --tacho NAME"),
+        (("--tacho", "9"), "a channel of this name"),
+        (("--tacho", "1", "--orders", "0"), "--orders takes whole numbers from 1 to 20"),
+        (("--tacho", "1", "--speeds", "9000rpm"), "there is no speed of 9000 rpm"),
+        (("--tacho", "1", "--pulses", "0"), "pulses"),
+        (("--tacho", "1", "--edge", "left"), "leading"),
+        (
+            ("--tacho", "1", "--amplitude", "um", "--unit", "V"),
+            "a unit that can become that of the amplitudes",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_message(cli, words, message):
+    result = cli("vectors", SAMPLE / "run_up.wav", *words)
+    assert result.code == 2
+    assert message in result.err.replace("\n", " ")
+
+
+def test_pulses_that_are_alike_do_not_compare_records(tmp_path):
+    files = [write(tmp_path / f"{name}.wav", pulses=2) for name in "ab"]
+    options = VectorsOptions(tacho="1", unit="um", pulses=2)
+    (one,) = vectors(files[:1], options).result
+    assert "multiples of 180°" in one.warnings[0]
+    with pytest.raises((ValueError, InputError), match="vectors of different records cannot be compared"):
+        vectors(files, options)
+
+
+def test_a_job_names_what_is_wrong_with_its_records(cli, tmp_path):
+    (tmp_path / "w.toml").write_text('tacho = "1"\nrecords = { a = "gone.wav" }\n', encoding="utf-8")
+    (tmp_path / "w.csv").write_text("run,plane,mass_g,angle_deg\n", encoding="utf-8")
+    (tmp_path / "job.toml").write_text('runs = "w.toml"\nweights = "w.csv"\n', encoding="utf-8")
+    result = cli("balance", tmp_path / "job.toml")
+    assert result.code == 2
+    assert "gone.wav" in result.err
+    assert "a file that exists" in result.err.replace("\n", " ")
