@@ -47,7 +47,7 @@ def test_its_stated_error_holds():
         tacho = read(5.0 * (turns % 1 < 0.05))
         t = np.linspace(1, 19, 40)
         off = tacho.turn_at(t) - np.interp(t, T, turns)
-        ratios.append((off - np.round(off.mean())) / tacho.angle.deviation(t))
+        ratios.append((off - np.round(off.mean())) / tacho.error_at(t))
     assert np.mean(np.abs(ratios) < 1.96) == pytest.approx(0.95, abs=0.05)
 
 
