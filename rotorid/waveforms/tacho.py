@@ -142,34 +142,11 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     times, grid = every[kept], np.arange(index[-1] + 1)
     lost, kind = np.setdiff1d(grid, index), index % pulses
     many = np.bincount(kind, minlength=pulses)
-    trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
-    place, speed = np.interp(grid, index, times), trend.deriv()(times)
-    sampled, offsets = sharp / (12 * rate**2), np.zeros(pulses)
-    variance, gram = np.mean(speed**2) + 0 * speed, np.zeros((4, len(grid)))
-    right = np.zeros(len(grid))
-    edges, angle = np.sort(np.concatenate((rising, falling))) / rate, trend
+    edges, sampled = np.sort(np.concatenate((rising, falling))) / rate, sharp / (12 * rate**2)
     other = edges[np.minimum(np.searchsorted(edges, times, "right"), len(edges) - 1)]
-    for _ in range(ROUNDS):
-        gram[0, index] = 1 / variance
-        ahead = index / pulses + offsets[kind] - trend(times)
-        # the mark's other edge tells as much, where it keeps its distance
-        apart = angle(other) - angle(times)
-        apart -= np.median(apart)
-        usual = np.abs(apart) < WIDE * np.median(np.abs(apart)) + EXACT
-        half = len(apart) // 2
-        drift = np.median(apart[:half]) - np.median(apart[half:])
-        usual &= np.abs(drift) < WIDE * np.median(np.abs(apart)) / np.sqrt(half)
-        right[index] = (ahead - usual * apart / 2) / variance
-        smoothing, course = smooth(gram, right)
-        angle = CubicSpline(place, course + trend(place))
-        ahead -= course[index]
-        offsets -= np.bincount(kind, ahead, pulses) / np.maximum(many, 1)
-        offsets -= offsets[0]
-        speed = angle(times, 1)
-        scatter = np.minimum(ahead**2, OUTLYING * np.median(ahead**2)).mean()
-        worn = max(0.0, scatter - sampled * np.mean(speed**2))
-        variance = sampled * speed**2 + worn + EXACT**2
-    jitter = float(np.sqrt(np.median(variance)))
+    angle, errors, offsets, ahead, worn = _angle(times, other, index, pulses, sampled)
+    speed = angle(times, 1)
+    jitter = float(np.sqrt(np.median(sampled * speed**2 + worn)))
     # the turn begins after the longest gap, of a tooth that is not there, say
     present = np.flatnonzero(many >= RARE * many.max())
     marks = present / pulses + offsets[present]
@@ -208,9 +185,46 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
         offset_s=float(np.hypot(unseen, np.sqrt(worn / len(times)) / np.median(speed))),
         warnings=tuple(words),
         angle=angle,
-        errors=np.sqrt(smoothing.covariance[0]),
+        errors=errors,
         indexed=indexed,
     )
+
+
+def _angle(
+    times: FloatArray, other: FloatArray, index: IntArray, pulses: int, sampled: float
+) -> tuple[CubicSpline, FloatArray, FloatArray, FloatArray, float]:
+    """The angle, its errors, the offset of each pulse of a turn, and what pulses are ahead of it, all in turns.
+
+    And the variance of the marks, turns²; `sampled` is that of the times, s², `other` those of the marks'
+    other edges.
+    """
+    grid, kind = np.arange(index[-1] + 1), index % pulses
+    trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
+    place, speed = np.interp(grid, index, times), trend.deriv()(times)
+    offsets, angle = np.zeros(pulses), trend
+    variance, gram = np.mean(speed**2) + 0 * speed, np.zeros((4, len(grid)))
+    right = np.zeros(len(grid))
+    for _ in range(ROUNDS):
+        gram[0, index] = 1 / variance
+        ahead = index / pulses + offsets[kind] - trend(times)
+        # the mark's other edge tells as much, where it keeps its distance
+        apart = angle(other) - angle(times)
+        apart -= np.median(apart)
+        usual = np.abs(apart) < WIDE * np.median(np.abs(apart)) + EXACT
+        early, late = np.array_split(apart[usual], 2)
+        if np.abs(early.mean() - late.mean()) > WIDE * np.std(apart[usual]) / np.sqrt(len(early)):
+            usual[:] = False
+        right[index] = (ahead - usual * apart / 2) / variance
+        smoothing, course = smooth(gram, right)
+        angle = CubicSpline(place, course + trend(place))
+        ahead -= course[index]
+        offsets -= np.bincount(kind, ahead, pulses) / np.maximum(np.bincount(kind, minlength=pulses), 1)
+        offsets -= offsets[0]
+        speed = angle(times, 1)
+        scatter = np.minimum(ahead**2, OUTLYING * np.median(ahead**2)).mean()
+        worn = max(0.0, scatter - sampled * np.mean(speed**2))
+        variance = sampled * speed**2 + worn + EXACT**2
+    return angle, np.sqrt(smoothing.covariance[0]), offsets, ahead, worn
 
 
 def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float]:

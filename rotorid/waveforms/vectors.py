@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import interp1d
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
-from rotorid.waveforms.order_tracking import track_orders
+from rotorid.waveforms.order_tracking import Orders, track_orders
 from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
 from rotorid.waveforms.signal_path import before_path, response
 from rotorid.waveforms.tacho import Tacho, read_tacho
@@ -25,8 +25,8 @@ range, are equal."""
 LEAST_TURNS = 2.0
 """Over which the overall level is taken."""
 MOVES, TOLD = 0.1, 3.0
-"""A vector that moves by more, of its size, at a steady speed is worth a word, beside so many times the jitter
-of the tacho; one that is less than so many deviations is noise."""
+"""A vector that moves by more, of its size, at a steady speed is worth a word, beside so many times the
+jitter of the tacho; one that is less than so many deviations is noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,34 +135,24 @@ def _found(
             f"{max(orders)}× is {max(orders) * course.max():.4g} Hz at the highest speed, beyond "
             f"{HIGHEST:g} of the {record.rate:.6g} samples a second"
         )
-    jitter = CALM / STEADY * np.sqrt(2) * tacho.jitter_deg / 360 * settings.pulses
-    step = max(1, len(tacho.times) // WINDOWS, min(int(jitter), len(tacho.times) // 3))
-    means = np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step])
+    means = _means(tacho, settings.pulses)
     steady = bool(np.ptp(means) < STEADY * means.mean())
     tracked = track_orders(record, tacho, max(orders))
-    places, width = tracked.centres, tracked.width
     first, last = tacho.turn_at(np.array(tacho.span))
     if steady:
         course = np.clip(course, means.min(), means.max())
     if speeds is not None:
         times = _passed(tacho, course, speeds)
-    elif steady:
-        times = np.array([np.mean(tacho.span)])
-    else:  # so far apart that vectors share no turns
-        number = np.concatenate(([0.0], np.cumsum((last - first) / len(width) / width)))
-        count = max(2, int(number[-1]))
-        passed = np.interp(
-            (np.arange(count) + 0.5) * number[-1] / count, number, np.linspace(first, last, len(number))
-        )
-        times = np.interp(passed, tacho.turn_at(tacho.angle.x), tacho.angle.x)
+    else:
+        times = np.array([np.mean(tacho.span)]) if steady else _independent(tacho, tracked)
     turns = tacho.turn_at(times)
-    wide = np.interp(turns, places, width)
+    wide = np.interp(turns, tracked.centres, tracked.width)
     wanted, speed = list(orders), tacho.speed_at(times)
     edge = np.minimum(turns - first, last - turns) < wide / 2 * (1 - 1e-9)
     around = np.clip(times + np.multiply.outer((-0.5, 0.5), wide / speed), *tacho.span)
     rise = np.diff(tacho.speed_at(around), axis=0)[0] / np.diff(around, axis=0)[0]
     read, change = tracked.curve(turns), tracked.curve(turns, 1) * speed[:, None, None]
-    deviation = interp1d(places, tracked.errors[:, wanted], axis=0, fill_value="extrapolate")(turns)
+    deviation = interp1d(tracked.centres, tracked.errors[:, wanted], axis=0, fill_value="extrapolate")(turns)
     drawn = tacho.error_at(times)
     if steady:
         wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
@@ -171,46 +161,20 @@ def _found(
         deviation = np.broadcast_to(tracked.mean_errors[wanted], deviation.shape)
         rise, drawn = 0 * rise, 0 * drawn
     w = 2 * np.pi * np.multiply.outer(speed, orders)
-    gap, same = read[:, 0].real.copy(), []
-    vectors, radial = (
-        np.empty((len(times), len(record.sensors), len(orders)), kind) for kind in (complex, float)
-    )
+    dw = w * (rise / speed)[:, None]
+    same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
+    coupled = np.array([sensor.path.high_pass_rad_s is not None for sensor in record.sensors])
+    vectors, radial = read[:, wanted], deviation.copy()
     for c, sensor in enumerate(record.sensors):
-        more = 0 if derivative is None or sensor.derivative is None else sensor.derivative - derivative
-        same.append(derivative in (None, sensor.derivative))
-        if not same[-1] or sensor.path.high_pass_rad_s is not None:
-            gap[:, c] = np.nan
-        vectors[:, c], factor = before_path(
-            response(sensor.path, more),
-            read[:, wanted, c],
-            change[:, wanted, c],
-            w,
-            w * (rise / speed)[:, None],
-        )
-        radial[:, c] = deviation[:, :, c] * factor
+        H = response(sensor.path, 0 if same[c] else (sensor.derivative or 0) - (derivative or 0))
+        vectors[:, :, c], factor = before_path(H, vectors[:, :, c], change[:, wanted, c], w, dw)
+        radial[:, :, c] *= factor
+    vectors, radial = vectors.swapaxes(1, 2), radial.swapaxes(1, 2)
     angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * speed)
     tangential = np.hypot(radial, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None])
     nearby = np.stack((times, np.maximum(wide, LEAST_TURNS) / speed), axis=1)
     overall = np.array([_overall(record, *each) for each in nearby])
-    overall[:, ~np.array(same)] = np.nan
-    once = tracked.curve(places)[:, 1]
-    moves = np.abs(once / tracked.mean[1] - 1).max(axis=0)
-    for c, sensor in enumerate(record.sensors):
-        if not (np.abs(vectors[:, c, 0]) > TOLD * radial[:, c, 0]).any():
-            words.append(
-                f"1× of {sensor.name!r} cannot be told from noise: is the sensor connected, and are the "
-                "pulses a turn right?"
-            )
-        elif steady and moves[c] > MOVES + TOLD * np.radians(tacho.jitter_deg):
-            words.append(
-                f"1× of {sensor.name!r} moves by up to {100 * moves[c]:.0f} % while the speed is steady: the "
-                "mean is given; has the machine settled?"
-            )
-        elif not steady and tracked.fast[c]:
-            words.append(
-                f"1× of {sensor.name!r} is hardly told along the run-up: there is strong noise near it, or "
-                "the speed passes a resonance within so few turns that vectors there are too small"
-            )
+    words += _doubts(record, vectors[:, :, 0], radial[:, :, 0], tracked, tacho.jitter_deg if steady else None)
     return Vectors(
         run=record.run,
         sensors=tuple(sensor.name for sensor in record.sensors),
@@ -221,14 +185,30 @@ def _found(
         radial=radial,
         tangential=tangential,
         turns=wide,
-        overall=overall,
-        gap=gap,
+        overall=np.where(same[:, None], overall, np.nan),
+        gap=np.where(same & ~coupled, read[:, 0].real, np.nan),
         end=edge,
         steady=steady,
         range=2 * np.pi * np.array([course.min(), course.max()]),
         tacho=tacho,
         warnings=tuple(words),
     )
+
+
+def _means(tacho: Tacho, pulses: int) -> FloatArray:
+    """Mean speeds of windows, turns per s."""
+    jitter = CALM / STEADY * np.sqrt(2) * tacho.jitter_deg / 360 * pulses
+    step = max(1, len(tacho.times) // WINDOWS, min(int(jitter), len(tacho.times) // 3))
+    return np.asarray(np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step]))
+
+
+def _independent(tacho: Tacho, tracked: Orders) -> FloatArray:
+    """Times of vectors that share no turns, the first and the last half their turns from the ends."""
+    blocks = np.linspace(*tacho.turn_at(np.array(tacho.span)), len(tracked.width) + 1)
+    number = np.append(0.0, np.cumsum(np.diff(blocks) / tracked.width))
+    count = max(2, int(number[-1]))
+    turns = np.interp((np.arange(count) + 0.5) * number[-1] / count, number, blocks)
+    return np.interp(turns, tacho.turn_at(tacho.angle.x), tacho.angle.x)
 
 
 def _passed(tacho: Tacho, course: FloatArray, speeds: FloatArray) -> FloatArray:
@@ -256,6 +236,33 @@ def _overall(record: WaveformRecord, time: float, around: float) -> FloatArray:
     part = slice(first, max(first + 2, int((time + around / 2) * record.rate)))
     samples = [sensor.samples[part] * sensor.factor for sensor in record.sensors]
     return np.array([(np.ptp(x) / 2, np.sqrt(2.0) * x.std()) for x in samples])
+
+
+def _doubts(
+    record: WaveformRecord,
+    vectors: ComplexArray,
+    deviation: FloatArray,
+    tracked: Orders,
+    jitter: float | None,
+) -> Iterator[str]:
+    """What 1× (P, C) does not tell; with the jitter of the tacho, degrees, where the speed is steady."""
+    moves = np.abs(tracked.curve(tracked.centres)[:, 1] / tracked.mean[1] - 1).max(axis=0)
+    for c, sensor in enumerate(record.sensors):
+        if not (np.abs(vectors[:, c]) > TOLD * deviation[:, c]).any():
+            yield (
+                f"1× of {sensor.name!r} cannot be told from noise: is the sensor connected, and are the "
+                "pulses a turn right?"
+            )
+        elif jitter is not None and moves[c] > MOVES + TOLD * np.radians(jitter):
+            yield (
+                f"1× of {sensor.name!r} moves by up to {100 * moves[c]:.0f} % while the speed is steady: the "
+                "mean is given; has the machine settled?"
+            )
+        elif jitter is None and tracked.fast[c]:
+            yield (
+                f"1× of {sensor.name!r} is hardly told along the run-up: there is strong noise near it, or "
+                "the speed passes a resonance within so few turns that vectors there are too small"
+            )
 
 
 def _checked(sensor: Channel) -> Iterator[str]:

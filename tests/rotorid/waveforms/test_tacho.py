@@ -112,7 +112,7 @@ def test_even_pulses_leave_the_turn_open_and_uneven_ones_do_not():
     assert min(np.abs(offsets(even, zero)).max() for zero in (0, 0.5)) * 360 < 0.3
     uneven = read(pulses((0, 0.4)), pulses=2)
     assert uneven.indexed
-    assert np.abs(offsets(uneven)).max() * 360 < 0.2  # the gap from 0.4 to 1 is the longest
+    assert np.abs(offsets(uneven)).max() * 360 < 0.3  # the gap from 0.4 to 1 is the longest
 
 
 def test_less_than_two_turns_of_a_wheel_are_refused():
@@ -127,7 +127,7 @@ def test_a_wheel_that_lacks_a_tooth():
     tacho = read(teeth, pulses=12, edge="rising")
     assert tacho.indexed
     assert len(tacho.missing) == 0
-    assert np.abs(offsets(tacho)).max() * 360 < 0.2
+    assert np.abs(offsets(tacho)).max() * 360 < 0.3
 
 
 def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
