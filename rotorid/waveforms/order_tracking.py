@@ -77,11 +77,11 @@ def track_orders(record: WaveformRecord, tacho: Tacho, highest: int, size: float
         leak[j], blocks[j] = np.split(np.linalg.lstsq(columns, both, rcond=None)[0], [M], axis=1)
     gram, width = np.zeros((4, n)), np.empty((n, C))
     gram[0] = np.diff(ends) / 2  # mean squares of cosine and sine
-    curve, still = np.zeros((n, highest + 1, C), dtype=complex), blocks
+    curve = np.zeros((n, highest + 1, C), dtype=complex)
     errors, mean_errors = np.empty(curve.shape), np.empty(curve.shape[1:])
     for _ in range(PASSES):
-        moves = np.gradient(curve, axis=0).view(np.float64).reshape(n, highest + 1, C, 2)
-        moves = np.moveaxis(moves, 3, 2).reshape(n, M + 1, C)
+        slope: ComplexArray = np.asarray(np.gradient(curve, axis=0))
+        moves = np.stack((slope.real, slope.imag), axis=2).reshape(n, M + 1, C)
         still = _complex(blocks - leak @ np.delete(moves, 1, axis=1))
         for k, c in np.ndindex(highest + 1, C):
             smoothing, curve[:, k, c] = smooth(gram, gram[0] * still[:, k, c])

@@ -48,8 +48,8 @@ class Smoothing:
 
         Within the band the inverse follows from the factor, from its end on (Takahashi 1973).
         """
-        out, window = np.zeros(self.factor.shape), np.zeros((3, 3))
-        for j in range(out.shape[1] - 1, -1, -1):
+        out, window = np.zeros_like(self.factor), np.zeros((3, 3))
+        for j in range(len(out.T) - 1, -1, -1):
             below = self.factor[1:, j] / self.factor[0, j]
             near = -window @ below
             out[0, j] = 1 / self.factor[0, j] ** 2 - below @ near
@@ -118,9 +118,8 @@ def smooth(gram: FloatArray, right: AnyArray) -> tuple[Smoothing, AnyArray]:
 
     log, w = MIDDLE, np.ones(n)
     for step in STEPS:
-        trials = {at: fitted(at) for at in (log, log - step, log + step)}
-        log = min(trials, key=lambda at: trials[at][0])
-        _, c, smoothing = trials[log]
+        trials = [(at, *fitted(at)) for at in (log, log - step, log + step)]
+        log, _, c, smoothing = min(trials, key=lambda trial: trial[1])
         bend = uniform_filter1d((np.diff(c, 3, axis=0) ** 2).sum(axis=1), NEIGHBOURS, mode="constant")
         likely = columns * smoothing.variance / (per * np.exp(log))
         w = 1 / (bend + EVENING * (bend.mean() + FEW * likely) + 1e-300)

@@ -193,7 +193,7 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
 def _angle(
     times: FloatArray, other: FloatArray, index: IntArray, pulses: int, sampled: float
 ) -> tuple[CubicSpline, FloatArray, FloatArray, FloatArray, float]:
-    """The angle, its errors, the offset of each pulse of a turn, and what pulses are ahead of it, all in turns.
+    """The angle, its errors, offsets of the pulses of a turn, and what pulses are ahead of it, in turns.
 
     And the variance of the marks, turns²; `sampled` is that of the times, s², `other` those of the marks'
     other edges.

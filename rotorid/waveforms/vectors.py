@@ -147,13 +147,13 @@ def _found(
         times = np.array([np.mean(tacho.span)]) if steady else _independent(tacho, tracked)
     turns = tacho.turn_at(times)
     wide = np.interp(turns, tracked.centres, tracked.width)
-    wanted, speed = list(orders), tacho.speed_at(times)
+    wanted, speed, drawn = list(orders), tacho.speed_at(times), tacho.error_at(times)
     edge = np.minimum(turns - first, last - turns) < wide / 2 * (1 - 1e-9)
     around = np.clip(times + np.multiply.outer((-0.5, 0.5), wide / speed), *tacho.span)
     rise = np.diff(tacho.speed_at(around), axis=0)[0] / np.diff(around, axis=0)[0]
     read, change = tracked.curve(turns), tracked.curve(turns, 1) * speed[:, None, None]
-    deviation = interp1d(tracked.centres, tracked.errors[:, wanted], axis=0, fill_value="extrapolate")(turns)
-    drawn = tacho.error_at(times)
+    inside = np.clip(turns, tracked.centres[0], tracked.centres[-1])
+    deviation = interp1d(tracked.centres, tracked.errors[:, wanted], axis=0)(inside)
     if steady:
         wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
         speed = wide / np.ptp(tacho.span)
@@ -161,19 +161,24 @@ def _found(
         deviation = np.broadcast_to(tracked.mean_errors[wanted], deviation.shape)
         rise, drawn = 0 * rise, 0 * drawn
     w = 2 * np.pi * np.multiply.outer(speed, orders)
-    dw = w * (rise / speed)[:, None]
     same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
-    coupled = np.array([sensor.path.high_pass_rad_s is not None for sensor in record.sensors])
+    direct = np.array([sensor.path.high_pass_rad_s is None for sensor in record.sensors])
     vectors, radial = read[:, wanted], deviation.copy()
     for c, sensor in enumerate(record.sensors):
-        H = response(sensor.path, 0 if same[c] else (sensor.derivative or 0) - (derivative or 0))
-        vectors[:, :, c], factor = before_path(H, vectors[:, :, c], change[:, wanted, c], w, dw)
+        more = 0 if derivative is None or sensor.derivative is None else sensor.derivative - derivative
+        vectors[:, :, c], factor = before_path(
+            response(sensor.path, more),
+            vectors[:, :, c],
+            change[:, wanted, c],
+            w,
+            w * (rise / speed)[:, None],
+        )
         radial[:, :, c] *= factor
     vectors, radial = vectors.swapaxes(1, 2), radial.swapaxes(1, 2)
     angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * speed)
     tangential = np.hypot(radial, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None])
-    nearby = np.stack((times, np.maximum(wide, LEAST_TURNS) / speed), axis=1)
-    overall = np.array([_overall(record, *each) for each in nearby])
+    spans = zip(times, np.maximum(wide, LEAST_TURNS) / speed, strict=True)
+    overall = np.array([_overall(record, *each) for each in spans])
     words += _doubts(record, vectors[:, :, 0], radial[:, :, 0], tracked, tacho.jitter_deg if steady else None)
     return Vectors(
         run=record.run,
@@ -186,7 +191,7 @@ def _found(
         tangential=tangential,
         turns=wide,
         overall=np.where(same[:, None], overall, np.nan),
-        gap=np.where(same & ~coupled, read[:, 0].real, np.nan),
+        gap=np.where(same & direct, read[:, 0].real, np.nan),
         end=edge,
         steady=steady,
         range=2 * np.pi * np.array([course.min(), course.max()]),
@@ -204,11 +209,12 @@ def _means(tacho: Tacho, pulses: int) -> FloatArray:
 
 def _independent(tacho: Tacho, tracked: Orders) -> FloatArray:
     """Times of vectors that share no turns, the first and the last half their turns from the ends."""
-    blocks = np.linspace(*tacho.turn_at(np.array(tacho.span)), len(tracked.width) + 1)
+    first, last = tacho.turn_at(np.array(tacho.span))
+    blocks = np.linspace(first, last, len(tracked.width) + 1)
     number = np.append(0.0, np.cumsum(np.diff(blocks) / tracked.width))
     count = max(2, int(number[-1]))
     turns = np.interp((np.arange(count) + 0.5) * number[-1] / count, number, blocks)
-    return np.interp(turns, tacho.turn_at(tacho.angle.x), tacho.angle.x)
+    return np.asarray(np.interp(turns, tacho.turn_at(tacho.angle.x), tacho.angle.x))
 
 
 def _passed(tacho: Tacho, course: FloatArray, speeds: FloatArray) -> FloatArray:
