@@ -104,7 +104,7 @@ def smooth(gram: FloatArray, right: AnyArray) -> tuple[Smoothing, AnyArray]:
     parabolas = np.linalg.qr(np.vander(np.linspace(-1, 1, n + 3), 3))[0]
     trend = parabolas @ (parabolas.T @ data)
     y, left = real - times(gram, trend), data - trend
-    count = max((np.count_nonzero(gram[0]) - 3) * columns, 1)
+    count = max((int(np.count_nonzero(gram[0])) - 3) * columns, 1)
     tiny = 1e-30 * np.vdot(data, real) + 1e-300
 
     def fitted(log: float) -> tuple[float, FloatArray, Smoothing]:
@@ -118,8 +118,10 @@ def smooth(gram: FloatArray, right: AnyArray) -> tuple[Smoothing, AnyArray]:
 
     log, w = MIDDLE, np.ones(n)
     for step in STEPS:
-        trials = [(at, *fitted(at)) for at in (log, log - step, log + step)]
-        log, _, c, smoothing = min(trials, key=lambda trial: trial[1])
+        places = log - step, log, log + step
+        trials = [fitted(at) for at in places]
+        best = int(np.argmin([value for value, _, _ in trials]))
+        log, (_, c, smoothing) = places[best], trials[best]
         bend = uniform_filter1d((np.diff(c, 3, axis=0) ** 2).sum(axis=1), NEIGHBOURS, mode="constant")
         likely = columns * smoothing.variance / (per * np.exp(log))
         w = 1 / (bend + EVENING * (bend.mean() + FEW * likely) + 1e-300)
