@@ -1,4 +1,4 @@
-"""Pictures of records: the tacho, an orbit beside its waveforms, and a waterfall of spectra over speed.
+"""Pictures of records: the tacho, the orbit of two sensors, and a waterfall of spectra over speed.
 
 The mark of a turn is shown as on an oscilloscope: the curve is blank just before it and bright, a dot, at it,
 so that blank to bright is the direction of time. Of a long record only what is drawn is read.
@@ -41,8 +41,8 @@ LINES, TALLEST, SEEN = 48, 0.3, 0.02
 SWEPT, MOST_TURNS = 1.0, 64.0
 """Change of 1× within a spectrum of T, in units of 1/T, to which a flat top stays true to 0.3 % (of 2× to
 1.1 %); and turns within it, at most."""
-FLAT_TOP, FINER = 3.77, 4
-"""Its noise bandwidth, in units of 1/T; steps of the frequency in that unit."""
+FINER = 4
+"""Steps of the frequency in 1/T."""
 RUN_UP = 0.05
 """Share of the speed by which it must change to be an axis."""
 
@@ -206,9 +206,8 @@ def figure_waterfall(
             text = ax.text(each * speed[-1], 1.0, f"{each:g}×", transform=ax.get_xaxis_transform())
             text.set(color=VERMILION, ha="center", va="bottom", fontsize=TEXT)
     ax.set(xlim=(0, highest), xlabel="frequency, Hz", ylabel="speed, rpm" if run_up else "time, s")
-    words = f"{LINES} spectra of {n / rate:.2g} s, {FLAT_TOP * rate / n:.2g} Hz wide (flat top)"
     size = f"largest {largest:.3g} {unit} (peak)".replace("  ", " ")
-    ax.set_title(f"{sensor}: {words}; {size}", fontsize=TEXT, pad=16)
+    ax.set_title(f"{sensor}: {LINES} spectra of {n / rate:.2g} s; {size}", fontsize=TEXT, pad=16)
     plain(ax)
     return figure
 
