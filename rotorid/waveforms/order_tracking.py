@@ -1,48 +1,32 @@
-"""Vectors of orders along a record: a Vold–Kalman filter over turns.
+"""Vectors of orders along a record: least squares over blocks of whole turns, smoothed.
 
-x = Σ_k Re(A_k(u) e^{2πiku}), u turns: the mean of the waveform (k = 0), 1×, 2× and so on, all together, so
-that no order leaks into another. Each A_k is a penalised spline (rotorid.waveforms.penalised_spline): where
-nothing moves its stiffness makes of it a mean over all turns, with a slope; where the speed passes a
-resonance it follows.
+In a block x ≈ Re Σ_k A_k e^{ikθ}, θ the angle of the shaft: the mean of the waveform (k = 0), 1×, 2× and so
+on, all together; whole turns hold no other order, nor halves of them where there are two. The A_k of the
+blocks are smoothed order by order (rotorid.waveforms.smoothing): where nothing moves this is a mean over all;
+where the speed passes a resonance it follows. The noise of an order is what its blocks scatter by, so that
+its colour counts. Where A moves in a block, by A′ s, s from −½ to ½, it leaks L A′ into itself and other
+orders, which is taken off with A′ of the curve; so is, at last, what the mean over a block differs by, A″/24.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.interpolate import CubicSpline
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.waveforms.penalised_spline import (
-    ROUNDS,
-    SOFTEST,
-    Smoothing,
-    band_of,
-    moments,
-    smooth,
-    spline,
-    sums_of,
-    third_differences,
-    times,
-)
+from rotorid.waveforms.record import WaveformRecord
+from rotorid.waveforms.smoothing import smooth
+from rotorid.waveforms.tacho import Tacho
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
-KNOT, FINE, MOST_KNOTS = 2.0, 1.0, 8000
-"""Turns between two knots, and where 1× moves too fast for these; a longer record has more between."""
-VAGUE, PLACES = 0.03, 100
-"""Share of the largest vector; where its error is more at one of so many places, it may move too fast."""
+TURNS, LEAST, MOST = 2.0, 4, 8000
+"""Of a block; how many blocks there are: those of longer records have more turns."""
+PASSES, FAST = 2, 0.03
+"""How often leaks are taken off; where A″/24 is more, of the largest, blocks are too long."""
 PARTS = 16
-"""Of a steady record, whose means are compared."""
-PASSES = 2
-"""Penalties of all orders are chosen so often, each time with what the others explain taken off."""
-Parts = Callable[[], Iterator[tuple[FloatArray, FloatArray]]]
-"""Gives the record part by part: turns (L,), increasing, and samples (L, C)."""
+"""Of a record, whose means are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,149 +35,75 @@ class Orders:
 
     Attributes
     ----------
-    first, knot
-        Turn of the first knot, and turns from knot to knot.
-    coefficients
-        Of the splines, (n + 3, K + 1, C).
-    smoothings
-        How stiff each is, [sensor][order].
-    density
-        Samples a turn, (n,).
-    raw
-        Means of some turns around each coefficient, without any penalty, (n + 3, K + 1, C).
+    centres
+        Of the blocks, turns, (n,).
+    curve
+        Amplitudes over turns (P, K + 1, C), and by `(turns, 1)` their change in a turn.
+    errors
+        Standard deviation of the real part, and of the imaginary one, at the centres, (n, K + 1, C).
+    width
+        Turns that count for 1×: as many, evenly weighed, would leave the same error, (n,).
+    mean, mean_errors
+        Over the record, and their standard deviations in each direction, (K + 1, C).
+    fast
+        Whether 1× moves too fast for blocks of a turn, or is in noise, (C,).
     """
 
-    first: float
-    knot: float
-    coefficients: ComplexArray
-    smoothings: tuple[tuple[Smoothing, ...], ...]
-    density: FloatArray
-    raw: ComplexArray
-
-    @property
-    def last(self) -> float:
-        """Turn of the last knot."""
-        return self.first + self.knot * len(self.density)
-
-    @cached_property
-    def spline(self) -> BSpline:
-        """Over turns: amplitudes (P, K + 1, C), and by `(turns, 1)` their change in a turn."""
-        return spline(self.first, self.knot, self.coefficients)
-
-    def deviation(self, turns: FloatArray, order: int) -> FloatArray:
-        """Standard deviation of the real part, and of the imaginary one, (P, C), of one order."""
-        s = (turns - self.first) / self.knot
-        return np.transpose([sensor[order].deviation(s) for sensor in self.smoothings])
-
-    def mean(self) -> tuple[ComplexArray, FloatArray]:
-        """Means over the record, and their standard deviations in each direction, (K + 1, C).
-
-        Those of the filter, or of the means of parts of the record where these scatter more: noise beside an
-        order, slower than two turns, looks like a vector that moves.
-        """
-        n = len(self.density)
-        row = np.convolve(np.ones(n), (1 / 24, 11 / 24, 11 / 24, 1 / 24)) / n
-        filtered = [[curve.of_sums(row[:, None])[0] for curve in sensor] for sensor in self.smoothings]
-        parts = np.stack([part.mean(axis=0) for part in np.array_split(self.raw, min(PARTS, n))])
-        scatter = np.sqrt(
-            np.mean(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / 2 / max(len(parts) - 1, 1)
-        )
-        return np.tensordot(row, self.coefficients, 1), np.maximum(np.transpose(filtered), scatter)
-
-    def width(self, turns: FloatArray, order: int = 1) -> FloatArray:
-        """Turns that count around these, (P,): as many, evenly weighed, would leave the same error."""
-        noise = np.array([2 * own[order].variance for own in self.smoothings])
-        samples = np.median(noise / self.deviation(turns, order) ** 2, axis=1)
-        at = ((turns - self.first) / self.knot).astype(np.int64)
-        return np.asarray(samples / self.density[np.clip(at, 0, len(self.density) - 1)])
-
-    def vague(self) -> BoolArray:
-        """Sensors whose largest 1× has a large error, (C,): of noise, or as it moves too fast."""
-        places = np.linspace(self.first, self.last, PLACES)
-        size, error = np.abs(self.spline(places)[:, 1]), self.deviation(places, 1)
-        largest = size.argmax(axis=0), np.arange(size.shape[1])
-        return np.asarray(error[largest] > VAGUE * size[largest])
-
-    def too_fast(self) -> bool:
-        """Whether 1× may move faster than these splines: it is vague, or means are over less than a turn."""
-        places = np.linspace(self.first, self.last, PLACES)
-        return bool(self.width(places).min() < 1 or self.vague().any())
+    centres: FloatArray
+    curve: CubicSpline
+    errors: FloatArray
+    width: FloatArray
+    mean: ComplexArray
+    mean_errors: FloatArray
+    fast: BoolArray
 
 
-def track_orders(parts: Parts, first: float, last: float, highest: int, knot: float = KNOT) -> Orders:
-    """Fit orders 0 to `highest` to a record between two turns.
-
-    Parameters
-    ----------
-    parts
-        See `Parts`.
-    first, last
-        Turns.
-    highest
-        Order.
-    knot
-        Turns between two knots; smaller ones let more of what is between the orders through.
-    """
-    fine = knot <= FINE
-    n = int(np.clip(np.ceil((last - first) / knot), 1, MOST_KNOTS))
-    knot = (last - first) / n
-
-    def with_columns() -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        for turns, samples in parts():
-            yield np.clip((turns - first) / knot, 0, n), _columns(turns, highest), samples
-
-    blocks, samples = moments(with_columns(), n)
-    of_mean = blocks[:, :: 2 * highest + 1, :: 2 * highest + 1]
-    band, alone, right = band_of(blocks), band_of(of_mean), sums_of(samples)
-    loose = np.full(n, alone[0].mean() * np.exp(SOFTEST / 2))
-    M = 2 * highest + 1
-    start = _solved(band, [loose] * M, right)
-    # parabolas, which no penalty changes, are taken off: stiff penalties would round them
-    parabolas = np.linalg.qr(np.vander(np.linspace(-1, 1, n + 3), 3))[0]
-    trend = np.tensordot(parabolas, np.tensordot(parabolas.T, start, 1), 1)
-    start, right = start - trend, right - times(band, trend.reshape(len(band.T), -1)).reshape(right.shape)
-    coefficients, raw, smoothings = [], [], list[tuple[Smoothing, ...]]()
-    total = times(alone, np.ones(n + 3))
-    for sensor in range(right.shape[2]):
-        c, b, own = start[:, :, sensor], right[:, :, sensor], list[Smoothing]()
-        for turn in range(PASSES):
-            left, own, means = b - times(band, c.reshape(-1)).reshape(c.shape), [], []
-            for k in range(highest + 1):
-                columns = slice(0, 1) if k == 0 else slice(2 * k - 1, 2 * k + 1)
-                gram = alone if k == 0 else alone / 2  # mean squares of cosine and sine
-                y = np.ascontiguousarray(left[:, columns] + times(gram, c[:, columns]))
-                own.append(smooth(gram, y, rounds=1 if turn == 0 else ROUNDS)[0])
-                full = y + times(gram, trend[:, columns, sensor])
-                means.append(full @ ((1.0,) if k == 0 else (2.0, 2.0j)) / total)
-            c = _solved(band, [own[(m + 1) // 2].penalty for m in range(M)], b)
-        coefficients.append(c + trend[:, :, sensor])
-        smoothings.append(tuple(own))
-        raw.append(np.stack(means, axis=-1))
-    c = np.stack(coefficients, axis=-1)
-    complex_ones = np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)
-    density = of_mean.sum(axis=(1, 2)) / knot
-    found = Orders(first, knot, complex_ones, tuple(smoothings), density, np.stack(raw, axis=-1))
-    return found if fine or not found.too_fast() else track_orders(parts, first, last, highest, FINE)
+def track_orders(record: WaveformRecord, tacho: Tacho, highest: int, size: float = TURNS) -> Orders:
+    """Find orders 0 to `highest` between the first and the last pulse, in blocks of so many turns."""
+    first, last = tacho.turn_at(np.array(tacho.span))
+    n, C = int(np.clip((last - first) / size, LEAST, MOST)), len(record.sensors)
+    places = np.linspace(first, last, n + 1)
+    times = np.interp(places, tacho.turn_at(tacho.angle.x), tacho.angle.x)
+    ends, centres = np.rint(times * record.rate).astype(np.int64), (places[1:] + places[:-1]) / 2
+    length, M = places[1] - places[0], 2 * highest + 1
+    leak, blocks = np.empty((n, M, M)), np.empty((n, M, C))
+    for j, (begin, end) in enumerate(pairwise(ends)):
+        turns = tacho.turn_at(np.arange(begin, end) / record.rate)
+        waves = np.exp(-2j * np.pi * turns)[:, None] ** np.arange(1, highest + 1)
+        columns = np.column_stack((np.ones(len(turns)), waves.view(np.float64)))
+        moving = columns * ((turns - centres[j]) / length)[:, None]
+        samples = [sensor.samples[begin:end] * sensor.factor for sensor in record.sensors]
+        both = np.column_stack((moving, *samples))
+        leak[j], blocks[j] = np.split(np.linalg.lstsq(columns, both, rcond=None)[0], [M], axis=1)
+    gram, width = np.zeros((4, n)), np.empty((n, C))
+    gram[0] = np.diff(ends) / 2  # mean squares of cosine and sine
+    curve = np.zeros((n, highest + 1, C), dtype=complex)
+    errors, mean_errors = np.empty(curve.shape), np.empty(curve.shape[1:])
+    for _ in range(PASSES):
+        slope: ComplexArray = np.asarray(np.gradient(curve, axis=0))
+        moves = np.stack((slope.real, slope.imag), axis=2).reshape(n, M + 1, C)
+        still = _complex(blocks - leak @ np.delete(moves, 1, axis=1))
+        for k, c in np.ndindex(highest + 1, C):
+            smoothing, curve[:, k, c] = smooth(gram, gram[0] * still[:, k, c])
+            errors[:, k, c] = np.sqrt(smoothing.covariance[0])
+            mean_errors[k, c] = smoothing.of_sum(np.full(n, 1 / n))
+            if k == 1:
+                width[:, c] = smoothing.variance / errors[:, k, c] ** 2 / gram[0] * length
+    # noise beside an order, slower than a block, looks like a vector that moves: parts scatter by it
+    parts = [part.mean(axis=0) for part in np.array_split(still, min(PARTS, n))]
+    mean_errors = np.maximum(mean_errors, np.std(parts, axis=0) / np.sqrt(2 * (len(parts) - 1)))
+    mean, bend = curve.mean(axis=0), np.diff(curve, 2, axis=0) / 24
+    once = np.abs(curve[:, 1])
+    unclear = np.take_along_axis(errors[:, 1], once.argmax(axis=0)[None], 0)[0]
+    fast = np.maximum(np.abs(bend[:, 1]).max(axis=0), unclear) > FAST * once.max(axis=0)
+    if fast.any() and size > 1:
+        return track_orders(record, tacho, highest, 1.0)
+    curve[1:-1] -= bend
+    errors[1:-1] = np.hypot(errors[1:-1], np.abs(bend) / 2)  # what is not taken off, of A⁗
+    width = np.median(width, axis=1)
+    return Orders(centres, CubicSpline(centres, curve), errors, width, mean, mean_errors, fast)
 
 
-def _columns(turns: FloatArray, highest: int) -> FloatArray:
-    """What mean, real and imaginary parts of orders multiply, (L, 2 K + 1)."""
-    out = np.ones((len(turns), 2 * highest + 1))
-    once = np.exp(2j * np.pi * (turns % 1.0))
-    power = once
-    for k in range(1, highest + 1):
-        out[:, 2 * k - 1], out[:, 2 * k] = power.real, -power.imag
-        power = power * once
-    return out
-
-
-def _solved(band: FloatArray, penalties: list[FloatArray], right: FloatArray) -> FloatArray:
-    """Coefficients (n + 3, M, …) of all columns together, each with its penalty (n,)."""
-    M = len(penalties)
-    matrix = band.copy()
-    for m, penalty in enumerate(penalties):
-        for below, line in enumerate(third_differences(penalty)):
-            matrix[below * M, m::M] += line
-    factor = cholesky_banded(matrix, lower=True)
-    flat = right.reshape(len(right) * M, -1)
-    return np.asarray(cho_solve_banded((factor, True), flat).reshape(right.shape))
+def _complex(c: FloatArray) -> ComplexArray:
+    """Amplitudes (n, K + 1, C) of those of columns, (n, M, C)."""
+    return np.concatenate((c[:, :1] + 0j, c[:, 1::2] + 1j * c[:, 2::2]), axis=1)

@@ -1,4 +1,4 @@
-"""Pictures of records: the tacho, an orbit beside its waveforms, and a waterfall of spectra over speed.
+"""Pictures of records: the tacho, the orbit of two sensors, and a waterfall of spectra over speed.
 
 The mark of a turn is shown as on an oscilloscope: the curve is blank just before it and bright, a dot, at it,
 so that blank to bright is the direction of time. Of a long record only what is drawn is read.
@@ -7,15 +7,14 @@ so that blank to bright is the direction of time. Of a long record only what is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.arrays import AnyArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     BLUE,
     COLORS,
-    DARK,
     QUIET,
     TEXT,
     VERMILION,
@@ -26,7 +25,6 @@ from rotorid.base.plot_style import (
 from rotorid.waveforms.record import Channel, WaveformRecord
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.waveforms.tacho import Tacho
@@ -43,8 +41,8 @@ LINES, TALLEST, SEEN = 48, 0.3, 0.02
 SWEPT, MOST_TURNS = 1.0, 64.0
 """Change of 1× within a spectrum of T, in units of 1/T, to which a flat top stays true to 0.3 % (of 2× to
 1.1 %); and turns within it, at most."""
-FLAT_TOP, FINER = 3.77, 4
-"""Its noise bandwidth, in units of 1/T; steps of the frequency in that unit."""
+FINER = 4
+"""Steps of the frequency in 1/T."""
 RUN_UP = 0.05
 """Share of the speed by which it must change to be an axis."""
 
@@ -71,19 +69,17 @@ def figure_of(picture: str, record: WaveformRecord, vectors: Vectors) -> Figure:
 
 
 def figure_tacho(channel: Channel, rate: float, tacho: Tacho) -> Figure:
-    """Draw a tacho's signal around its first damaged pulse, else in the middle, its speed, and its jitter."""
+    """Draw a tacho's signal around its first damaged pulse, else in the middle, and its speed."""
     missing = np.interp(tacho.missing, tacho.turns, tacho.times)
     damaged = np.sort(np.concatenate((missing, tacho.double)))
     centre = damaged[0] if damaged.size else tacho.times[len(tacho.times) // 2]
     middle = float(np.interp(centre, tacho.times, tacho.turns))
     ends = np.interp([middle - TURNS / 2, middle + TURNS / 2], tacho.turns, tacho.times)
     first, last = int(ends[0] * rate), int(ends[1] * rate) + 1
-    figure = new_figure(6.4)
-    signal, speed, jitter = figure.subplots(3)
+    figure = new_figure(4.6)
+    signal, speed = figure.subplots(2)
     signal.plot(np.arange(first, last) / rate, channel.samples[first:last], color=QUIET, linewidth=0.9)
-    signal.axhline(tacho.level, color=DARK, linestyle="--", linewidth=0.8)
-    band = (tacho.level - tacho.hysteresis, tacho.level + tacho.hysteresis)
-    signal.axhspan(*band, color=BLUE, alpha=0.12, linewidth=0)
+    signal.axhspan(tacho.level - tacho.hysteresis, tacho.level + tacho.hysteresis, color=BLUE, alpha=0.12)
     between = (tacho.times[1:] + tacho.times[:-1]) / 2
     rpm = 60 * np.diff(tacho.turns) / np.diff(tacho.times)
     speed.plot(between, rpm, color=BLUE, linewidth=0.9)
@@ -92,20 +88,14 @@ def figure_tacho(channel: Channel, rate: float, tacho: Tacho) -> Figure:
         (missing, "D", VERMILION, f"missing, bridged: {missing.size}"),
         (tacho.double, "X", COLORS[3], f"double, left out: {tacho.double.size}"),
     ):
-        look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": color, "markersize": 6}
-        near = times[(times >= ends[0]) & (times <= ends[1])]
-        signal.plot(near, np.full(near.size, tacho.level), label=label, **look)
+        signal.plot(times, np.full(times.size, tacho.level), marker, color=color, label=label)
         if marker != "o":
-            speed.plot(times, np.interp(times, between, rpm), **look)
-    late = 360 * (tacho.turn_at(tacho.times) - tacho.turns)
-    jitter.plot(tacho.times, late, ".", color=BLUE, markersize=2, rasterized=True)
+            speed.plot(times, np.interp(times, between, rpm), marker, color=color)
     signal.set(ylabel=f"{channel.name}, as recorded", xlim=ends)
-    signal.set_title(f"around turn {middle - tacho.turns[0]:.0f}", fontsize=TEXT)
-    speed.set(ylabel="speed, rpm")
-    jitter.set(xlabel="time, s", ylabel="pulse, ° late")
-    jitter.set_title(f"jitter {tacho.jitter_deg:.2g}° (standard deviation of a pulse)", fontsize=TEXT)
-    for each in (signal, speed, jitter):
-        plain(each)
+    signal.set_title(f"jitter {tacho.jitter_deg:.2g}° (standard deviation of a pulse)", fontsize=TEXT)
+    speed.set(xlabel="time, s", ylabel="speed, rpm")
+    plain(signal)
+    plain(speed)
     legend_below(figure, [signal], 3)
     return figure
 
@@ -113,7 +103,7 @@ def figure_tacho(channel: Channel, rate: float, tacho: Tacho) -> Figure:
 def figure_orbit(
     record: WaveformRecord, pair: Sequence[str], tacho: Tacho, at: float, turns: int = TURNS
 ) -> Figure:
-    """Draw the orbit of two sensors over whole turns, as measured and 1×, beside their waveforms.
+    """Draw the orbit of two sensors over whole turns, as measured and 1×, over each other.
 
     It is drawn as if the second sensor stood a quarter turn after the first, with the rotation.
 
@@ -154,46 +144,26 @@ def figure_orbit(
     read -= read[:, :-1].mean(axis=1, keepdims=True)  # the last point is the first one of another turn
     x, y = 2 * (read[:, :-1] * mark[:-1].conj()).mean(axis=1)
     once = np.real(np.multiply.outer((x, y), mark))
-    figure, reach = new_figure(4.3), 1.1 * np.abs(read).max()
-    axes = figure.subplot_mosaic([["orbit", "0"], ["orbit", "1"]], width_ratios=[7, 6])
+    figure = new_figure(4.8, 4.8)
+    orbit = figure.add_subplot()
     for label, z, color, width in (("1×", once, VERMILION, 2.4), ("as measured", read, BLUE, 0.8)):
-        shown = POINTS + 1 if label == "1×" else turn.size
-        _draw_marked(axes["orbit"], turn[:shown], (z[0] + 1j * z[1])[:shown], label, color, width)
-        for k in (0, 1):
-            _draw_marked(axes[str(k)], turn, turn + 1j * z[k], label, color, width)
-    for k in (0, 1):
-        axes[str(k)].set(xlim=(-0.05, turns + 0.05), ylim=(-reach, reach))
-        axes[str(k)].set_ylabel(f"{pair[k]}, {unit}".rstrip(", "))
-    axes["0"].set_title(f"{60 * turns / (stop - start):.4g} rpm, at {start:.4g} s", fontsize=TEXT)
-    axes["1"].set_xlabel("turns")
+        shown = z[:, : POINTS + 1] if label == "1×" else z
+        blank = np.where((turn[: shown.shape[1]] + 1e-9) % 1 > 1 - BLANK, np.nan, shown)
+        orbit.plot(*blank, color=color, linewidth=width, label=label)
+        mark = "mark, blank before it" if label == "1×" else ""
+        orbit.plot(*shown[:, ::POINTS], "o", color=color, markersize=3 + 2 * width, label=mark)
     # with the rotation and against it: x + iy = (x₁ + i y₁)/2 e^{iθ} + conj(x₁ − i y₁)/2 e^{−iθ}
-    long, short = ((abs(x + 1j * y) + sign * abs(x - 1j * y)) / 2 for sign in (1, -1))
+    short, long = abs(x + 1j * y) - abs(x - 1j * y), abs(x + 1j * y) + abs(x - 1j * y)
     way = "forward whirl, with the rotation" if short > 0 else "backward whirl, against the rotation"
     way = "nearly along a line" if abs(short) < A_LINE * long else way
-    size = f"if {pair[1]} stands 90° after {pair[0]}; semi-axes {long:.3g} × {abs(short):.3g} {unit}"
-    orbit = axes["orbit"]
-    orbit.set_title(f"1×: {way}\n{size}".rstrip(), fontsize=TEXT)
-    orbit.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    orbit.set(xlabel=f"{pair[0]}, {unit}".rstrip(", "), ylabel=f"{pair[1]}, {unit}".rstrip(", "))
-    for ax in axes.values():
-        plain(ax)
+    speed = f"{60 * turns / (stop - start):.4g} rpm, at {start:.4g} s"
+    orbit.set_title(f"{speed}\n1×: {way}, if {pair[1]} stands 90° after {pair[0]}", fontsize=TEXT)
+    orbit.set(
+        aspect="equal", xlabel=f"{pair[0]}, {unit}".rstrip(", "), ylabel=f"{pair[1]}, {unit}".rstrip(", ")
+    )
+    plain(orbit)
     legend_below(figure, [orbit], 3, title="rotation anticlockwise")
     return figure
-
-
-def _draw_marked(
-    ax: Axes,
-    turn: FloatArray,
-    z: AnyArray,
-    label: str,
-    color: str,
-    width: float,
-) -> None:
-    """A curve z, blank before each whole turn, with a dot at it."""
-    shown = np.where((turn + 1e-9) % 1 > 1 - BLANK, np.nan, z)
-    ax.plot(shown.real, shown.imag, color=color, linewidth=width, label=label)
-    marks, label = z[::POINTS], "mark, blank before it" if label == "1×" else ""
-    ax.plot(marks.real, marks.imag, "o", color=color, markersize=3 + 2 * width, label=label)
 
 
 def figure_waterfall(
@@ -236,9 +206,8 @@ def figure_waterfall(
             text = ax.text(each * speed[-1], 1.0, f"{each:g}×", transform=ax.get_xaxis_transform())
             text.set(color=VERMILION, ha="center", va="bottom", fontsize=TEXT)
     ax.set(xlim=(0, highest), xlabel="frequency, Hz", ylabel="speed, rpm" if run_up else "time, s")
-    words = f"{LINES} spectra of {n / rate:.2g} s, {FLAT_TOP * rate / n:.2g} Hz wide (flat top)"
     size = f"largest {largest:.3g} {unit} (peak)".replace("  ", " ")
-    ax.set_title(f"{sensor}: {words}; {size}", fontsize=TEXT, pad=16)
+    ax.set_title(f"{sensor}: {LINES} spectra of {n / rate:.2g} s; {size}", fontsize=TEXT, pad=16)
     plain(ax)
     return figure
 
@@ -260,7 +229,7 @@ def spectra(channel: Channel, rate: float, times: FloatArray, n: int) -> tuple[F
 
 
 def _instants(tacho: Tacho, rate: float) -> tuple[FloatArray, FloatArray, int]:
-    """Speeds, turns a second, evenly, when they are, s, and how many samples a spectrum takes there."""
+    """Speeds, turns a second, when they are, s, evenly, and how many samples a spectrum takes there."""
     from scipy.fft import next_fast_len
 
     start, stop = tacho.times[0], tacho.times[-1]
@@ -268,7 +237,5 @@ def _instants(tacho: Tacho, rate: float) -> tuple[FloatArray, FloatArray, int]:
     speed = np.gradient(tacho.turn_at(t), t)
     change = max(float(np.abs(np.diff(speed)).sum() / (stop - start)), 1e-12)
     T = min(MOST_TURNS / speed.mean(), (stop - start) / 4, np.sqrt(SWEPT / change))
-    inside = (t >= start + T / 2) & (t <= stop - T / 2)
-    way = np.cumsum(np.abs(np.gradient(speed[inside])) + 1e-4 * speed.max())
-    times = np.interp(np.linspace(way[0], way[-1], LINES), way, t[inside])
+    times = np.linspace(start + T / 2, stop - T / 2, LINES)
     return np.interp(times, t, speed), times, next_fast_len(int(T * rate), real=True)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import interp1d
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
-from rotorid.base.logs import progress
-from rotorid.base.text import listing
 from rotorid.waveforms.order_tracking import Orders, track_orders
 from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
 from rotorid.waveforms.signal_path import before_path, response
@@ -20,17 +17,16 @@ from rotorid.waveforms.tacho import Tacho, read_tacho
 STEADY, WINDOWS, CALM = 0.01, 20, 8
 """A record whose speed, in so many windows, stays within this share of it has one vector; windows are so long
 that jitter of the tacho is that much less."""
-PART, MOST_PLACES = 1 << 16, 500
-"""Samples at a time; places at which the turns that count are found."""
 HIGHEST = 0.45
 """Of the sampling rate: beyond, an order is not what the samples hold."""
-NEAR_TOP, PILED = 0.01, 0.65
-"""So many of the samples in this uppermost share of the range are equal where a channel is clipped."""
+PILED = 10
+"""A channel is clipped where so many samples, and more than half of those in the uppermost hundredth of the
+range, are equal."""
 LEAST_TURNS = 2.0
 """Over which the overall level is taken."""
-MOVES = 0.1
-"""A vector that moves by more, of its size, at a steady speed is worth a word, beside jitter of the tacho."""
-TOLD = 3.0
+MOVES, TOLD = 0.1, 3.0
+"""A vector that moves by more, of its size, at a steady speed is worth a word, beside so many times the
+jitter of the tacho; one that is less than so many deviations is noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,138 +128,112 @@ def _found(
     if record.tacho is None:
         raise ValueError("a tacho channel is needed: without one there are no turns, and no phase")
     tacho = read_tacho(record.tacho, record.rate, settings)
-    begin, end = (round(t * record.rate) for t in tacho.span)
     words = [*tacho.warnings, *(word for sensor in record.sensors for word in _checked(sensor))]
-    own = tacho.angle.speed(np.linspace(*tacho.span, 2 + len(tacho.times)))
-    if max(orders) * own.max() > HIGHEST * record.rate:
+    course = tacho.speed_at(np.linspace(*tacho.span, 2 + len(tacho.times)))
+    if max(orders) * course.max() > HIGHEST * record.rate:
         raise ValueError(
-            f"{max(orders)}× is {max(orders) * own.max():.4g} Hz at the highest speed, beyond "
+            f"{max(orders)}× is {max(orders) * course.max():.4g} Hz at the highest speed, beyond "
             f"{HIGHEST:g} of the {record.rate:.6g} samples a second"
         )
-
-    def parts() -> Iterator[tuple[FloatArray, FloatArray]]:
-        for start in range(begin, end, PART):
-            stop = min(end, start + PART)
-            progress.info("%s at %.0f %%", record.run, 100 * (start - begin) / (end - begin))
-            turns = tacho.turn_at(np.arange(start, stop) / record.rate)
-            yield turns, np.stack([c.samples[start:stop] * c.factor for c in record.sensors], axis=1)
-
-    first, last = tacho.turn_at(np.array([begin, end - 1]) / record.rate)
-    tracked = track_orders(parts, float(first), float(last), max(orders))
-    course = _course(tacho, settings.pulses)
-    steady = bool(np.ptp(course) < STEADY * course.mean())
-    own = np.clip(own, course.min(), course.max()) if steady else own
-    places = np.linspace(tracked.first, tracked.last, min(len(tracked.density), MOST_PLACES) + 1)
-    width = tracked.width(places)
+    means = _means(tacho, settings.pulses)
+    steady = bool(np.ptp(means) < STEADY * means.mean())
+    tracked = track_orders(record, tacho, max(orders))
+    first, last = tacho.turn_at(np.array(tacho.span))
+    if steady:
+        course = np.clip(course, means.min(), means.max())
     if speeds is not None:
-        times = _passed(tacho, own, speeds)
-    elif steady:
-        times = np.array([np.mean(tacho.span)])
+        times = _passed(tacho, course, speeds)
     else:
-        times = _independent(tacho, places, width)
+        times = np.array([np.mean(tacho.span)]) if steady else _independent(tacho, tracked)
     turns = tacho.turn_at(times)
-    wide = np.interp(turns, places, width)
-    edge = np.minimum(turns - tracked.first, tracked.last - turns) < wide / 2 * (1 - 1e-9)
-    rate = tacho.angle.speed(times)
+    wide = np.interp(turns, tracked.centres, tracked.width)
+    wanted, speed, drawn = list(orders), tacho.speed_at(times), tacho.error_at(times)
+    edge = np.minimum(turns - first, last - turns) < wide / 2 * (1 - 1e-9)
+    around = np.clip(times + np.multiply.outer((-0.5, 0.5), wide / speed), *tacho.span)
+    rise = np.diff(tacho.speed_at(around), axis=0)[0] / np.diff(around, axis=0)[0]
+    read, change = tracked.curve(turns), tracked.curve(turns, 1) * speed[:, None, None]
+    inside = np.clip(turns, tracked.centres[0], tracked.centres[-1])
+    deviation = interp1d(tracked.centres, tracked.errors[:, wanted], axis=0)(inside)
     if steady:
         wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
-        rate = np.full(len(times), (last - first) * record.rate / (end - 1 - begin))
-    nearby = np.stack((times, np.maximum(wide, LEAST_TURNS) / rate), axis=1)
-    before, after = (np.clip(times + side * wide / rate, *tacho.span) for side in (-0.5, 0.5))
-    rise = (tacho.angle.speed(after) - tacho.angle.speed(before)) / (after - before)
-    vectors, deviation, gap = _before_paths(record, tracked, orders, derivative, turns, rate, rise, steady)
-    drawn = np.zeros(len(times)) if steady else tacho.angle.deviation(times)
-    angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * rate)
-    across = np.hypot(deviation, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None, :])
-    moves = MOVES + TOLD * np.radians(tacho.jitter_deg) if steady else np.inf
-    words += _said(record, vectors, deviation, tracked, moves)
+        speed = wide / np.ptp(tacho.span)
+        read, change = np.broadcast_to(tracked.mean, read.shape), 0 * read
+        deviation = np.broadcast_to(tracked.mean_errors[wanted], deviation.shape)
+        rise, drawn = 0 * rise, 0 * drawn
+    w = 2 * np.pi * np.multiply.outer(speed, orders)
     same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
-    overall = np.where(same[:, None], [_overall(record, *each) for each in nearby], np.nan)
+    direct = np.array([sensor.path.high_pass_rad_s is None for sensor in record.sensors])
+    vectors, radial = read[:, wanted], deviation.copy()
+    for c, sensor in enumerate(record.sensors):
+        more = 0 if derivative is None or sensor.derivative is None else sensor.derivative - derivative
+        vectors[:, :, c], factor = before_path(
+            response(sensor.path, more),
+            vectors[:, :, c],
+            change[:, wanted, c],
+            w,
+            w * (rise / speed)[:, None],
+        )
+        radial[:, :, c] *= factor
+    vectors, radial = vectors.swapaxes(1, 2), radial.swapaxes(1, 2)
+    angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * speed)
+    tangential = np.hypot(radial, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None])
+    spans = zip(times, np.maximum(wide, LEAST_TURNS) / speed, strict=True)
+    overall = np.array([_overall(record, *each) for each in spans])
+    words += _doubts(record, vectors[:, :, 0], radial[:, :, 0], tracked, tacho.jitter_deg if steady else None)
     return Vectors(
         run=record.run,
         sensors=tuple(sensor.name for sensor in record.sensors),
         orders=orders,
         times=times,
-        speeds=2 * np.pi * rate,
+        speeds=2 * np.pi * speed,
         vectors=vectors,
-        radial=deviation,
-        tangential=across,
+        radial=radial,
+        tangential=tangential,
         turns=wide,
-        overall=overall,
-        gap=np.where(same, gap, np.nan),
+        overall=np.where(same[:, None], overall, np.nan),
+        gap=np.where(same & direct, read[:, 0].real, np.nan),
         end=edge,
         steady=steady,
-        range=2 * np.pi * np.array([own.min(), own.max()]),
+        range=2 * np.pi * np.array([course.min(), course.max()]),
         tacho=tacho,
         warnings=tuple(words),
     )
 
 
-def _course(tacho: Tacho, pulses: int) -> FloatArray:
+def _means(tacho: Tacho, pulses: int) -> FloatArray:
     """Mean speeds of windows, turns per s."""
     jitter = CALM / STEADY * np.sqrt(2) * tacho.jitter_deg / 360 * pulses
     step = max(1, len(tacho.times) // WINDOWS, min(int(jitter), len(tacho.times) // 3))
     return np.asarray(np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step]))
 
 
-def _passed(tacho: Tacho, own: FloatArray, speeds: FloatArray) -> FloatArray:
+def _independent(tacho: Tacho, tracked: Orders) -> FloatArray:
+    """Times of vectors that share no turns, the first and the last half their turns from the ends."""
+    first, last = tacho.turn_at(np.array(tacho.span))
+    blocks = np.linspace(first, last, len(tracked.width) + 1)
+    number = np.append(0.0, np.cumsum(np.diff(blocks) / tracked.width))
+    count = max(2, int(number[-1]))
+    turns = np.interp((np.arange(count) + 0.5) * number[-1] / count, number, blocks)
+    return np.asarray(np.interp(turns, tacho.turn_at(tacho.angle.x), tacho.angle.x))
+
+
+def _passed(tacho: Tacho, course: FloatArray, speeds: FloatArray) -> FloatArray:
     """Times at which the speed first is each of these, rad/s."""
-    at, times = np.linspace(*tacho.span, len(own)), []
+    at, times = np.linspace(*tacho.span, len(course)), []
     for speed in speeds / (2 * np.pi):
-        if not own.min() * (1 - STEADY / 2) <= speed <= own.max() * (1 + STEADY / 2):
+        if not course.min() * (1 - STEADY / 2) <= speed <= course.max() * (1 + STEADY / 2):
             raise ValueError(
-                f"there is no speed of {speed * 60:.6g} rpm: the record runs from {own.min() * 60:.6g} to "
-                f"{own.max() * 60:.6g} rpm"
+                f"there is no speed of {speed * 60:.6g} rpm: the record runs from {course.min() * 60:.6g} to "
+                f"{course.max() * 60:.6g} rpm"
             )
-        above = own >= speed
+        above = course >= speed
         change = np.flatnonzero(above[1:] != above[:-1])
         if len(change):
             i = int(change[0])
-            times.append(at[i] + (speed - own[i]) / (own[i + 1] - own[i]) * (at[i + 1] - at[i]))
+            times.append(at[i] + (speed - course[i]) / (course[i + 1] - course[i]) * (at[i + 1] - at[i]))
         else:
-            times.append(at[np.abs(own - speed).argmin()])
+            times.append(at[np.abs(course - speed).argmin()])
     return np.array(times)
-
-
-def _independent(tacho: Tacho, places: FloatArray, width: FloatArray) -> FloatArray:
-    """Times of vectors that share no turns, the first and the last half their turns from the ends."""
-    counted = cumulative_trapezoid(1 / width, places, initial=0.0)
-    number = max(2, int(counted[-1]))
-    turns = np.interp((np.arange(number) + 0.5) * counted[-1] / number, counted, places)
-    dense = np.linspace(*tacho.span, 4 * len(places))
-    return np.asarray(np.interp(turns, tacho.turn_at(dense), dense))
-
-
-def _before_paths(
-    record: WaveformRecord,
-    tracked: Orders,
-    orders: tuple[int, ...],
-    derivative: int | None,
-    turns: FloatArray,
-    speed: FloatArray,
-    rate: FloatArray,
-    steady: bool,
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Vectors and their deviations, (P, C, K), and means (P, C), without what the channels' paths did."""
-    read, change = tracked.spline(turns), tracked.spline(turns, 1) * speed[:, None, None]
-    deviation = np.stack([tracked.deviation(turns, k) for k in orders], axis=2)
-    if steady:
-        means, deviations = tracked.mean()
-        read = np.repeat(means[None], len(turns), 0)
-        deviation = np.repeat(deviations[None, list(orders)].swapaxes(1, 2), len(turns), 0)
-        change, rate = 0 * read, 0 * rate
-    vectors = np.empty((len(turns), len(record.sensors), len(orders)), dtype=complex)
-    errors, gap = np.empty(vectors.shape), read[:, 0].real.copy()
-    for c, sensor in enumerate(record.sensors):
-        more = 0 if derivative is None or sensor.derivative is None else sensor.derivative - derivative
-        H = response(sensor.path, more)
-        if more or sensor.path.high_pass_rad_s is not None:
-            gap[:, c] = np.nan
-        for place, k in enumerate(orders):
-            w, dw = 2 * np.pi * k * speed, 2 * np.pi * k * rate
-            vectors[:, c, place], scale = before_path(H, read[:, k, c], change[:, k, c], w, dw)
-            errors[:, c, place] = deviation[:, c, place] * scale
-    return vectors, errors, gap
 
 
 def _overall(record: WaveformRecord, time: float, around: float) -> FloatArray:
@@ -272,6 +242,33 @@ def _overall(record: WaveformRecord, time: float, around: float) -> FloatArray:
     part = slice(first, max(first + 2, int((time + around / 2) * record.rate)))
     samples = [sensor.samples[part] * sensor.factor for sensor in record.sensors]
     return np.array([(np.ptp(x) / 2, np.sqrt(2.0) * x.std()) for x in samples])
+
+
+def _doubts(
+    record: WaveformRecord,
+    vectors: ComplexArray,
+    deviation: FloatArray,
+    tracked: Orders,
+    jitter: float | None,
+) -> Iterator[str]:
+    """What 1× (P, C) does not tell; with the jitter of the tacho, degrees, where the speed is steady."""
+    moves = np.abs(tracked.curve(tracked.centres)[:, 1] / tracked.mean[1] - 1).max(axis=0)
+    for c, sensor in enumerate(record.sensors):
+        if not (np.abs(vectors[:, c]) > TOLD * deviation[:, c]).any():
+            yield (
+                f"1× of {sensor.name!r} cannot be told from noise: is the sensor connected, and are the "
+                "pulses a turn right?"
+            )
+        elif jitter is not None and moves[c] > MOVES + TOLD * np.radians(jitter):
+            yield (
+                f"1× of {sensor.name!r} moves by up to {100 * moves[c]:.0f} % while the speed is steady: the "
+                "mean is given; has the machine settled?"
+            )
+        elif jitter is None and tracked.fast[c]:
+            yield (
+                f"1× of {sensor.name!r} is hardly told along the run-up: there is strong noise near it, or "
+                "the speed passes a resonance within so few turns that vectors there are too small"
+            )
 
 
 def _checked(sensor: Channel) -> Iterator[str]:
@@ -284,42 +281,11 @@ def _checked(sensor: Channel) -> Iterator[str]:
         raise ValueError(
             f"sensor {sensor.name!r} reads {low:.6g} throughout: it is dead or not connected; leave it out"
         )
-    reach = NEAR_TOP * (float(high) - float(low))
+    reach = (float(high) - float(low)) / 100
     for end, near in ((high, x >= high - reach), (low, x <= low + reach)):
-        close = x[near]
-        at = int(np.count_nonzero(close == end))
-        if at > PILED * len(close) and at > 10 and len(np.unique(close)) > 2:
+        at = int(np.count_nonzero(x == end))
+        if at > PILED and 2 * at > np.count_nonzero(near) > at:
             yield (
                 f"sensor {sensor.name!r} is clipped at {float(end) * sensor.factor:.4g}, {at} samples: "
                 "its vectors are too small there; choose a wider range"
             )
-
-
-def _said(
-    record: WaveformRecord, vectors: ComplexArray, deviation: FloatArray, tracked: Orders, moves: float
-) -> Iterator[str]:
-    """What vectors at 1× do not tell; by what share one of a steady record may move, else infinite."""
-    steady = np.isfinite(moves)
-    size, error = np.abs(vectors[:, :, 0]), deviation[:, :, 0]
-    lost = [sensor.name for c, sensor in enumerate(record.sensors) if (size[:, c] < TOLD * error[:, c]).all()]
-    if lost:
-        names = listing(map(repr, lost), "and")
-        yield (
-            f"1× of {names} cannot be told from noise: is the sensor connected, and are the pulses a turn "
-            "right?"
-        )
-    for sensor in () if steady else itertools.compress(record.sensors, tracked.vague()):
-        if sensor.name not in lost:
-            yield (
-                f"1× of {sensor.name!r} is hardly told along the run-up: there is strong noise near it, or "
-                "the speed passes a resonance within so few turns that vectors there are too small"
-            )
-    if steady:
-        places = np.linspace(tracked.first, tracked.last, 21)[1:-1]
-        course = np.abs(tracked.spline(places)[:, 1] - tracked.mean()[0][1]) / np.abs(tracked.mean()[0][1])
-        for c, sensor in enumerate(record.sensors):
-            if sensor.name not in lost and course[:, c].max() > moves:
-                yield (
-                    f"1× of {sensor.name!r} moves by up to {100 * course[:, c].max():.0f} % while the speed "
-                    "is steady: the mean is given; has the machine settled?"
-                )

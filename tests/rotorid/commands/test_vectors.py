@@ -90,7 +90,7 @@ def test_command_line(cli, tmp_path):
     assert result.code == 0, result.err
     document = result.json
     assert document["tacho"]["missing"] == document["tacho"]["double"] == 0
-    assert document["tacho"]["pulses"] == 389
+    assert document["tacho"]["pulses"] == 390
     assert document["warnings"] == []
     table = pd.read_csv(tmp_path / "runs.csv")
     assert table["amplitude_um_pp"].tolist() == [row["amplitude_um_pp"] for row in document["rows"]]
