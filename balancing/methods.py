@@ -29,6 +29,7 @@ from functools import cache, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, check_planes, check_stack
@@ -471,7 +472,7 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
         further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
         step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ gain.T
         others = np.roll(step - step.mean(axis=0), 1, axis=0)[..., None]
-        others *= np.linalg.norm(D) / np.fmax(np.linalg.norm(others, axis=1, keepdims=True), np.linalg.norm(D))
+        others *= norm(D) / np.fmax(norm(others, axis=1, keepdims=True), norm(D))
         drawn = D + unstretch(step - (gain @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
