@@ -129,7 +129,7 @@ def correct(  # noqa: PLR0913
         limits=kept,
         remove=tuple(name for name in part.planes if name in remove),
     )
-    return replace(result, decision=decide(result, case, (unclear,) if unclear else (), limits))
+    return replace(result, decision=decide(result, case, unclear, limits))
 
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:

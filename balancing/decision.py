@@ -8,7 +8,8 @@ Weights are not worth mounting
 - where the errors add half or more of what is promised, zᴴ F z − F₀₀ ≥ (R₀₀ − zᴴ R z)/2;
 - where fewer planes with weights a third as large leave hardly more;
 - where 95 of 100 check runs stay only below 0.9 of the present vibration;
-- where planes are not determined and the bound is not clearly below the present vibration;
+- where planes are not determined and the bound is not clearly below the present vibration (where it is, the
+  answer is what is determined, and what would determine the rest);
 - where a run that was read, with its weights, is better than what is promised.
 """
 
@@ -26,7 +27,7 @@ from balancing.conditioning import REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
 from balancing.planes import error_form
 from balancing.tables import reading_names, rms
-from rotorid.base.text import figures, listing
+from rotorid.base.text import capital, figures, listing
 from rotorid.regression import solution
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ class Case:
         return f"{figures(size * self.labels.vibration_scale, digits)} {self.labels.vibration_in}".rstrip()
 
 
-def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limits | None) -> MountDecision:
+def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) -> MountDecision:
     """Whether to mount a correction, and what to do instead.
 
     Parameters
@@ -166,7 +167,7 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
     case
         What it is made of.
     unclear
-        Clauses that planes are not determined.
+        That planes are not determined; empty where they are.
     limits
         Of all speeds and planes; None: none.
     """
@@ -182,11 +183,12 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
         return replace(made, word="do not mount", cause=better[0], instead=better[1:])
     bound = result.check_rms / rms(result.before) if result.errors_known else 0.0
     if not D.any() or (sound and bound <= HARDLY_BELOW and not (unclear and bound**2 > 1 - EATEN)):
-        together = "; each weight alone is uncertain, what they leave together is not"
-        alike = () if result.combination else unclear
-        open_ = (words.removesuffix(REMEDY) + together for words in alike)
-        warnings = (*open_, *made.warnings, *_rising(result, case.today, limits))
-        return replace(made, warnings=warnings, notes=coarse(case.today))
+        warnings = (*made.warnings, *_rising(result, case.today, limits))
+        made = replace(made, warnings=warnings, notes=coarse(case.today))
+        cause = result.combination or unclear.removesuffix(REMEDY)
+        if not (cause and D.any()):
+            return made
+        return replace(made, word="determined in part", cause=cause, instead=remedies(case, fewer))
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
         f"with the weights, expect rms {case.shown(whole.expected)} rather than {promised}; without them "
@@ -197,13 +199,14 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
         return replace(
             made, word="measure again", cause="; ".join((*contradictions, outlook)), instead=instead
         )
-    causes = [words.removesuffix(REMEDY) + "; their weights are not determined" for words in unclear]
+    determined = (f"{capital(result.combination)}.",) if result.combination else ()
+    causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
     if not sound:
         causes = _causes(result, case)
-    elif not causes:
-        causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
+    elif unclear:
+        causes = [unclear.removesuffix(REMEDY) + "; their weights are not determined"]
     cause = "; ".join((*causes, outlook))
-    return replace(made, word="do not mount", cause=cause, instead=remedies(case, fewer))
+    return replace(made, word="do not mount", cause=cause, instead=(*determined, *remedies(case, fewer)))
 
 
 def remedies(case: Case, fewer: Sequence[Choice] | None = None) -> tuple[str, ...]:

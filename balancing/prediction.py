@@ -141,10 +141,13 @@ class Prediction:
 
         The columns w of both planes, scaled to length 1, differ by little but a factor: w₂ ≈ ρ w₁. Then
         D₁ + ρ D₂, the weight in the first plane that does the same, is determined, and
-        (D₁ − ρ D₂) / 2 is not. With ρ ≈ 1 they are the static part and the couple.
+        (D₁ − ρ D₂) / 2 is not. With ρ ≈ 1 they are the static part and the couple. Where the regions of both
+        weights leave zero out, each is determined, whatever the couple.
         """
         apart, labels = self.conditioning, self.labels
         if len(self.planes) != 2 or not self.region_known or apart.condition_number <= HARDLY_APART:
+            return ""
+        if self._clear.all():
             return ""
         v = apart.directions[:, 0].conj() * apart.lengths
         ratio = v[1] / v[0]
