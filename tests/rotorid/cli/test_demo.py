@@ -10,15 +10,15 @@ from rotorid.workflows.demo_samples import SAMPLES
 
 NUMBERS = {
     "main": ["1291.45", "134.203"],
-    "balancing": ["430.0  171.5°", "explained by the stated errors", "13.59 at 154.7°"],
-    "holes": ["2 × 150.0 in hole 6; 150.0 in hole 8", "1 × 20 g in holes 4 (45°), 7 (90°)"],
-    "rig": ["disk 1    33.49  250.5°", "its angle is not determined"],
+    "balancing": ["rms 28.4 → 0.314 µm pp", "explained by the errors", "add 13.65 g·mm at"],
+    "holes": ["150.0 in hole 7; 2 × 150.0 in hole 8", "20 g in holes 7 (90°), 11 (150°)"],
+    "rig": ["disk 1    34.12  251.1°", "angle not determined"],
     "rotor": ["4375.19", "10932.4 rpm", "4409.93"],
     "reduction": ["134.203", "IRS", "three_masses.toml"],
     "identification": ["10.0108", "Only c and b*(1 - delta) are determined"],
     "record": ["880.814", "The model leaves 3.4 % of the record"],
     "calibration": ["The model explains the data", "rms 26.2 → 2.29 µm pp"],
-    "waveforms": ["1× of 3 sensors in 3 records; phases lag.", "rms 80.1 → "],
+    "waveforms": ["1× of 3 sensors in 3 records; phases lag.", "rms 80.0 → "],
 }
 
 
