@@ -192,9 +192,10 @@ class CheckComparison(Answered):
 
     @property
     def headline(self) -> str:
-        """Whether the rotor does what was predicted, and what is left, in a sentence."""
+        """Whether the rotor does what was predicted, and what is left in the last run, in a sentence."""
         scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        before, predicted, achieved = (rms(z) * scale for z in (self.before, self.predicted, self.achieved))
+        last = self.before, self.predicted[-1], self.achieved[-1]
+        before, predicted, achieved = (rms(z) * scale for z in last)
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
         left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
         return f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."

@@ -265,10 +265,10 @@ class Correction(Prediction, Answered):
         labels = self.labels
         if not self.sound:
             first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
-            stop, *instead = self.decision.lines() or ("",)
+            first += self.decision.lines()
             if self.decision.word == "determined in part":
-                instead.insert(0, f"With these weights: {self._left()}.")
-            return "\n".join(filter(None, (*first, stop, *instead)))
+                first.insert(len(self.contradictions) + 1, f"With these weights: {self._left()}.")
+            return "\n".join(first)
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
         what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"

@@ -137,6 +137,7 @@ class Case:
         at = [self.names.index(plane) for plane in choice.planes]
         return float((np.abs(choice.weights) * self.effect[at]).max())
 
+    @cached_property
     def fewer(self) -> tuple[Choice, ...]:
         """Choices of fewer planes within the limits of weights: all of four planes, one left out of more."""
         P = len(self.names)
@@ -172,7 +173,7 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         Of all speeds and planes; None: none.
     """
     D, before = result.weights, case.before
-    whole, fewer = case.choice(range(len(D)), D), case.fewer()
+    whole, fewer = case.choice(range(len(D)), D), case.fewer
     made = MountDecision(
         before=before, expected=whole.expected, choices=fewer, warnings=_contradicted(result)
     )
@@ -188,7 +189,7 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         cause = result.combination or unclear.removesuffix(REMEDY)
         if not (cause and D.any()):
             return made
-        return replace(made, word="determined in part", cause=cause, instead=remedies(case, fewer))
+        return replace(made, word="determined in part", cause=cause, instead=remedies(case))
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
         f"with the weights, expect rms {case.shown(whole.expected)} rather than {promised}; without them "
@@ -206,22 +207,19 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
     elif unclear:
         causes = [unclear.removesuffix(REMEDY) + "; their weights are not determined"]
     cause = "; ".join((*causes, outlook))
-    return replace(made, word="do not mount", cause=cause, instead=(*determined, *remedies(case, fewer)))
+    return replace(made, word="do not mount", cause=cause, instead=(*determined, *remedies(case)))
 
 
-def remedies(case: Case, fewer: Sequence[Choice] | None = None) -> tuple[str, ...]:
+def remedies(case: Case) -> tuple[str, ...]:
     """What to do instead of mounting weights in all the planes, in sentences with numbers.
 
     Parameters
     ----------
     case
         What weights would be made of.
-    fewer
-        Choices of fewer planes, if they are known.
     """
     weak, words = case.weak, []
-    every = case.fewer() if fewer is None else fewer
-    good = [c for c in every if case.sound(c) and c.most < WORTH * case.before]
+    good = [c for c in case.fewer if case.sound(c) and c.most < WORTH * case.before]
     if good:
         best = min(good, key=lambda c: c.most)
         planes = listing(map(repr, best.planes), "and")

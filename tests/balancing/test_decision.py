@@ -110,7 +110,7 @@ def test_limits_leave_choices_and_trial_weights_out():
     assert any("repeat the trial run of plane 'A' with" in w for w in free)
     limits = Limits(np.array([0.05, 0.05]) * GRAM, np.full((1, 5), np.inf), ((), ()))
     bound = replace(inputs, limits=limits)
-    assert not bound.fewer()
+    assert not bound.fewer
     assert any(
         "leave plane 'A' out: a clear trial weight would be larger than its largest" in w
         for w in remedies(bound)

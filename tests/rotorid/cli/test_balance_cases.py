@@ -89,3 +89,28 @@ def test_phases_that_are_missing_are_no_zeros(cli, runs):
     (line,) = ran.err.splitlines()
     assert line.startswith(f"rotorid: {JOBS / 'no_phase' / runs}, rows 2–5, column phase_deg: found ")
     assert not ran.out
+
+
+def test_limits_that_no_weights_are_sure_to_keep_ask_for_no_more_pieces(cli):
+    """Errors may leave 1.9 mm/s of any weights, the limit is 0.5: it was 12 pieces, 32 g, for 23.5 g."""
+    job = JOBS / "uncertain_limits/job.toml"
+    ran = cli("balance", job, "--split")
+    assert first(ran).startswith("Not decidable (prediction): 2 of 2 limits open")
+    assert "No set of pieces is enough" not in ran.out
+    found = cli("balance", job, "--split", "--json").json["mounting"]
+    assert found["pieces"] <= 5
+    assert found["max_after"] < 0.5
+
+
+def test_what_is_left_is_that_of_the_last_check_run(cli):
+    """Root mean squares 0.361 and 0.112 of two check runs, which are not told as one."""
+    ran = cli("balance", JOBS / "two_checks/job.toml")
+    assert first(ran).startswith("As predicted: with the weights rms 2.28 → 0.112 mm/s rms")
+
+
+def test_a_trim_that_cannot_be_one_of_pieces_says_why(cli):
+    job = JOBS / "two_checks/job.toml"
+    for options in ([], ["--split"]):
+        said = first(cli("balance", job, *options))
+        assert "Trim: add 0.3644 g at 51.4° in plane 'L'" in said
+        assert "not as pieces: the holes in which weights of run 'check 2' stand are not named" in said
