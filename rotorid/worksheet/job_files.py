@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorid.base.text import listing
-from rotorid.tables.job.job_keys import TABLES
+from rotorid.tables.job.job_keys import named_tables
 from rotorid.tables.reader.excel_workbook import SUFFIXES, is_workbook
 from rotorid.tables.reader.grid import clean
 from rotorid.tables.reader.input_file import MOST_BYTES, file_content, first_bytes
@@ -68,8 +68,7 @@ class FilesVersion:
             self.settings = settings_in(self._text)
         except ValueError as error:
             self.read_only = f"{job.name} cannot be read, correct it there: {error}"
-        for key in (*TABLES, "rotor"):
-            name = self.settings.get(key)
+        for key, name in (*named_tables(self.settings).items(), ("rotor", self.settings.get("rotor"))):
             if isinstance(name, str) and name.isprintable():
                 self._open(key, job.parent / name)
 

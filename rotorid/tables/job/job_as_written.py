@@ -10,7 +10,7 @@ from typing import Any
 
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_from_excel import WrittenJob, open_job
-from rotorid.tables.job.job_keys import LARGEST, READINGS, TABLES
+from rotorid.tables.job.job_keys import LARGEST, READINGS, TABLES, named_tables
 from rotorid.tables.job.readings import overriding_errors
 from rotorid.tables.reader.columns import Source, read_grid
 from rotorid.tables.reader.grid import Grid
@@ -112,11 +112,7 @@ def _comments(path: Path, problems: Problems) -> tuple[str, ...]:
 
 def _files(settings: dict[str, Any], job: Path) -> tuple[dict[str, Path], Path | None]:
     """Take the files out of the settings of a job that was read before."""
-    named = {
-        key: job.parent / settings.pop(key).strip()
-        for key in TABLES
-        if isinstance(settings.get(key), str)  # slow_roll may be vectors
-    }
+    named = {key: job.parent / settings.pop(key).strip() for key in named_tables(settings)}
     rotor = settings.pop("rotor", None)
     return named, None if rotor is None else job.parent / str(rotor).strip()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +24,8 @@ from rotorid.tables.runs.stated_conventions import (
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""
+WEIGHTS = "weights"
+"""In place of a table of `check_weights`: the weights were mounted, although there are holes for pieces."""
 READINGS = ("runs", "check", "slow_roll")
 """Those that are runs tables."""
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
@@ -37,6 +39,14 @@ _DEG = "angles of the holes in degrees, such as holes_deg = [0, 30, 75]"
 _AVAILABLE = "weights of which each can be mounted, such as available_g = [5, 10, 20]"
 _TAKEN = 'weights that are in holes already, by number or name of the hole, such as { "3" = 10 }'
 _STOCK = "how many there are of each available weight, such as stock = [4, 4, 2]"
+
+
+def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The files of `TABLES` that a job names, by key; vectors at slow speed and `WEIGHTS` are none."""
+    named = {key: settings.get(key) for key in TABLES}
+    if named["check_weights"] == WEIGHTS:
+        del named["check_weights"]
+    return {key: name for key, name in named.items() if isinstance(name, str)}
 
 
 def _arcs(section: Section, key: str) -> tuple[Pair, ...] | None:
@@ -394,7 +404,7 @@ JOB = (
         "check_weights",
         FILE,
         "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
-        "where there are holes, else the weights",
+        'where there are holes, else the weights; `"weights"`: these, although there are holes',
     ),
     Key(
         "slow_roll",

@@ -10,7 +10,7 @@ from rotorid.tables.job.assumed_conventions import with_assumed
 from rotorid.tables.job.check_runs import read_check
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_holes import read_holes
-from rotorid.tables.job.job_keys import JOB, TABLES
+from rotorid.tables.job.job_keys import JOB, TABLES, WEIGHTS, named_tables
 from rotorid.tables.job.job_limits import read_limits
 from rotorid.tables.job.job_model import read_model
 from rotorid.tables.job.job_planes import read_planes
@@ -47,7 +47,7 @@ def job_of(
     """
     said = take(top, JOB)
     folder = Path() if path is None else path.parent
-    named = {key: folder / said[key] for key in TABLES if isinstance(said[key], str)}
+    named = {key: folder / name for key, name in named_tables({key: said[key] for key in TABLES}).items()}
     tables: dict[str, Source] = {**named, **sheets}
     if overrides.waveforms is not None:
         tables["runs"] = Path(overrides.waveforms)
@@ -83,6 +83,7 @@ def job_of(
             left_out=planes.left_out,
             check=check,
             check_mounted=check is not None and "check_weights" in tables,
+            check_of_weights=said["check_weights"] == WEIGHTS and "check_weights" not in tables,
             rotor=model.rotor,
             plane_nodes=model.plane_nodes,
             sensor_places=model.sensor_places,
