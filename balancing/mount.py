@@ -126,7 +126,9 @@ class Mounted(Answered):
         each = [f"{one['pieces']} → {three_figures(one['rms_after'])} {unit}".rstrip() for one in fewer]
         lines += [f"With fewer pieces: {', '.join(each)}."] if each else []
         if not self.discrete.enough:
-            lines.append("No set of pieces is enough: this one leaves hardly more than the best.")
+            lines.append(
+                f"No set of pieces is enough: these are the fewest that leave {FEW} times the least."
+            )
         return Answer(
             f"{first} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),

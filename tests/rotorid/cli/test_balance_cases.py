@@ -1,5 +1,6 @@
 """Jobs on which the program was found wrong, and what it should say of them (tests/data/balance_cases)."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,28 @@ def test_the_region_of_planes_that_act_nearly_alike_holds_the_truth(cli):
     for row, off in zip(rows, vectors(rows) - truth, strict=True):
         distance = np.linalg.solve(row["covariance"], [off.real, off.imag]) @ [off.real, off.imag]
         assert distance < 6  # 95 %
+
+
+def test_where_no_set_of_pieces_is_enough_that_is_said_with_how_near_the_best_it_is(cli):
+    """Every set that the stock allows is tried: a 4 g and two 8 g in P1, a 4 g and an 8 g in P2."""
+    job = JOBS / "pieces_checked/job.toml"
+    ran = cli("balance", job, "--split")
+    assert "No set of pieces is enough: these are the fewest that leave 1.2 times the least." in ran.out
+    size, phase = np.loadtxt(job.with_name("runs.csv"), delimiter=",", skiprows=1, usecols=(3, 4)).T
+    y, *trials = (size * np.exp(1j * np.radians(phase))).reshape(3, 2)
+    W = (np.array(trials).T - y[:, None]) / 10
+    hole = np.exp(1j * np.radians(60 * np.arange(6)))
+
+    def sums(*pieces):
+        each = product(*(range(-1, 6) for _ in pieces))  # -1: left out
+        sets = [[(p, h) for p, h in zip(pieces, one, strict=True) if h >= 0] for one in each]
+        return [
+            sum((p * hole[h] for p, h in one), 0j) for one in sets if len({h for _, h in one}) == len(one)
+        ]
+
+    D = np.array(list(product(sums(4, 8, 8), sums(4, 8))))
+    rms = np.sqrt(np.mean(np.abs(y + D @ W.T) ** 2, axis=1))
+    assert cli("balance", job, "--split", "--json").json["mounting"]["rms_after"] < 1.2 * rms.min()
 
 
 @pytest.mark.parametrize("options", [[], ["--split"], ["--refine"], ["--refine", "--split"]])
