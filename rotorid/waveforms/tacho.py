@@ -106,6 +106,10 @@ class Tacho:
         """Turns per s."""
         return np.asarray(self.angle(t, 1))
 
+    def time_at(self, turns: FloatArray) -> FloatArray:
+        """Times of turns, s."""
+        return np.interp(turns, self.turn_at(self.angle.x), self.angle.x)
+
     def error_at(self, t: FloatArray) -> FloatArray:
         """Standard deviation, turns."""
         return np.interp(t, self.angle.x, self.errors)
@@ -202,10 +206,10 @@ def _angle(
     trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
     place, speed = np.interp(grid, index, times), trend.deriv()(times)
     offsets, angle = np.zeros(pulses), trend
-    variance, gram = np.mean(speed**2) + 0 * speed, np.zeros((4, len(grid)))
-    right = np.zeros(len(grid))
+    variance = np.mean(speed**2) + 0 * speed
+    weights, data = np.zeros((2, len(grid)))
     for _ in range(ROUNDS):
-        gram[0, index] = 1 / variance
+        weights[index] = 1 / variance
         ahead = index / pulses + offsets[kind] - trend(times)
         # the mark's other edge tells as much, where it keeps its distance
         apart = angle(other) - angle(times)
@@ -214,8 +218,9 @@ def _angle(
         early, late = np.array_split(apart[usual], 2)
         if np.abs(early.mean() - late.mean()) > WIDE * np.std(apart[usual]) / np.sqrt(len(early)):
             usual[:] = False
-        right[index] = (ahead - usual * apart / 2) / variance
-        smoothing, course = smooth(gram, right)
+        data[index] = ahead - usual * apart / 2
+        fit = smooth(weights, data)
+        course = fit.curve
         angle = CubicSpline(place, course + trend(place))
         ahead -= course[index]
         offsets -= np.bincount(kind, ahead, pulses) / np.maximum(np.bincount(kind, minlength=pulses), 1)
@@ -224,7 +229,7 @@ def _angle(
         scatter = np.minimum(ahead**2, OUTLYING * np.median(ahead**2)).mean()
         worn = max(0.0, scatter - sampled * np.mean(speed**2))
         variance = sampled * speed**2 + worn + EXACT**2
-    return angle, np.sqrt(smoothing.covariance[0]), offsets, ahead, worn
+    return angle, fit.errors, offsets, ahead, worn
 
 
 def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float]:
