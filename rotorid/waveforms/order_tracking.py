@@ -12,7 +12,7 @@ differs by, A″/24.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -60,6 +60,11 @@ class Orders:
     mean: ComplexArray
     mean_errors: FloatArray
     fast: BoolArray
+
+    def averaged(self, ends: FloatArray) -> Orders:
+        """The mean throughout, between two turns."""
+        curve, errors = CubicSpline(ends, [self.mean] * 2), np.array([self.mean_errors] * 2)
+        return replace(self, centres=ends, curve=curve, errors=errors, width=np.full(2, np.ptp(ends)))
 
 
 def track_orders(record: WaveformRecord, tacho: Tacho, highest: int, size: float = TURNS) -> Orders:
