@@ -5,21 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rotorid.base.answer import Answer
+import numpy as np
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import range_text
+from rotorid.base.text import capital, counted, error_figures
 from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import Found, command, log_rotor, phase, provenance
+from rotorid.commands.outcome import USUAL, Delivered, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Names, Nodes, nodes
+from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
-
-    DataFiles = Path | str | Sequence[Path | str]
-    """Jobs, tables of critical speeds or natural frequencies, tables of modes."""
+    from rotorid.base.arrays import BoolArray
+    from rotorid.calibration import CalibratedRotor, MeasuredFrequencies, RunReadings, Unknown
 
 
 @dataclass(frozen=True)
@@ -50,26 +56,85 @@ class CalibrateOptions:
     exact: bool = False
     unbalance_at: Nodes | None = None
     bow: int = 0
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
+    to: ClassVar[Sequence[str]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Calibrated(Found):
+class Calibrated(Delivered):
     """The calibrated rotor, and what was assumed of the data."""
 
+    found: CalibratedRotor
     assumed: tuple[str, ...] = ()
-    written: Path | None = None
 
     @property
     def answer(self) -> Answer:
-        """With what was assumed."""
-        answer: Answer = self.found.answer
-        return replace(answer, notes=(*answer.notes, *self.assumed))
+        """Whether the model explains the data; the wished numbers; what the data do not tell."""
+        found = self.found
+        fits = "explains" if found.explained else "does NOT explain"
+        chi = f"χ² {found.chi_square:.4g} with {counted(found.dof, 'degree')} of freedom"
+        first = [f"The model {fits} the data ({chi})."]
+        speeds = [speed for data in found.readings for speed in data.trials.speeds.tolist()]
+        if seen := found.seen:
+            at = f"at {range_text(min(speeds), max(speeds))} " if speeds else ""
+            first.append(capital(f"{at}{seen}."))
+        why = {} if found.prior is None else found.prior.why
+        beside = ~found.wished
+        tables = [parameter_text(*self._part(which), why) for which in (~beside, beside) if which.any()]
+        if found.bare:
+            tables.append(text(self._unbalance(), width=COLUMNS))
+        more = "what else is not known exactly" if beside.any() else "unbalance"
+        notes = []
+        if found.searches > 1:
+            notes.append(f"searched from {found.searches} starting values")
+        if found.exact:
+            exact = counted(len(found.exact), "number")
+            notes.append(f"± count what {exact} taken as exact may be off")
+        return Answer(
+            "\n".join(first),
+            tables[0],
+            found.warnings,
+            (*notes, *self.assumed),
+            tables=tuple(tables[1:]),
+            more=more if tables[1:] else "",
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per number: value, standard deviation, 95 % interval, share of the data."""
+        every = parameter_columns(*self._part(np.full(len(self.found.names), True)))
+        return frame((*every, Column("data_share", self.found.data_share)))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types, with the rotor file that is written."""
-        return {**super().to_dict(), "rotor": self.written and str(self.written)}
+        """As JSON types, without the provenance; None where not determined."""
+        found, estimate = self.found, self.found.fit.estimate
+        names, every = self._part(np.full(len(self.found.names), True))
+        parameters = parameter_dict(names, every)
+        for name, unknown, share in zip(names, found.unknowns, found.data_share, strict=True):
+            parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
+        return plain(
+            {
+                "parameters": parameters,
+                "rank": estimate.rank,
+                "condition_number": estimate.condition_number,
+                "identifiable": estimate.full_rank,
+                "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
+                "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+                "correlation": every.correlation,
+                "seen": found.seen or None,
+                "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
+                "chi_square": found.chi_square,
+                "degrees_of_freedom": found.dof,
+                "probability": found.chance,
+                "exact": found.exact,
+                "explained": found.explained,
+                "lack_of_fit": found.lack_of_fit,
+                "unbalance": rows(self._unbalance()) if found.bare else [],
+                "warnings": found.warnings,
+                "rotor": None,
+            }
+        )
 
-    def files(self, path: Path) -> Mapping[Path, bytes]:
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
         """The calibrated rotor as a rotor file, .toml, with its tables; or the table of numbers.
 
         Raises
@@ -77,20 +142,41 @@ class Calibrated(Found):
         ValueError
             For a rotor file of numbers that the data do not determine.
         """
-        from rotorid.tables.reader.table_writing import table_bytes
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
         if path.suffix.lower() != ".toml":
-            return {path: table_bytes(path, self.to_frame())}
+            return super().table_file(path)
         if why := self.found.undetermined:
             raise ValueError(f"{path}: no rotor file can be written, {why}")
         return rotor_file_bytes(path, self.found.rotor)
+
+    def document_for(self, output: Path | None) -> dict[str, Any]:
+        """With the name of the file that is written."""
+        return {**self.document, "rotor": output and str(output)}
 
     def figure(self) -> Figure:
         """The numbers with what was known of them."""
         from rotorid.calibration.plots import calibration_figure
 
         return calibration_figure(self.found)
+
+    def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
+        """Names of some of the numbers, and these with their errors."""
+        found, part = self.found, Uncertain()
+        part.values, part.errors_stated, part.dof = found.values[which], True, 0
+        part.covariance = np.where(np.isnan(found.std), np.nan, found.covariance)[np.ix_(which, which)]
+        return tuple(name for name, taken in zip(found.names, which, strict=True) if taken), part
+
+    def _unbalance(self) -> tuple[Column, ...]:
+        """What the bare rotor's readings say of its unbalances and bows."""
+        names, values = self.found.bare, np.concatenate(self.found.unbalance)
+        return (
+            Column("unbalance", names, str),
+            Column("size", np.abs(values), "{:.4g}".format),
+            Column("std", np.concatenate(self.found.unbalance_std), error_figures, "±"),
+            Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names], str),
+            Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
+        )
 
 
 class Prepared(NamedTuple):
@@ -111,16 +197,23 @@ class Prepared(NamedTuple):
 
 
 @command
-def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Calibrated:
-    """Estimate numbers of a rotor from data of any mixture, with errors, and what the data do not determine.
+def calibrate(
+    rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
+) -> Calibrated:
+    """Numbers of a rotor file from trial runs, critical speeds and modes, with ±.
+
+    --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
+    critical, campbell and response show bands.
+
+    Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
+    --estimate "bearing[*].*" --prior "bearing[*].*=20%" --output calibrated.toml
 
     Parameters
     ----------
-    rotor
-        As it is believed to be: a rotor, or its file.
-    data
-        Jobs with trial runs (or with readings of the bare rotor), tables of critical speeds, natural
-        frequencies or modes.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml).
+    data : DATA
+        Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.
     options
         What is unknown, and what is known of it.
 
@@ -148,7 +241,9 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
     return Calibrated(found=result, assumed=tuple(given.assumed), provenance=origin)
 
 
-def prepared(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Prepared:
+def prepared(
+    rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
+) -> Prepared:
     """Read what is calibrated.
 
     Raises

@@ -4,10 +4,10 @@ In a block x ≈ Re Σ_k A_k e^{ikθ}, θ the angle of the shaft: the mean of th
 on, all together; whole turns hold no other order, nor halves of them where there are two. The A_k of the
 blocks are smoothed order by order (rotorid.waveforms.smoothing): where nothing moves this is a mean over all;
 where the speed passes a resonance it follows. The noise of an order is what its blocks scatter by, so that
-its colour counts; where the curve follows each block, that says little, and the noise is at least that share
-of what the blocks leave of their samples. Where A moves in a block, by A′ s, s from −½ to ½, it leaks L A′ into
-itself and other orders, which is taken off with A′ of the curve; so is, at last, what the mean over a block
-differs by, A″/24.
+its colour counts; where the curve follows each block that says little, and the noise is at least that share
+of what the blocks leave of their samples. Where A moves in a block, by A′ s, s from −½ to ½, it leaks L A′
+into itself and other orders, which is taken off with A′ of the curve; so is, at last, what the mean over a
+block differs by, A″/24.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rotorid.waveforms.tacho import Tacho
 TURNS, LEAST, MOST = 2.0, 4, 8000
 """Of a block; how many blocks there are: those of longer records have more turns."""
 FINER, FAST = 0.01, 0.03
-"""Where A″/24 is more, of the largest, blocks are of one turn; where it is more than that, they are too long."""
+"""Where A″/24, or the error, is more, of the largest, blocks are of one turn; beyond that it is said."""
 PASSES = 2
 """The second takes off what the first says that leaks."""
 PARTS = 16

@@ -142,7 +142,7 @@ def figure_waterfall(record: WaveformRecord, tacho: Tacho, orders: Sequence[floa
     """
     channel, rate = record.sensors[0], record.rate
     unit, scale = UNITS[channel.derivative]
-    # of 1× within a spectrum of T the frequency changes by 1/T: a flat top stays true to 0.3 %, of 2× to 1.1 %
+    # 1× changes by 1/T within a spectrum of T, at most: a flat top stays true to 0.3 %, of 2× to 1.1 %
     start, stop = tacho.times[0], tacho.times[-1]
     t = np.linspace(start, stop, 10 * LINES)
     course = np.gradient(tacho.turn_at(t), t)

@@ -4,9 +4,9 @@ Data z of a curve, n values that weigh g each: c minimises Σ g |c − z|² + λ
 most likely one (restricted maximum likelihood: log|G + λP| − n log λ + N log s² is least), w follows how fast
 the curve moves: near a resonance it is bent more easily.
 
-The Bayesian variance s² (G + λP)⁻¹ (Wahba 1983) is that of noise and of bias. This λ is small for curves
-smoother than a third difference expects, as those of machines are, and leaves hardly any bias: errors are those
-of the noise alone, 5/6 of that variance but for the three numbers of a parabola, which have no bias.
+The Bayesian variance s² (G + λP)⁻¹ (Wahba 1983) is that of noise and of bias. Curves of machines are
+smoother than third differences expect, and this λ leaves them hardly any bias: errors are those of the noise
+alone, 5/6 of that variance but for the three numbers of a parabola, which have no bias.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def stiffness(penalty: FloatArray) -> FloatArray:
 
 
 def smooth(weights: FloatArray, data: AnyArray) -> Smoothed:
-    """Choose the stiffness of a curve through data (n,), which weigh so much, (n,), or 0 where there are none."""
+    """Choose the stiffness of a curve through data (n,) of these weights (n,), 0 where there are none."""
     n, columns = len(data) - 3, 2 if np.iscomplexobj(data) else 1
     per, count = float(weights.mean()), max((int(np.count_nonzero(weights)) - 3) * columns, 1)
 

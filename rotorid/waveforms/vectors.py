@@ -196,7 +196,7 @@ def _means(tacho: Tacho, pulses: int) -> FloatArray:
 
 def _independent(tacho: Tacho, tracked: Orders, ends: FloatArray) -> FloatArray:
     """Times of vectors that share no turns, the first and the last half their turns from the ends."""
-    blocks = np.linspace(*ends, len(tracked.width) + 1)
+    blocks = np.linspace(ends[0], ends[1], len(tracked.width) + 1)
     number = np.append(0.0, np.cumsum(np.diff(blocks) / tracked.width))
     count = max(2, int(number[-1]))
     return tacho.time_at(np.interp((np.arange(count) + 0.5) * number[-1] / count, number, blocks))

@@ -317,7 +317,7 @@ def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor)
         left(truth.W),
         left(believed.W),
         d / np.where(free, found.std, np.nan),
-        found.to_frame()["data_share"].to_numpy() > 0.5,
+        found.data_share > 0.5,
         distance(d[free], found.covariance[np.ix_(free, free)]),
         distance(stretch(other.weights + U), other.covariance),
         check.distance.ravel() ** 2 < chdtri(2, 0.05),
