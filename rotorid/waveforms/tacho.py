@@ -76,8 +76,8 @@ class Tacho:
         What the user should know.
     angle
         Turns over time, s.
-    errors
-        Standard deviation of the angle, turns, at its knots.
+    errors, widths
+        Standard deviation of the angle, turns, at its knots, and over how many turns it is a mean.
     indexed
         Whether angle 0 is the same in every record: not with several even pulses a turn.
     """
@@ -93,6 +93,7 @@ class Tacho:
     warnings: tuple[str, ...]
     angle: CubicSpline
     errors: FloatArray
+    widths: FloatArray
     indexed: bool
 
     @property
@@ -112,9 +113,10 @@ class Tacho:
         """Turns per s."""
         return np.asarray(self.angle(t, 1))
 
-    def error_at(self, t: FloatArray) -> FloatArray:
-        """Standard deviation, turns."""
-        return np.interp(t, self.angle.x, self.errors)
+    def error_at(self, t: FloatArray, over: FloatArray | float = 0.0) -> FloatArray:
+        """Standard deviation, turns; of the mean over some turns less: squares of widths of means add."""
+        error, width = (np.interp(t, self.angle.x, each) for each in (self.errors, self.widths))
+        return np.asarray(error / (1 + (over / width) ** 2) ** 0.25)
 
 
 def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
@@ -192,18 +194,20 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
         warnings=tuple(words),
         angle=fit.angle,
         errors=fit.errors,
+        widths=fit.widths,
         indexed=indexed,
     )
 
 
 class _Fit(NamedTuple):
-    """The angle with its errors; offsets of the pulses of a turn; pulses less the angle; their variance, turns².
+    """The angle, its errors and widths; offsets of the pulses of a turn; pulses less the angle; their variance, turns².
 
     And that of worn marks.
     """
 
     angle: CubicSpline
     errors: FloatArray
+    widths: FloatArray
     offsets: FloatArray
     ahead: FloatArray
     variance: FloatArray
@@ -217,8 +221,8 @@ def _fitted(times: FloatArray, other: FloatArray, index: IntArray, pulses: int, 
     """
     grid, kind = np.arange(index[-1] + 1), index % pulses
     many = np.maximum(np.bincount(kind, minlength=pulses), 1)
-    trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
-    place, angle, offsets = np.interp(grid, index, times), trend, np.zeros(pulses)
+    angle = trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
+    place, offsets = np.interp(grid, index, times), np.zeros(pulses)
     variance = np.full(len(times), np.mean(trend.deriv()(times) ** 2))
     weights, data = np.zeros((2, len(grid)))
     for _ in range(ROUNDS):
@@ -238,7 +242,8 @@ def _fitted(times: FloatArray, other: FloatArray, index: IntArray, pulses: int, 
         edge = sampled * angle(times, 1) ** 2
         worn = max(0.0, np.minimum(ahead**2, OUTLYING * np.median(ahead**2)).mean() - edge.mean())
         variance = edge + worn + EXACT**2
-    return _Fit(angle, curve.errors, offsets, ahead, variance, worn)
+    widths = 1 / (pulses * np.maximum(curve.shares, EXACT))
+    return _Fit(angle, curve.errors, widths, offsets, ahead, variance, worn)
 
 
 def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float]:

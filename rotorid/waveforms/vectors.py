@@ -143,7 +143,7 @@ def _found(
         times = np.full(1 if times is None else len(times), np.mean(tacho.span))
         along, shaft = (
             tracked.averaged(ends),
-            replace(tacho, angle=CubicSpline(tacho.span, ends), errors=np.zeros(2)),
+            replace(tacho, angle=CubicSpline(tacho.span, ends), errors=np.zeros(2), widths=np.ones(2)),
         )
     else:
         along, shaft, times = tracked, tacho, _independent(tacho, tracked, ends) if times is None else times
@@ -161,7 +161,7 @@ def _found(
         vectors[:, :, c], factor = before_path(H, vectors[:, :, c], change[:, wanted, c], w, rates)
         radial[:, :, c] *= factor
     vectors, radial = vectors.swapaxes(1, 2), radial.swapaxes(1, 2)
-    angle = 2 * np.pi * np.hypot(shaft.error_at(times), tacho.offset_s * speed)
+    angle = 2 * np.pi * np.hypot(shaft.error_at(times, wide), tacho.offset_s * speed)
     same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
     direct = np.array([sensor.path.high_pass_rad_s is None for sensor in record.sensors])
     spans = zip(times, np.maximum(wide, LEAST_TURNS) / speed, strict=True)
