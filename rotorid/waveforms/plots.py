@@ -1,4 +1,4 @@
-"""Pictures of records: the tacho, the orbit of two sensors, and a waterfall of spectra over speed.
+"""Pictures of records: the tacho, the orbit of two sensors, and a waterfall of spectra over time.
 
 The mark of a turn is shown as on an oscilloscope: the curve is blank just before it and bright, a dot, at it,
 so that blank to bright is the direction of time. Of a long record only what is drawn is read.
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import BLUE, COLORS, QUIET, TEXT, VERMILION, legend_below, new_figure, plain
 from rotorid.waveforms.record import Channel, WaveformRecord
 
@@ -27,12 +26,8 @@ TURNS, BLANK = 4, 0.06
 """Drawn of a tacho or an orbit; share of a turn before its mark."""
 A_LINE = 0.02
 """An orbit that is narrower, of its length, has no direction."""
-LINES, TALLEST, SEEN = 48, 0.3, 0.02
-"""Spectra of a waterfall; its largest amplitude, of its height, and what of that must be on the axis."""
-MOST_TURNS, FINER = 64.0, 4
-"""Turns within a spectrum of T, at most; steps of its frequency in 1/T."""
-RUN_UP = 0.05
-"""Share of the speed by which it must change to be an axis."""
+LINES, MOST_TURNS, POINTS = 48, 64.0, 200
+"""Spectra of a waterfall, at least, and turns within each, at most; points of the lines of orders."""
 
 
 def figure_of(picture: str, record: WaveformRecord, vectors: Vectors) -> Figure:
@@ -106,13 +101,14 @@ def figure_orbit(record: WaveformRecord, tacho: Tacho, at: float) -> Figure:
         end = f"its pulses end at {tacho.times[-1]:.4g} s"
         raise ValueError(f"the tacho has not {TURNS} whole turns after {at:.4g} s: {end}")
     start, stop = np.interp([begin, begin + TURNS], tacho.turns, tacho.times)
-    first, last = int(np.ceil(start * record.rate)), int(stop * record.rate) + 1
+    first, last = int(start * record.rate), int(stop * record.rate) + 2
     unit, scale = UNITS[pair[0].derivative]
     read = np.stack([sensor.samples[first:last] * (sensor.factor * scale) for sensor in pair])
-    read -= read.mean(axis=1, keepdims=True)
     turn = tacho.turn_at(np.arange(first, last) / record.rate) - begin
     mark = np.exp(2j * np.pi * turn)
-    x, y = 2 * (read * mark.conj()).mean(axis=1)
+    whole = (turn >= 0) & (turn < TURNS)
+    read -= read[:, whole].mean(axis=1, keepdims=True)
+    x, y = 2 * (read * mark.conj())[:, whole].mean(axis=1)
     figure = new_figure(4.8, 4.8)
     orbit = figure.add_subplot()
     for label, z, color, width in (
@@ -136,51 +132,19 @@ def figure_orbit(record: WaveformRecord, tacho: Tacho, at: float) -> Figure:
 
 
 def figure_waterfall(record: WaveformRecord, tacho: Tacho, orders: Sequence[float] = (1, 2)) -> Figure:
-    """Draw spectra of the first sensor above each other, and orders as lines.
-
-    Over speed, or time where that is steady or turns back.
-    """
-    channel, rate = record.sensors[0], record.rate
+    """Draw spectra of the first sensor over time, in dB of the unit shown, and orders as lines."""
+    channel, t = record.sensors[0], np.linspace(tacho.times[0], tacho.times[-1], POINTS)
     unit, scale = UNITS[channel.derivative]
-    # 1× changes by 1/T within a spectrum of T, at most: a flat top stays true to 0.3 %, of 2× to 1.1 %
-    start, stop = tacho.times[0], tacho.times[-1]
-    t = np.linspace(start, stop, 10 * LINES)
-    course = np.gradient(tacho.turn_at(t), t)
-    change = max(float(np.abs(np.diff(course)).sum() / (stop - start)), 1e-12)
-    T = min(MOST_TURNS / course.mean(), (stop - start) / 4, change**-0.5)
-    times = np.linspace(start + T / 2, stop - T / 2, LINES)
-    speed = np.interp(times, t, course)
-    run_up = abs(speed[-1] - speed[0]) > max(0.9 * np.ptp(speed), RUN_UP * speed.max())
-    place = 60 * speed if run_up else times
-    frequencies, amplitudes = spectra(channel, rate, times, int(T * rate))
-    largest = float(amplitudes.max()) or 1.0
-    seen = frequencies[amplitudes.max(axis=0) > SEEN * largest].max(initial=0.0)
-    shown = frequencies <= min(max(1.15 * seen, (max(orders) + 0.5) * speed.max()), rate / 2)
+    speed = np.gradient(tacho.turn_at(t), t)
+    n = int(min(MOST_TURNS / speed.mean(), np.ptp(t) / LINES) * record.rate)
     figure = new_figure(5.4)
     ax = figure.add_subplot()
-    x, tall = frequencies[shown], TALLEST * np.ptp(place) / largest
-    for base, line in sorted(zip(place, amplitudes[:, shown], strict=True), key=lambda each: -each[0]):
-        ax.fill_between(x, base, base + tall * line, color="white", zorder=3)
-        ax.plot(x, base + tall * line, color=BLUE, linewidth=0.8, zorder=3)
-    top = int(np.argmax(place))
+    samples = channel.samples * (channel.factor * scale)
+    ax.specgram(samples - samples.mean(), NFFT=n, Fs=record.rate, noverlap=n // 2, pad_to=4 * n, mode="magnitude")
     for each in orders:
-        ax.plot(each * speed, place, "--", color=VERMILION, linewidth=0.9, zorder=4)
-        ax.annotate(f"{each:g}×", (each * speed[top], place[top]), color=VERMILION, fontsize=TEXT, zorder=4)
-    ax.set(xlim=(0, x[-1]), xlabel="frequency, Hz", ylabel="speed, rpm" if run_up else "time, s")
-    size = f"largest {scale * largest:.3g} {unit} (peak)".replace("  ", " ")
-    ax.set_title(f"{channel.name}: {LINES} spectra of {T:.2g} s; {size}", fontsize=TEXT)
-    plain(ax)
+        ax.plot(t, each * speed, "--", color=VERMILION, linewidth=0.9)
+        ax.annotate(f"{each:g}×", (t[-1], each * speed[-1]), color=VERMILION, fontsize=TEXT)
+    ax.set(ylim=(0, min((max(orders) + 1) * speed.max(), record.rate / 2)))
+    ax.set(xlabel="time, s", ylabel="frequency, Hz")
+    ax.set_title(f"{channel.name}: spectra of {n / record.rate:.2g} s, dB {unit}".strip(), fontsize=TEXT)
     return figure
-
-
-def spectra(channel: Channel, rate: float, times: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (F,), Hz, and amplitudes (L, F), SI, of n samples around each time.
-
-    The peak of a sine is its amplitude, wherever its frequency is.
-    """
-    from scipy.signal import periodogram
-
-    firsts = np.clip(np.rint(times * rate).astype(int) - n // 2, 0, len(channel.samples) - n)
-    samples = np.array([channel.samples[first : first + n] for first in firsts]) * channel.factor
-    frequencies, power = periodogram(samples, rate, "flattop", FINER * n, scaling="spectrum")
-    return frequencies, np.sqrt(2 * power)

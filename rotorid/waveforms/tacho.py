@@ -200,9 +200,9 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
 
 
 class _Fit(NamedTuple):
-    """The angle, its errors and widths; offsets of the pulses of a turn; pulses less the angle; their variance, turns².
+    """The angle, its errors and widths; offsets of a turn's pulses; pulses less the angle and their variance.
 
-    And that of worn marks.
+    In turns²; and the variance of worn marks.
     """
 
     angle: CubicSpline
