@@ -1,4 +1,4 @@
-"""Numbers of a rotor from readings of runs, critical speeds and modes together: one least-squares fit.
+"""Numbers of a rotor from readings of runs: one least-squares fit.
 
 Rows of all data, each divided by its error, and of what is known beforehand go through the nonlinear driver
 of `rotorid.regression` with exact derivatives. χ² of data and priors together, m + p − n degrees of freedom,
@@ -21,7 +21,6 @@ from scipy.special import chdtrc
 from fem import Calibration, Rotor, is_reading
 from fem.parameters import with_parameters
 from rotorid.base.arrays import FloatArray, IntArray
-from rotorid.calibration.frequencies import MeasuredFrequencies
 from rotorid.calibration.readings import ReadingRows, RunReadings
 from rotorid.calibration.result import LEVEL, CalibratedRotor
 from rotorid.calibration.unknowns import Unknown, as_they_stand, check_different
@@ -43,14 +42,8 @@ AS_WELL = 4.0
 class _Equations:
     """Residuals of all data at the numbers θ (n,), in standard deviations, and their derivatives."""
 
-    def __init__(
-        self,
-        rotor: Rotor,
-        paths: Sequence[str],
-        readings: Sequence[RunReadings],
-        frequencies: Sequence[MeasuredFrequencies],
-    ) -> None:
-        self.rotor, self.paths, self.readings, self.frequencies = rotor, paths, readings, frequencies
+    def __init__(self, rotor: Rotor, paths: Sequence[str], readings: Sequence[RunReadings]) -> None:
+        self.rotor, self.paths, self.readings = rotor, paths, readings
         self.rows: list[ReadingRows] = []
         self.size = 0
 
@@ -67,7 +60,6 @@ class _Equations:
         try:
             W = [data.coefficients(self.rotor, values)[0] for data in self.readings]
             parts = [rows.residual(each)[0] for rows, each in zip(self.rows, W, strict=True)]
-            parts += [data.residual(self.rotor, values) for data in self.frequencies]
         except (ValueError, np.linalg.LinAlgError):
             if not self.size:
                 raise
@@ -82,15 +74,13 @@ class _Equations:
     def by(self, paths: Sequence[str], values: dict[str, float]) -> FloatArray:
         """Derivatives by any numbers that have values."""
         parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, paths)) for rows in self.rows]
-        parts += [data.jacobian(self.rotor, values, paths) for data in self.frequencies]
         return np.vstack(parts)
 
 
 def calibrate(
     rotor: Rotor,
     unknowns: Sequence[Unknown],
-    readings: Sequence[RunReadings] = (),
-    frequencies: Sequence[MeasuredFrequencies] = (),
+    readings: Sequence[RunReadings],
     *,
     exact: Sequence[Unknown] = (),
     side_starts: bool = True,
@@ -103,8 +93,8 @@ def calibrate(
         As it is believed to be.
     unknowns
         Its n unknown numbers.
-    readings, frequencies
-        The data, of any mixture.
+    readings
+        The data, of one machine in one or several states.
     exact
         Numbers that are taken as the rotor has them; the deviations of their priors widen the errors of the
         estimate.
@@ -117,14 +107,14 @@ def calibrate(
     ValueError
         Without data or unknowns, for unknowns that the rotor does not have, and data that it cannot show.
     """
-    if not unknowns or not (readings or frequencies):
+    if not unknowns or not readings:
         raise ValueError("a calibration needs data and at least one unknown number")
-    equations = _Equations(rotor, [unknown.path for unknown in unknowns], readings, frequencies)
+    equations = _Equations(rotor, [unknown.path for unknown in unknowns], readings)
     sensors = [sensor for data in readings for sensor in data.trials.sensors]
-    shown = ["key_phasor.angle"] if readings else []
-    shown += [f"probe[{sensor}].{what}" for sensor in sensors for what in ("angle", "gain")]
+    shown = [f"probe[{sensor}].{what}" for sensor in sensors for what in ("angle", "gain")]
+    shown.append("key_phasor.angle")
     if lost := [path for path in equations.paths if is_reading(path) and path not in shown]:
-        raise ValueError(f"no data have readings of {lost[0]}: {', '.join(shown) or 'there are no runs'}")
+        raise ValueError(f"no data have readings of {lost[0]}: {', '.join(shown)}")
     check_different(rotor, equations.paths)
     names = tuple(unknown.label for unknown in unknowns)
     limits = dict(zip(names, (unknown.limits(rotor) for unknown in unknowns), strict=True))
@@ -132,8 +122,6 @@ def calibrate(
     bounds = np.array([*limits.values()], dtype=float)
     bounds = np.where(np.isnan(bounds), (-np.inf, np.inf), bounds)
     first = np.clip([unknown.first(rotor) for unknown in unknowns], *bounds.T)
-    for modes in frequencies:
-        modes.check(rotor, equations.values(first), equations.paths)
     equations.weigh(first)
     equations.residual(first)
 
@@ -195,7 +183,7 @@ def _judged(
     theta, rotor, rows = fit.estimate.solution, equations.rotor, equations.rows
     K, r, values = equations.jacobian(theta), equations.residual(theta), equations.values(theta)
     bare = [each.bare(*each.data.coefficients(rotor, values, equations.paths)) for each in rows]
-    spent = sum(each.rank for each in bare) + sum(modes.scales for modes in equations.frequencies)
+    spent = sum(each.rank for each in bare)
 
     def mismatch(theta: FloatArray) -> float:
         return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))

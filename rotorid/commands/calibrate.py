@@ -1,4 +1,4 @@
-"""`calibrate`: numbers of a rotor file from trial runs, critical speeds and modes."""
+"""`calibrate`: numbers of a rotor file from trial runs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from fem import Rotor
     from rotorid.base.arrays import BoolArray
-    from rotorid.calibration import CalibratedRotor, MeasuredFrequencies, RunReadings, Unknown
+    from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,9 @@ class CalibrateOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Calibrated(Delivered):
-    """The calibrated rotor, and what was assumed of the data."""
+    """The calibrated rotor."""
 
     found: CalibratedRotor
-    assumed: tuple[str, ...] = ()
 
     @property
     def answer(self) -> Answer:
@@ -94,7 +93,7 @@ class Calibrated(Delivered):
             "\n".join(first),
             tables[0],
             found.warnings,
-            (*notes, *self.assumed),
+            tuple(notes),
             tables=tuple(tables[1:]),
             more=more if tables[1:] else "",
         )
@@ -180,15 +179,13 @@ class Calibrated(Delivered):
 
 
 class Prepared(NamedTuple):
-    """What is calibrated: the rotor, unknown numbers, data; files of both; what was assumed."""
+    """What is calibrated: the rotor, unknown numbers, data; files of both."""
 
     rotor: Rotor
     numbers: list[Unknown]
     readings: list[RunReadings]
-    frequencies: list[MeasuredFrequencies]
     rotor_files: tuple[Path, ...]
     data_files: list[Path]
-    assumed: list[str]
 
     @property
     def probes(self) -> list[str]:
@@ -200,7 +197,7 @@ class Prepared(NamedTuple):
 def calibrate(
     rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
 ) -> Calibrated:
-    """Numbers of a rotor file from trial runs, critical speeds and modes, with ±.
+    """Numbers of a rotor file from trial runs, with ±.
 
     --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
     critical, campbell and response show bands.
@@ -213,7 +210,7 @@ def calibrate(
     rotor : ROTOR
         Rotor table (.csv, .xlsx) or rotor file (.toml).
     data : DATA
-        Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.
+        Jobs with trial runs (.toml, .xlsx).
     options
         What is unknown, and what is known of it.
 
@@ -232,13 +229,13 @@ def calibrate(
     beside = unknowns(given.rotor, given.probes, options.estimate, exact=False) if options.exact else []
     exact = [number for number in beside if number.path not in paths]
     with phase("calibration"):
-        result = calibration.calibrate(*given[:4], exact=exact)
+        result = calibration.calibrate(*given[:3], exact=exact)
     of_rotor = {one["sha256"] for one in origin["inputs"][: len(given.rotor_files)]}  # which jobs name, too
     made_from = [one for one in origin["inputs"] if one["sha256"] not in of_rotor]
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-    return Calibrated(found=result, assumed=tuple(given.assumed), provenance=origin)
+    return Calibrated(found=result, provenance=origin)
 
 
 def prepared(
@@ -267,8 +264,8 @@ def prepared(
     if options.bow and not places:
         raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]
-    readings, frequencies, read, assumed = read_data(sources, model, places, options.bow)
-    without = Prepared(model, [], readings, frequencies, files, read, assumed)
+    readings, read = read_data(sources, model, places, options.bow)
+    without = Prepared(model, [], readings, files, read)
     numbers = unknowns(
         model, without.probes, options.estimate, options.prior, options.bounds, exact=options.exact
     )

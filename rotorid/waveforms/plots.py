@@ -140,7 +140,9 @@ def figure_waterfall(record: WaveformRecord, tacho: Tacho, orders: Sequence[floa
     figure = new_figure(5.4)
     ax = figure.add_subplot()
     samples = channel.samples * (channel.factor * scale)
-    ax.specgram(samples - samples.mean(), NFFT=n, Fs=record.rate, noverlap=n // 2, pad_to=4 * n, mode="magnitude")
+    ax.specgram(
+        samples - samples.mean(), NFFT=n, Fs=record.rate, noverlap=n // 2, pad_to=4 * n, mode="magnitude"
+    )
     for each in orders:
         ax.plot(t, each * speed, "--", color=VERMILION, linewidth=0.9)
         ax.annotate(f"{each:g}×", (t[-1], each * speed[-1]), color=VERMILION, fontsize=TEXT)
