@@ -199,16 +199,14 @@ def _judged(
         moved = solution(prior.below(K), H)
         covariance = covariance + moved @ moved.T
     to = as_they_stand(rotor, values)
-    lack = _lack_of_fit(equations, values) if chance < LEVEL else {}
-    speeds, sensors = sorted({speed for speed, _ in lack}), sorted({sensor for _, sensor in lack})
+    lack = _lack_of_fit(equations, values) if chance < LEVEL else 0.0
+    explained = chance >= LEVEL and fit.converged and fit.estimate.full_rank
     calibration = Calibration(
         names=tuple(equations.paths),
         values=theta,
         covariance=to @ covariance @ to.T,
-        speeds=np.array(speeds),
-        sensors=tuple(sensors),
-        lack_of_fit=np.array([[lack.get((v, c), 0.0) for c in sensors] for v in speeds]),
-        needs_trial_run=chance < LEVEL or not (fit.converged and fit.estimate.full_rank),
+        lack_of_fit=lack,
+        needs_trial_run=not explained,
     )
     same = 3 * np.sqrt(np.diag(covariance)) + SAME * np.abs(theta)
     same[np.isnan(fit.values)] = np.inf
@@ -223,6 +221,8 @@ def _judged(
         chi_square=chi_square,
         dof=dof,
         chance=chance,
+        explained=explained,
+        lack_of_fit=lack,
         exact=tuple(number.label for number in exact),
         unbalance=tuple(each.u for each in bare),
         unbalance_std=tuple(each.std(covariance, times) for each in bare),
@@ -233,22 +233,18 @@ def _judged(
     )
 
 
-def _lack_of_fit(equations: _Equations, values: dict[str, float]) -> dict[tuple[float, str], float]:
-    """What the model leaves of what weights do beyond the errors, by speed and sensor: relative deviations.
+def _lack_of_fit(equations: _Equations, values: dict[str, float]) -> float:
+    """What the model leaves of what weights do beyond the errors: relative rms over speeds and sensors.
 
     The mean over all readings of a job counts as two more rows of each speed and sensor.
     """
-    lack: dict[tuple[float, str], float] = {}
+    relative = []
     for rows in equations.rows:
-        trials, W = rows.data.trials, rows.data.coefficients(equations.rotor, values)[0]
+        W = rows.data.coefficients(equations.rotor, values)[0]
         bare = np.einsum("scq,q->sc", W[..., len(rows.data.nodes) :], rows.residual(W)[2])[:, None]
         left = rows.raw(W) + bare
         square = (np.abs(left) ** 2 / 2 - rows.variance.reshape(*left.shape, 2).mean(axis=3)).sum(axis=1)
-        effects = np.abs(bare + rows.effect(W))
-        size, share = np.maximum((effects**2).sum(axis=1), np.finfo(float).tiny), 2 / left.shape[1]
-        mean = max(float(square.sum() / size.sum()), 0.0)
-        relative = np.sqrt((share * mean + np.maximum(square, 0.0) / size) / (1 + share))
-        for (s, c), value in np.ndenumerate(relative):
-            key = float(trials.speeds[s]), trials.sensors[c]
-            lack[key] = max(lack.get(key, 0.0), float(value))
-    return lack
+        size = np.maximum((np.abs(bare + rows.effect(W)) ** 2).sum(axis=1), np.finfo(float).tiny)
+        mean, share = max(float(square.sum() / size.sum()), 0.0), 2 / left.shape[1]
+        relative.append(np.ravel(share * mean + np.maximum(square, 0.0) / size) / (1 + share))
+    return float(np.sqrt(np.concatenate(relative).mean()))

@@ -46,6 +46,10 @@ class CalibratedRotor:
         Derivatives of the data's rows, (m, n), per standard deviation.
     chi_square, dof, chance
         Of data and priors together, and the probability of a larger χ².
+    explained
+        Whether the model explains the data within their errors.
+    lack_of_fit
+        What it leaves of what weights do beyond the errors, relative rms; 0 where it explains them.
     exact
         Names of numbers that were taken as the rotor file has them, whose usual errors widen the covariance.
     unbalance
@@ -72,6 +76,8 @@ class CalibratedRotor:
     chi_square: float
     dof: int
     chance: float
+    explained: bool
+    lack_of_fit: float
     exact: tuple[str, ...]
     unbalance: tuple[ComplexArray, ...]
     unbalance_std: tuple[FloatArray, ...]
@@ -113,17 +119,6 @@ class CalibratedRotor:
         nodes = [[f"node {node}" for node in data.unbalance] for data in self.readings]
         bows = [[f"bow {k + 1}" for k in range(data.bow)] for data in self.readings]
         return [name for each in zip(nodes, bows, strict=True) for part in each for name in part]
-
-    @property
-    def explained(self) -> bool:
-        """Whether the model explains the data within their errors."""
-        return not (self.rotor.calibration and self.rotor.calibration.needs_trial_run)
-
-    @property
-    def lack_of_fit(self) -> float:
-        """What the model leaves of what weights do beyond the errors, relative rms; 0 where it explains."""
-        lack = self.rotor.calibration.lack_of_fit if self.rotor.calibration else np.zeros(0)
-        return float(np.sqrt(np.mean(lack**2))) if lack.size else 0.0
 
     @property
     def undetermined(self) -> str:

@@ -289,7 +289,7 @@ def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypa
 
 @pytest.mark.full
 def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
-    """Readings of a rotor with another modulus: χ² is too large, by speed and sensor, too."""
+    """Readings of a rotor with another modulus: χ² is too large."""
     truth = with_parameters(machine(), {"material.youngs_modulus.scale": 0.7})
     runs = Runs()
     tight = ReadingErrors(0.002, 0.002)
@@ -299,7 +299,8 @@ def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
     assert not found.explained
     assert honest.explained
     assert found.rotor.calibration.needs_trial_run
-    assert found.rotor.calibration.lack_of_fit.shape == (3, 4)
+    assert found.rotor.calibration.lack_of_fit == found.lack_of_fit > 0.002
+    assert honest.lack_of_fit == 0
     assert found.std[0] > 3 * honest.std[0]
     assert found.std[0] ** 2 == pytest.approx(
         found.fit.estimate.solution_covariance[0, 0] * found.chi_square / found.dof
