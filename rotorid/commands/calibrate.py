@@ -7,25 +7,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-import numpy as np
-
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import range_text
 from rotorid.base.text import capital, counted, error_figures
 from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import USUAL, Delivered, command, log_rotor, phase, provenance
+from rotorid.commands.outcome import Delivered, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Names, Nodes, nodes
-from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from fem import Rotor
     from rotorid.base.arrays import BoolArray
     from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
+    from rotorid.regression.estimate import Uncertain
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class CalibrateOptions:
     unbalance_at: Nodes | None = None
     bow: int = 0
     outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,6 +66,8 @@ class Calibrated(Delivered):
     @property
     def answer(self) -> Answer:
         """Whether the model explains the data; the wished numbers; what the data do not tell."""
+        from rotorid.regression.estimate import parameter_text
+
         found = self.found
         fits = "explains" if found.explained else "does NOT explain"
         chi = f"χ² {found.chi_square:.4g} with {counted(found.dof, 'degree')} of freedom"
@@ -100,13 +99,19 @@ class Calibrated(Delivered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per number: value, standard deviation, 95 % interval, share of the data."""
-        every = parameter_columns(*self._part(np.full(len(self.found.names), True)))
+        from rotorid.regression.estimate import parameter_columns
+
+        every = parameter_columns(*self._part(self.found.wished | True))
         return frame((*every, Column("data_share", self.found.data_share)))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance; None where not determined."""
+        import numpy as np
+
+        from rotorid.regression.estimate import parameter_dict
+
         found, estimate = self.found, self.found.fit.estimate
-        names, every = self._part(np.full(len(self.found.names), True))
+        names, every = self._part(found.wished | True)
         parameters = parameter_dict(names, every)
         for name, unknown, share in zip(names, found.unknowns, found.data_share, strict=True):
             parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
@@ -153,14 +158,12 @@ class Calibrated(Delivered):
         """With the name of the file that is written."""
         return {**self.document, "rotor": output and str(output)}
 
-    def figure(self) -> Figure:
-        """The numbers with what was known of them."""
-        from rotorid.calibration.plots import calibration_figure
-
-        return calibration_figure(self.found)
-
     def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
         """Names of some of the numbers, and these with their errors."""
+        import numpy as np
+
+        from rotorid.regression.estimate import Uncertain
+
         found, part = self.found, Uncertain()
         part.values, part.errors_stated, part.dof = found.values[which], True, 0
         part.covariance = np.where(np.isnan(found.std), np.nan, found.covariance)[np.ix_(which, which)]
@@ -168,6 +171,8 @@ class Calibrated(Delivered):
 
     def _unbalance(self) -> tuple[Column, ...]:
         """What the bare rotor's readings say of its unbalances and bows."""
+        import numpy as np
+
         names, values = self.found.bare, np.concatenate(self.found.unbalance)
         return (
             Column("unbalance", names, str),

@@ -107,7 +107,7 @@ motion-run-up               motion sample_data/motion/unbalanced.toml --run-up 3
 motion-bode                 motion sample_data/motion/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode --plot run_up.png
 motion-from-rest            motion sample_data/motion/small.toml --run-up 0:3000rpm --time 1s
 periodic-jumps              periodic sample_data/motion/damper.toml --speeds 1000:5000rpm --plot jumps.png
-calibrate                   {CALIBRATE} --plot calibration.png
+calibrate                   {CALIBRATE}
 calibrate-table             {CALIBRATE} --exact --table --output numbers.csv --verbose
 calibrate-unexplained       {SUPPORTS} bearing.kxx.scale --prior bearing.kxx.scale=30%
 calibrate-no-bearing        {SUPPORTS} "bearing[3].kxx.scale"

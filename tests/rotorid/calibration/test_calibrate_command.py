@@ -75,7 +75,7 @@ def test_what_is_not_determined_is_null_and_no_rotor_is_written(cli, folder):
     assert told.code == 0, told.err
     assert [told.json["parameters"][f"bearing[{k}].kyy"]["value"] for k in (1, 2)] == [None, None]
     assert not told.json["identifiable"]
-    refused = cli(*args, "--output", "new.toml", "--plot", "new.png")
+    refused = cli(*args, "--output", "new.toml")
     assert refused.code == 2
     assert "new.toml: no rotor file can be written" in refused.err
     assert not [path for path in folder.iterdir() if path.name.startswith("new")]
@@ -122,7 +122,7 @@ def job(folder, *, rotor="rotor.csv", runs=("base", "trial"), weights="trial,P,1
 def test_jobs_and_options_that_cannot_be(cli, folder, change, args, said):
     name = job(folder, text=JOB.replace(*change) if change[0] else JOB)
     before = sorted(path.name for path in folder.iterdir())
-    told = cli("calibrate", ROTOR23, name, *args, "--estimate", "bearing[1].stiffness", "--plot", "new.png")
+    told = cli("calibrate", ROTOR23, name, *args, "--estimate", "bearing[1].stiffness", "--output", "new.csv")
     assert told.code == 2
     assert told.out == ""
     assert said in told.err
