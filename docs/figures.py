@@ -291,13 +291,6 @@ GALLERY = (
         dense=True,
     ),
     Picture(
-        "waterfall",
-        "instruments",
-        f"vectors {RUN_UP} --picture waterfall",
-        "What goes with the speed lies on the line of 1×, and grows where it crosses the two modes.",
-        dense=True,
-    ),
-    Picture(
         "bearings",
         "motion",
         f"bearings {MOTION}/rotor.toml --speeds 1000:9000:250rpm",
