@@ -74,12 +74,6 @@ class RunReadings:
     bow: int = 0
 
     @property
-    def size(self) -> int:
-        """Number of real rows."""
-        R, S, C = self.trials.mean.shape
-        return int(2 * S * C * (R if self.modelled else R - 1))
-
-    @property
     def modelled(self) -> bool:
         """Whether the bare rotor's readings are those of unknown unbalances."""
         return bool(self.unbalance or self.bow)

@@ -10,7 +10,6 @@ from rotorid.base.answer import COLUMNS
 from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
-    calibrate,
     demo,
     fit,
     reduce,
@@ -21,6 +20,7 @@ from rotorid.cli.study import study
 from rotorid.cli.worksheet import worksheet
 from rotorid.commands import (
     bearings,
+    calibrate,
     campbell,
     critical,
     identify,
@@ -79,7 +79,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "simulate": typer_command(simulate),
         "modes": typer_command(modes),
         "runup": typer_command(runup),
-        "calibrate": calibrate.calibrate,
+        "calibrate": typer_command(calibrate),
     },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema},
 }

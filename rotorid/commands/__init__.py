@@ -5,6 +5,7 @@
 
 from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.bearings import BearingEquilibria, BearingsOptions, bearings
+from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
 from rotorid.commands.fit import FitOptions, RecordFit, fit
@@ -28,6 +29,8 @@ __all__ = [
     "BalanceOptions",
     "BearingEquilibria",
     "BearingsOptions",
+    "CalibrateOptions",
+    "Calibrated",
     "CampbellOptions",
     "CriticalOptions",
     "FitOptions",
@@ -51,6 +54,7 @@ __all__ = [
     "VectorsOptions",
     "balance",
     "bearings",
+    "calibrate",
     "campbell",
     "critical",
     "fit",

@@ -52,10 +52,6 @@ if TYPE_CHECKING:
 _R = TypeVar("_R", bound=Delivered)
 Command = Callable[..., None]
 INPUT, OUTPUT = "Input", "Output"
-RotorArgument = Annotated[
-    Path,
-    typer.Argument(metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml)."),
-]
 _TYPES: dict[str, Any] = {"bool": bool, "int": int, "float": float, "Path": Path, "Amplitudes": list[str]}
 """What is typed, by the first alternative of an annotation; else one of a few words, or any text."""
 PICTURES = (".png", ".svg", ".pdf")
@@ -140,7 +136,7 @@ class Destination:
         with busy(what):
             result = work()
         equations = result.equations if self.show else None
-        document = result.document
+        document = result.document_for(output)
         if equations:
             document["equations"] = equations.to_dict()
         note(document)
@@ -271,7 +267,7 @@ def command(
 
 
 def typer_command(work: Callable[..., Delivered]) -> Command:
-    """The command of a function: its first parameter and what may be left out are arguments.
+    """The command of a function: its first parameter, lists of files and what may be left out are arguments.
 
     Others before `options` are required options.
     """
@@ -291,10 +287,11 @@ def typer_command(work: Callable[..., Delivered]) -> Command:
     parameters = []
     for name, one in given.items():
         told: dict[str, Any] = {"metavar": about[name].metavar, "help": about[name].text}
-        first = not hints or one.default is not one.empty
+        files = str(one.annotation).startswith("Sequence[Path")
+        first = files or not hints or one.default is not one.empty
         declared = typer.Argument(**told) if first else typer.Option(f"--{name}", **told)
         taken: Any = Path if "Path" in str(one.annotation) and first else str
-        taken = list[Path] if str(one.annotation).startswith("Sequence[Path") else taken
+        taken = list[Path] if files else taken
         hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
         parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
     parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]

@@ -1,25 +1,28 @@
-"""`calibrate`: numbers of a rotor file from trial runs, critical speeds and modes."""
+"""`calibrate`: numbers of a rotor file from trial runs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rotorid.base.answer import Answer
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import range_text
+from rotorid.base.text import capital, counted, error_figures
 from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import Found, command, log_rotor, phase, provenance
+from rotorid.commands.outcome import Delivered, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Names, Nodes, nodes
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import pandas as pd
 
     from fem import Rotor
-    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
-
-    DataFiles = Path | str | Sequence[Path | str]
-    """Jobs, tables of critical speeds or natural frequencies, tables of modes."""
+    from rotorid.base.arrays import BoolArray
+    from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
+    from rotorid.regression.estimate import Uncertain
 
 
 @dataclass(frozen=True)
@@ -50,26 +53,92 @@ class CalibrateOptions:
     exact: bool = False
     unbalance_at: Nodes | None = None
     bow: int = 0
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
+    to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Calibrated(Found):
-    """The calibrated rotor, and what was assumed of the data."""
+class Calibrated(Delivered):
+    """The calibrated rotor."""
 
-    assumed: tuple[str, ...] = ()
-    written: Path | None = None
+    found: CalibratedRotor
 
     @property
     def answer(self) -> Answer:
-        """With what was assumed."""
-        answer: Answer = self.found.answer
-        return replace(answer, notes=(*answer.notes, *self.assumed))
+        """Whether the model explains the data; the wished numbers; what the data do not tell."""
+        from rotorid.regression.estimate import parameter_text
+
+        found = self.found
+        fits = "explains" if found.explained else "does NOT explain"
+        chi = f"χ² {found.chi_square:.4g} with {counted(found.dof, 'degree')} of freedom"
+        first = [f"The model {fits} the data ({chi})."]
+        speeds = [speed for data in found.readings for speed in data.trials.speeds.tolist()]
+        if seen := found.seen:
+            at = f"at {range_text(min(speeds), max(speeds))} " if speeds else ""
+            first.append(capital(f"{at}{seen}."))
+        why = {} if found.prior is None else found.prior.why
+        beside = ~found.wished
+        tables = [parameter_text(*self._part(which), why) for which in (~beside, beside) if which.any()]
+        if found.bare:
+            tables.append(text(self._unbalance(), width=COLUMNS))
+        more = "what else is not known exactly" if beside.any() else "unbalance"
+        notes = []
+        if found.searches > 1:
+            notes.append(f"searched from {found.searches} starting values")
+        if found.exact:
+            exact = counted(len(found.exact), "number")
+            notes.append(f"± count what {exact} taken as exact may be off")
+        return Answer(
+            "\n".join(first),
+            tables[0],
+            found.warnings,
+            tuple(notes),
+            tables=tuple(tables[1:]),
+            more=more if tables[1:] else "",
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per number: value, standard deviation, 95 % interval, share of the data."""
+        from rotorid.regression.estimate import parameter_columns
+
+        every = parameter_columns(*self._part(self.found.wished | True))
+        return frame((*every, Column("data_share", self.found.data_share)))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types, with the rotor file that is written."""
-        return {**super().to_dict(), "rotor": self.written and str(self.written)}
+        """As JSON types, without the provenance; None where not determined."""
+        import numpy as np
 
-    def files(self, path: Path) -> Mapping[Path, bytes]:
+        from rotorid.regression.estimate import parameter_dict
+
+        found, estimate = self.found, self.found.fit.estimate
+        names, every = self._part(found.wished | True)
+        parameters = parameter_dict(names, every)
+        for name, unknown, share in zip(names, found.unknowns, found.data_share, strict=True):
+            parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
+        return plain(
+            {
+                "parameters": parameters,
+                "rank": estimate.rank,
+                "condition_number": estimate.condition_number,
+                "identifiable": estimate.full_rank,
+                "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
+                "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+                "correlation": every.correlation,
+                "seen": found.seen or None,
+                "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
+                "chi_square": found.chi_square,
+                "degrees_of_freedom": found.dof,
+                "probability": found.chance,
+                "exact": found.exact,
+                "explained": found.explained,
+                "lack_of_fit": found.lack_of_fit,
+                "unbalance": rows(self._unbalance()) if found.bare else [],
+                "warnings": found.warnings,
+                "rotor": None,
+            }
+        )
+
+    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
         """The calibrated rotor as a rotor file, .toml, with its tables; or the table of numbers.
 
         Raises
@@ -77,32 +146,51 @@ class Calibrated(Found):
         ValueError
             For a rotor file of numbers that the data do not determine.
         """
-        from rotorid.tables.reader.table_writing import table_bytes
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
         if path.suffix.lower() != ".toml":
-            return {path: table_bytes(path, self.to_frame())}
+            return super().table_file(path)
         if why := self.found.undetermined:
             raise ValueError(f"{path}: no rotor file can be written, {why}")
         return rotor_file_bytes(path, self.found.rotor)
 
-    def figure(self) -> Figure:
-        """The numbers with what was known of them."""
-        from rotorid.calibration.plots import calibration_figure
+    def document_for(self, output: Path | None) -> dict[str, Any]:
+        """With the name of the file that is written."""
+        return {**self.document, "rotor": output and str(output)}
 
-        return calibration_figure(self.found)
+    def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
+        """Names of some of the numbers, and these with their errors."""
+        import numpy as np
+
+        from rotorid.regression.estimate import Uncertain
+
+        found, part = self.found, Uncertain()
+        part.values, part.errors_stated, part.dof = found.values[which], True, 0
+        part.covariance = np.where(np.isnan(found.std), np.nan, found.covariance)[np.ix_(which, which)]
+        return tuple(name for name, taken in zip(found.names, which, strict=True) if taken), part
+
+    def _unbalance(self) -> tuple[Column, ...]:
+        """What the bare rotor's readings say of its unbalances and bows."""
+        import numpy as np
+
+        names, values = self.found.bare, np.concatenate(self.found.unbalance)
+        return (
+            Column("unbalance", names, str),
+            Column("size", np.abs(values), "{:.4g}".format),
+            Column("std", np.concatenate(self.found.unbalance_std), error_figures, "±"),
+            Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names], str),
+            Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
+        )
 
 
 class Prepared(NamedTuple):
-    """What is calibrated: the rotor, unknown numbers, data; files of both; what was assumed."""
+    """What is calibrated: the rotor, unknown numbers, data; files of both."""
 
     rotor: Rotor
     numbers: list[Unknown]
     readings: list[RunReadings]
-    frequencies: list[MeasuredFrequencies]
     rotor_files: tuple[Path, ...]
     data_files: list[Path]
-    assumed: list[str]
 
     @property
     def probes(self) -> list[str]:
@@ -111,16 +199,23 @@ class Prepared(NamedTuple):
 
 
 @command
-def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Calibrated:
-    """Estimate numbers of a rotor from data of any mixture, with errors, and what the data do not determine.
+def calibrate(
+    rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
+) -> Calibrated:
+    """Numbers of a rotor file from trial runs, with ±.
+
+    --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
+    critical, campbell and response show bands.
+
+    Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
+    --estimate "bearing[*].*" --prior "bearing[*].*=20%" --output calibrated.toml
 
     Parameters
     ----------
-    rotor
-        As it is believed to be: a rotor, or its file.
-    data
-        Jobs with trial runs (or with readings of the bare rotor), tables of critical speeds, natural
-        frequencies or modes.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml).
+    data : DATA
+        Jobs with trial runs (.toml, .xlsx).
     options
         What is unknown, and what is known of it.
 
@@ -139,16 +234,18 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
     beside = unknowns(given.rotor, given.probes, options.estimate, exact=False) if options.exact else []
     exact = [number for number in beside if number.path not in paths]
     with phase("calibration"):
-        result = calibration.calibrate(*given[:4], exact=exact)
+        result = calibration.calibrate(*given[:3], exact=exact)
     of_rotor = {one["sha256"] for one in origin["inputs"][: len(given.rotor_files)]}  # which jobs name, too
     made_from = [one for one in origin["inputs"] if one["sha256"] not in of_rotor]
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-    return Calibrated(found=result, assumed=tuple(given.assumed), provenance=origin)
+    return Calibrated(found=result, provenance=origin)
 
 
-def prepared(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Prepared:
+def prepared(
+    rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
+) -> Prepared:
     """Read what is calibrated.
 
     Raises
@@ -172,8 +269,8 @@ def prepared(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptio
     if options.bow and not places:
         raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]
-    readings, frequencies, read, assumed = read_data(sources, model, places, options.bow)
-    without = Prepared(model, [], readings, frequencies, files, read, assumed)
+    readings, read = read_data(sources, model, places, options.bow)
+    without = Prepared(model, [], readings, files, read)
     numbers = unknowns(
         model, without.probes, options.estimate, options.prior, options.bounds, exact=options.exact
     )

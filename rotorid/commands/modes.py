@@ -54,7 +54,7 @@ class ModesOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModesOutcome(Outcome):
-    """With a table for `reduce`, `identify` and `calibrate`, or why there is none."""
+    """With a table for `reduce` and `identify`, or why there is none."""
 
     lacking: str = ""
 

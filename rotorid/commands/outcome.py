@@ -79,6 +79,10 @@ class Delivered(Answered):
         """What `--json` prints."""
         return {**self.to_dict(), "schema_version": SCHEMA_VERSION, "provenance": dict(self.provenance)}
 
+    def document_for(self, output: Path | None) -> dict[str, Any]:
+        """What `--json` prints beside a file of `--output`."""
+        return self.document
+
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Outcome(Delivered):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Phase = Literal["lead", "lag"]
 Edge = Literal["leading", "trailing", "rising", "falling", "centre"]
-Picture = Literal["tacho", "orbit", "waterfall"]
+Picture = Literal["tacho", "orbit"]
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,6 @@ def _course(one: Vectors) -> str:
     """How the speed of a record runs, and over how many turns its vectors are means."""
     low, high = one.range * RPM
     if one.steady:
-        return f"{one.run}: {(low + high) / 2:.1f} rpm, {one.turns[0]:.0f} turns"
+        return f"{one.run}: {one.speeds[0] * RPM:.1f} rpm, {one.turns[0]:.0f} turns"
     turns = f"{one.turns.min():.0f} to {one.turns.max():.0f} turns"
     return f"{one.run}: {low:.0f} to {high:.0f} rpm, {counted(len(one.times), 'instant')} of {turns}"

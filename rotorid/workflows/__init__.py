@@ -8,6 +8,8 @@ from rotorid.commands import (
     BalanceOptions,
     BearingEquilibria,
     BearingsOptions,
+    Calibrated,
+    CalibrateOptions,
     CampbellOptions,
     CriticalOptions,
     FitOptions,
@@ -30,6 +32,7 @@ from rotorid.commands import (
     VectorsOptions,
     balance,
     bearings,
+    calibrate,
     campbell,
     critical,
     fit,
@@ -47,7 +50,6 @@ from rotorid.commands import (
     unbalance,
     vectors,
 )
-from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.identify import Coefficients
 from rotorid.commands.outcome import Delivered
 from rotorid.commands.reduce import ReduceOptions, reduce

@@ -195,7 +195,7 @@ SAMPLES = {
                 "calibrate",
                 "Bearings from a run with two weights",
                 "calibrate {}/compressor/rotor.toml {}/calibration/trial.toml --estimate 'bearing[*].*' "
-                "--prior 'bearing[*].*=20%' --plot {}/calibration.png",
+                "--prior 'bearing[*].*=20%'",
             ),
             Step(
                 "balance",

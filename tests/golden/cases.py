@@ -61,7 +61,7 @@ CALIBRATE = (
     f'calibrate {COMPRESSOR} sample_data/calibration/trial.toml --estimate "bearing[*].*" '
     '--prior "bearing[*].*=20%"'
 )
-SUPPORTS = f"calibrate {ROTOR23} sample_data/calibration/critical.csv --estimate"
+SUPPORTS = f"calibrate {COMPRESSOR} sample_data/calibration/trial.toml --exact --estimate"
 TURBO = "sample_data/turbo_job"
 MODEL_JOB = "sample_data/model_job/job.toml"
 PRINTED = (
@@ -107,11 +107,10 @@ motion-run-up               motion sample_data/motion/unbalanced.toml --run-up 3
 motion-bode                 motion sample_data/motion/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode --plot run_up.png
 motion-from-rest            motion sample_data/motion/small.toml --run-up 0:3000rpm --time 1s
 periodic-jumps              periodic sample_data/motion/damper.toml --speeds 1000:5000rpm --plot jumps.png
-calibrate                   {CALIBRATE} --plot calibration.png
+calibrate                   {CALIBRATE}
 calibrate-table             {CALIBRATE} --exact --table --output numbers.csv --verbose
-calibrate-critical          {SUPPORTS} "bearing[*].stiffness" --prior "bearing[*].stiffness=30%"
-calibrate-unexplained       {SUPPORTS} bearing.stiffness --prior bearing.stiffness=30%
-calibrate-no-bearing        {SUPPORTS} "bearing[3].stiffness"
+calibrate-unexplained       {SUPPORTS} bearing.kxx.scale --prior bearing.kxx.scale=30%
+calibrate-no-bearing        {SUPPORTS} "bearing[3].kxx.scale"
 calibrate-says-nothing      calibrate {COMPRESSOR} sample_data/calibration/later.toml --estimate bearing.kxx.scale
 critical-calibrated         critical sample_data/calibration/calibrated.toml -n 2
 reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
@@ -507,7 +506,6 @@ STORED = (
     "balance-equations",
     "bearings",
     "bearings-linear",
-    "calibrate-critical",
     "calibrate-rk4",
     "campbell-compressor-coarse",
     "campbell-model-job",

@@ -142,7 +142,7 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         material,
         *document.get("disc", ()),
         *(section for kind in (*names(KINDS), *forces) for section in document.get(kind, ())),
-        *(row for key in ("parameter", "reading", "compared") for row in found.get(key, ())),
+        *found.get("parameter", ()),
     ):
         _check_sizes(section)
     try:

@@ -29,7 +29,7 @@ def draw_start(given: Prepared, rng: np.random.Generator) -> dict[str, Any]:
         first = unknown.first(given.rotor)
         spread = unknown.prior[1] if unknown.prior else SPREAD * abs(first)
         begun.append(replace(unknown, start=first + spread * rng.uniform(-1.0, 1.0)))
-    end = calibrate(given.rotor, begun, given.readings, given.frequencies, side_starts=False)
+    end = calibrate(given.rotor, begun, given.readings, side_starts=False)
     numbers = dict(zip(end.fit.names, end.fit.estimate.solution.tolist(), strict=True))
     return {"converged": end.fit.converged, "chi_square": end.chi_square, **numbers}
 

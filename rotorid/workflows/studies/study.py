@@ -127,7 +127,7 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
         raise ValueError(f"calibrate.estimate: {taken.pop()!r} is another column of the samples: rename it")
     columns = {"converged": "bool", "chi_square": "double", **dict.fromkeys(labels, "double")}
     files = [*read.files, *given.data_files]
-    return Task(draw_start, given, seed, columns, STARTS), files, tuple(given.assumed)
+    return Task(draw_start, given, seed, columns, STARTS), files, ()
 
 
 @contextmanager
