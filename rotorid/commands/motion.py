@@ -181,7 +181,7 @@ class Motion(Delivered):
         """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
         import numpy as np
 
-        from rotorid.motion.periodic import repeating
+        from rotorid.motion.collocation import repeating
         from rotorid.motion.run import run
 
         motion, end = self.motion, self.end

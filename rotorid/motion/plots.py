@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rotorid.base.arrays import FloatArray
+    from rotorid.motion.branches import Branch
     from rotorid.motion.equilibrium import Equilibrium
-    from rotorid.motion.periodic import Readings
 
 _PANELS, _TURNS, _LARGEST_ORDER = 4, 12, 4.0
 """Nodes that are drawn, turns of an orbit, orders of a spectrum."""
@@ -199,15 +200,19 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     return ax
 
 
-def draw_bifurcations(readings: Readings, ax: Axes | None = None) -> Axes:
+def draw_bifurcations(
+    branches: Sequence[Branch], directions: FloatArray, label: str, ax: Axes | None = None
+) -> Axes:
     """Draw the amplitude of the first sensor, µm, over speed, rpm.
 
     Stable motions are solid, unstable ones dashed; arrows show where the motion jumps at a fold.
 
     Parameters
     ----------
-    readings
+    branches
         Of periodic motion.
+    directions, label
+        Unit vectors of what the sensors read, shape (k, n), and the name of the first.
     ax
         None: axes of a figure of their own.
 
@@ -215,33 +220,32 @@ def draw_bifurcations(readings: Readings, ax: Axes | None = None) -> Axes:
     -------
     The axes drawn into.
     """
-    from rotorid.motion.periodic import KINDS
+    from rotorid.motion.branches import KINDS, amplitudes, jumps
 
     ax = new_axes((WIDTH, 4.6)) if ax is None else ax
-    branches = readings.motion.branches
     colors = dict(zip(dict.fromkeys(b.kind for b in branches), COLORS, strict=False))
-    for branch, along, at in zip(branches, readings.along, readings.at, strict=True):
-        speeds, sizes, unstable = branch.speeds * RPM, 1e6 * along[:, 0], ~branch.stable
+    for branch in branches:
+        speeds, sizes = branch.speeds * RPM, 1e6 * amplitudes(branch.points, directions)[:, 0]
+        unstable = ~branch.stable
         near = np.append(unstable[1:], False) | np.append(False, unstable[:-1])  # up to the next stable ones
         for part, word, style in ((~unstable, "stable", "-"), (unstable | near, "unstable", "--")):
             if part.any():
-                label = _once(ax, f"{branch.kind}, {word}")
-                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "label": label}
+                name = _once(ax, f"{branch.kind}, {word}")
+                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "label": name}
                 drawn["marker"] = "" if len(sizes) > 1 else "o"
                 ax.plot(speeds, np.where(part, sizes, np.nan), style, clip_on=False, **drawn)
-        for bifurcation, size in zip(branch.bifurcations, at[:, 0], strict=True):
-            marker = MARKERS[KINDS.index(bifurcation.kind)]
-            drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": _once(ax, bifurcation.kind)}
-            ax.plot(bifurcation.point.orbit.speed * RPM, 1e6 * size, marker, **drawn)
-    for speed, before, after_it in readings.jumps:
-        tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after_it, before))
+        for orbit in branch.bifurcations:
+            marker, ((size, *_),) = MARKERS[KINDS.index(orbit.bifurcation)], amplitudes([orbit], directions)
+            drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": _once(ax, orbit.bifurcation)}
+            ax.plot(orbit.speed * RPM, 1e6 * size, marker, **drawn)
+    for speed, before, after in jumps(branches, directions):
+        tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after, before))
         arrow = {"arrowstyle": "->", "color": DARK, "linewidth": 1.1, "shrinkA": 4, "shrinkB": 1}
         ax.annotate("", tip, tail, arrowprops=arrow)
-        middle = (speed * RPM, 5e5 * (before[0] + after_it[0]))
+        middle = (speed * RPM, (tip[1] + tail[1]) / 2)
         where = {"rotation": 90, "va": "center", "ha": "right", "bbox": BOX}
-        word = "jump up" if after_it[0] > before[0] else "jump down"
-        note(ax, word, middle, (-3, 0), color=DARK, **where)
-    ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {readings.labels[0]}, µm")
+        note(ax, "jump up" if after[0] > before[0] else "jump down", middle, (-3, 0), color=DARK, **where)
+    ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {label}, µm")
     ax.set_ylim(bottom=0.0)
     plain(ax)
     rad_s_above(ax)
