@@ -14,7 +14,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
-from rotorid.commands.moving import Moving, moving
+from rotorid.commands.moving import Moving, moving, reduction, reduction_notes
 from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Band, Sensor, degrees, sensors, speeds
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rotorid.motion.branches import Branch
     from rotorid.motion.collocation import Orbit
     from rotorid.motion.periodic import PeriodicMotion
-    from rotorid.motion.system import MotionSystem, ReducedSystem
+    from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
 
 _SMALL = 24
@@ -85,14 +85,11 @@ class PeriodicMotions(Delivered):
         The branches.
     labels, directions
         Names of the k sensors, and unit vectors of what they read in the coordinates, shape (k, n).
-    reduced
-        What moves, if it is a rotor with fewer unknowns than it has.
     """
 
     motion: PeriodicMotion
     labels: tuple[str, ...]
     directions: FloatArray
-    reduced: ReducedSystem | None
 
     @cached_property
     def along(self) -> list[FloatArray]:
@@ -113,7 +110,7 @@ class PeriodicMotions(Delivered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
-        motion, few = self.motion, self.reduced
+        motion = self.motion
         branches = [
             {
                 "kind": branch.kind,
@@ -139,7 +136,7 @@ class PeriodicMotions(Delivered):
                 ],
                 "tried": motion.tried,
                 "warnings": motion.warnings,
-                "reduction": few and {"modes": few.modes, "frequency_error": few.error},
+                "reduction": reduction(motion.system),
             }
         )
 
@@ -154,7 +151,7 @@ class PeriodicMotions(Delivered):
             f"{motion.tried}",
             tuple(motion.warnings),
             (
-                *([] if self.reduced is None else [self.reduced.note]),
+                *reduction_notes(motion.system),
                 *(
                     f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
                     f"{self.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
@@ -272,8 +269,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
     few = full.size <= _SMALL and options.modes is None
-    reduced = None if few else reduced_system(full, kept, options.modes)
-    system = full if reduced is None else reduced.system
+    system = full if few else reduced_system(full, kept, options.modes)
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
@@ -289,7 +285,6 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
         motion=motion,
         labels=labels,
         directions=directions,
-        reduced=reduced,
         provenance=provenance(what.files, options),
     )
 

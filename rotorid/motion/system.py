@@ -27,7 +27,6 @@ from fem.forces import law, tables
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import number
 from rotorid.base.compiled import compiled_part
-from rotorid.base.text import counted, percent
 from rotorid.reduction import SmallModel
 
 ENOUGH = 3e-4
@@ -52,6 +51,11 @@ class MotionSystem:
         What is not linear, f of them.
     weight, unbalance, bow
         w, N, and, complex, u, kg·m, and b, N, shape (n,) each.
+    modes, frequency_error
+        Of a reduced system: how many modes stay in both planes together, and the largest relative error of
+        the natural frequencies without damping, those below twice the highest speed or at least the first two
+        that bend the shaft, at the lowest speed; bearings with films left out. Infinite where fewer unknowns
+        move. Of another one None and 0.
     """
 
     coordinates: tuple[str, ...]
@@ -63,6 +67,8 @@ class MotionSystem:
     weight: FloatArray
     unbalance: ComplexArray
     bow: ComplexArray
+    modes: int | None = None
+    frequency_error: float = 0.0
 
     @property
     def size(self) -> int:
@@ -141,7 +147,6 @@ def system(
     forces: Sequence[NodeForce] = (),
     weight: Mapping[str, float] | None = None,
     unbalance: Mapping[int, complex] | None = None,
-    bow: Mapping[str, complex] | None = None,
 ) -> MotionSystem:
     """Put together what moves; ValueError as `linear`, and for nodes that do not move.
 
@@ -151,7 +156,7 @@ def system(
         The equations of motion at a speed, rad/s; where their matrices may change slope, and both ends.
     forces
         What is not linear.
-    weight, bow
+    weight
         N by coordinate.
     unbalance
         m e e^{iβ} by node, kg·m, β with the rotation.
@@ -172,11 +177,10 @@ def system(
     for force in forces:
         for i in made.index(force.node):
             made.M[i, i] += force.mass
+    for name, force_there in (weight or {}).items():
+        made.weight[motions[0].index(name)] += force_there
     for node, value in (unbalance or {}).items():
         made.unbalance[[*made.index(node)]] += value, -1j * value
-    for vector, values in ((made.weight, weight), (made.bow, bow)):
-        for name, force_there in (values or {}).items():
-            vector[motions[0].index(name)] += force_there
     return made
 
 
@@ -235,27 +239,18 @@ def rotor_system(
             return rotor.motion(speed)
         return fem.equations_of_motion(rotor.linear, speed=speed)
 
+    knots = np.array([lowest, *sorted(inside), end])
+    made = system(linear, knots, forces=rotor.forces, unbalance=unbalance)
+    planes = np.array(
+        [[made.coordinates.index(name.replace("x", axis, 1)) for name in names] for axis in "xy"]
+    )
     angle = np.radians(number(direction, "direction", signed=True))
     pull = number(gravity, "gravity") * np.array([np.cos(angle), np.sin(angle)])
     pull[np.abs(pull) < 1e-15 * gravity] = 0.0  # straight down is straight down
+    made.weight[planes] = np.outer(pull, load)
     at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
     bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
-    made = system(
-        linear,
-        np.array([lowest, *sorted(inside), end]),
-        forces=rotor.forces,
-        weight={
-            name.replace("x", axis, 1): part * mass
-            for axis, part in zip("xy", pull, strict=True)
-            for name, mass in zip(names, load, strict=True)
-        },
-        unbalance=unbalance,
-        bow={
-            names[i].replace("x", axis, 1): turned * force
-            for i, force in zip(at, bent, strict=True)
-            for axis, turned in (("x", 1), ("y", -1j))
-        },
-    )
+    made.bow[planes[:, at]] = np.outer([1, -1j], bent)
     return without_followers(made) if isinstance(rotor, SmallModel) else made
 
 
@@ -310,38 +305,8 @@ def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> Comp
     return np.asarray((stiffness[np.ix_(at, at)] - across.T @ held) @ bow)
 
 
-@dataclass(frozen=True, eq=False)
-class ReducedSystem:
-    """The system with fewer unknowns, how many modes it has in both planes, and what that costs.
-
-    Attributes
-    ----------
-    system
-        Its unknowns are `x7`, `y7` … of the kept nodes, feet of pedestals, and `mode_1` …
-    modes
-        How many modes stay.
-    error
-        Largest relative error of the natural frequencies without damping, those below twice the highest speed
-        or at least the first two that bend the shaft, at the lowest speed; bearings with films left out.
-        Infinite where fewer unknowns move.
-    """
-
-    system: MotionSystem
-    modes: int
-    error: float
-
-    @property
-    def note(self) -> str:
-        """How many unknowns move, and what that costs."""
-        size, modes = counted(self.system.size, "unknown"), counted(self.modes, "mode")
-        high = f"natural frequencies without films are high by {percent(self.error)} % at most"
-        if self.error == np.inf:
-            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
-        return f"of the rotor {size} move, {modes} among them; {high}"
-
-
-def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> ReducedSystem:
-    """Keep some nodes, those of forces and so many modes between them.
+def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> MotionSystem:
+    """Keep some nodes, those of forces, feet of pedestals, and so many modes, `mode_1` …, between them.
 
     Parameters
     ----------
@@ -382,16 +347,14 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
     end = max(int((full <= 2 * system.knots[-1]).sum()), min(bends + 2, full.size))
 
     def error(modes: int) -> float:
-        few = frequencies(n + modes)
-        if end > few.size:
-            return np.inf
-        return float(np.max(few[bends:end] / full[bends:end] - 1.0, initial=0.0))
+        few = frequencies(n + modes)[bends:end]
+        return float(np.max(few / full[bends:end] - 1.0, initial=0.0)) if len(few) == end - bends else np.inf
 
     if modes is None:  # in pairs of both planes; more of them are never worse
         pairs = bisect_left(range((others.size + 1) // 2), True, key=lambda n: error(2 * n) <= ENOUGH)
         modes = min(2 * pairs, others.size)
     names = (*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes)))
-    return ReducedSystem(_in_basis(system, T[:, : n + modes], names), modes, error(modes))
+    return replace(_in_basis(system, T[:, : n + modes], names), modes=modes, frequency_error=error(modes))
 
 
 @compiled_part
