@@ -270,19 +270,17 @@ def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
     if not every:
         return None
     orbits = [every[0][0]]
+
+    def test(speed: float) -> float:
+        return float(motions(np.array([speed]))[0][1][0].real)
+
     for (a, _), (b, _) in itertools.pairwise(every):
-        for k in range(*sorted((a.outside, b.outside))):
-
-            def test(speed: float, k: int = k) -> float:
-                return float(np.log(np.abs(motions(np.array([speed]))[0][0].multipliers[k]) / UNITY))
-
+        if (a.outside == 0) != (b.outside == 0):
             ((there, values),) = motions(np.array([_root(test, a.speed, b.speed)]))
-            frequency = abs(values[k].imag)
-            whirls = frequency > 1e-6 * there.speed
-            if whirls and values[k].imag < 0:
-                continue  # the other one of a pair
-            kind = BRANCH if not whirls else TORUS if system.forced else HOPF
-            orbits.append(replace(there, bifurcation=kind, frequency=frequency if whirls else np.nan))
+            frequency = abs(values[0].imag)
+            kind = BRANCH if frequency < 1e-6 * there.speed else TORUS if system.forced else HOPF
+            frequency = np.nan if kind == BRANCH else frequency
+            orbits.append(replace(there, bifurcation=kind, frequency=frequency))
         orbits.append(b)
     ended = "end of the range of speeds" if orbits[-1].speed == high else "stopped: it rests no more"
     return Branch("synchronous" if system.forced else "rest", 1, tuple(orbits), ended, straight=True)

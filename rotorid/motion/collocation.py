@@ -117,12 +117,10 @@ class Orbit:
     def scale(self) -> FloatArray:
         """Sizes of the state, shape (2 n,): half of what each coordinate moves, and of its velocity.
 
-        At least a hundredth of its largest value, or all of that, where nothing moves more; and no coordinate
-        counts as less than 1e-3 of the largest one.
+        At least a hundredth of its largest value, and 1e-3 of the largest one.
         """
         q = self.deflections.reshape(-1, self.start.size)
-        moved, largest = np.ptp(q, axis=0) / 2, np.abs(q).max(axis=0)
-        size = np.maximum(moved, largest * (1e-2 if (moved > 1e-2 * largest).any() else 1.0))
+        size = np.maximum(np.ptp(q, axis=0) / 2, 1e-2 * np.abs(q).max(axis=0))
         size = np.maximum(size, max(1e-3 * float(size.max()), 1e-9))
         return np.concatenate([size, size * 2 * np.pi / self.period])
 
@@ -327,11 +325,9 @@ class Linearised:
     @cached_property
     def eigen(self) -> tuple[ComplexArray, ComplexArray]:
         """Multipliers, the largest first, and their vectors, (2 n, 2 n), of the state after a period."""
-        scale = self.orbit.scale
-        monodromy = self.states[-1][:, : scale.size]
-        values, vectors = np.linalg.eig(monodromy * scale / scale[:, None])
+        values, vectors = np.linalg.eig(self.states[-1][:, : len(self.states[-1])])
         order = np.argsort(-np.abs(values), kind="stable")
-        return values[order].astype(complex), (vectors * scale[:, None])[:, order].astype(complex)
+        return values[order].astype(complex), vectors[:, order].astype(complex)
 
     @cached_property
     def solution(self) -> Orbit:

@@ -19,7 +19,7 @@ from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import listing, percent
 from rotorid.motion.branches import HOPF, Branch, follow, straight
 from rotorid.motion.collocation import UNITY, Orbit, Periodic, repeating, turning
-from rotorid.motion.equilibrium import at_rest, equilibrium, whirl_at_rest
+from rotorid.motion.equilibrium import at_rest, equilibrium, room, whirl_at_rest
 from rotorid.motion.run import run
 from rotorid.motion.steady import steady_end, steady_linear
 from rotorid.motion.system import MotionSystem
@@ -216,16 +216,11 @@ def _in_time(motion: PeriodicMotion, limit_cycle: bool) -> None:
 
 
 def _asked(motion: PeriodicMotion) -> list[float]:
-    """Speeds at which motion in time is asked: three, and in the middle of where no branch is stable."""
-    low, high = motion.low, motion.high
-    edges, asked = {low, high}, {low, (low + high) / 2, high}
-    for branch in motion.branches:
-        edges |= {*branch.speeds[[0, -1]], *(orbit.speed for orbit in branch.bifurcations)}
-    for a, b in itertools.pairwise(sorted(edges)):
-        ways = (way for one in motion.branches for way in one.at((a + b) / 2, one.speeds[:, None]))
-        if b - a > 1e-3 * (high - low) and not any(stable for _, stable in ways):
-            asked.add((a + b) / 2)
-    return sorted(asked)[:_ASKED]
+    """Speeds at which motion in time is asked: both ends, and in the middle and between bifurcations."""
+    bifurcations = (orbit.speed for branch in motion.branches for orbit in branch.bifurcations)
+    edges = sorted({motion.low, motion.high, *bifurcations})
+    middles = ((a + b) / 2 for a, b in [(motion.low, motion.high), *itertools.pairwise(edges)])
+    return sorted({motion.low, motion.high, *middles})[:_ASKED]
 
 
 def _starts(system: MotionSystem, speed: float) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -242,9 +237,7 @@ def _starts(system: MotionSystem, speed: float) -> Iterator[tuple[FloatArray, Fl
     for response in steady_linear(system, [speed])[2]:
         load = speed**2 * system.unbalance + system.bow
         shape = response * np.exp(1j * np.angle(np.vdot(response, load)))  # in phase with the load
-        room = system.walls - np.abs(system.at_forces(rest))
-        moved = np.hypot(*(np.abs(system.at_forces(part)) for part in (shape.real, shape.imag)))
-        size = 0.9 * float((np.sqrt(2) * room / np.maximum(moved, 1e-300)).min(initial=np.inf))
+        size = 0.9 * np.sqrt(2) * room(system, rest, shape)
         for large in (size if np.isfinite(size) else 5.0) * shape * np.array([[1.0], [-1j]]):
             yield rest + large.real, -speed * large.imag
 

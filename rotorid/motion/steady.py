@@ -9,15 +9,15 @@ from typing import Literal
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.motion.collocation import repeating
 from rotorid.motion.equilibrium import at_rest
 from rotorid.motion.run import LEAST_A_TURN, TOLERANCE, MotionRun, run
 from rotorid.motion.system import MotionSystem
 
 LEAST_SAMPLES = 64
-_BLOCK, _BLOCKS, _SETTLED = 32, 64, 1e-6
-"""Turns that a start settles at once, how often at most, and what may change from one to the next."""
-_OF_A_TURN, _A_TURN = 64, 8
-"""Samples of the synchronous part that are averaged over, and of these those that are given."""
+_BLOCK, _BLOCKS = 32, 64
+"""Turns that a start settles at once, and how often at most."""
+_OF_A_TURN = 64  # samples of the synchronous part
 _TREND, _WANDERS = 1e-3, 1e-2
 """Change at which a motion that goes one way, and one that goes up and down, are not steady."""
 _PERIODIC, _PERIODS = 2e-3, 8
@@ -88,13 +88,13 @@ def begin(
         As `equilibrium` and `run`, if it touches a wall, and for nodes that do not move.
     """
     q, v, warnings = at_rest(system, speed), np.zeros(system.size), tuple[str, ...]()
-    if how == "steady":
+    if how == "steady" and speed and system.forced:
         response = steady_linear(system, [speed])[2][0]
-        moved = q + response.real
-        if not system.forces or (np.abs(system.at_forces(moved)) <= 0.9 * system.walls).all():
-            q, v = moved, (1j * speed * response).real
-        if system.forces and speed:
+        if (np.abs(system.at_forces(q + response.real)) <= 0.9 * system.walls).all():
+            q, v = q + response.real, (1j * speed * response).real
+        if system.forces:
             q, v, warnings = _settled(system, speed, q, v, tolerance)
+    q = q.copy()
     for node, by in (shift or {}).items():
         q[[*system.index(node)]] += by.real, by.imag
     return q, v, warnings
@@ -103,16 +103,14 @@ def begin(
 def _settled(
     system: MotionSystem, speed: float, q: FloatArray, v: FloatArray, tolerance: float
 ) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """After so many turns that the motion comes again each turn."""
-    before: ComplexArray | None = None
+    """After so many turns that a stable motion of one turn is near."""
     for _ in range(_BLOCKS):
         part = run(system, (speed, speed), _BLOCK * 2 * np.pi / speed, (q, v), tolerance=tolerance)
         if part.stopped:
             raise ValueError(f"while it settles at the first speed {part.stopped}")
-        q, v, turn = part.q, part.v, part.z[-(part.time.size // _BLOCK) :]
-        if before is not None and np.abs(turn - before).max() <= _SETTLED * np.abs(turn).max():
-            return q, v, ()
-        before = turn
+        q, v = part.q, part.v
+        if (orbit := repeating(system, speed, 2 * np.pi / speed, q, v)) and orbit.outside == 0:
+            return orbit.start, orbit.velocities[-1, -1], ()
     warning = f"at the first speed nothing that comes again each turn is reached in {_BLOCK * _BLOCKS} turns"
     return q, v, (warning,)
 
@@ -120,7 +118,7 @@ def _settled(
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
     """Follow the synchronous part of the deflections in x, that of x(t) = Re(X e^{iφ}) + the rest.
 
-    Each value is a mean over so many whole turns, which fades at both ends.
+    Each value is a mean of so many whole turns, those in the middle weighing more.
 
     Parameters
     ----------
@@ -139,7 +137,6 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
         For fewer samples a turn, or fewer turns.
     """
     from scipy.interpolate import CubicSpline
-    from scipy.signal import fftconvolve
 
     angle = motion.turned - motion.turned[0]
     whole = int(angle[-1] / (2 * np.pi))
@@ -149,14 +146,14 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
         raise ValueError(
             f"{LEAST_A_TURN} samples a turn are needed at least for the synchronous part: a higher rate"
         )
-    even = np.arange(whole * _OF_A_TURN + 1) * (2 * np.pi / _OF_A_TURN)
-    rising = np.concatenate([[True], np.diff(angle) > 0])
+    even = np.arange(whole * _OF_A_TURN) * (2 * np.pi / _OF_A_TURN)
+    rising = np.diff(angle, prepend=-1.0) > 0
     x = CubicSpline(angle[rising], motion.z.real[rising])(even)
     turning = 2 * x * np.exp(-1j * (motion.turned[0] + even))[:, None]
-    window = np.hanning(turns * _OF_A_TURN + 1)[:-1]
-    mean = fftconvolve(turning, window[:, None] / window.sum(), mode="valid", axes=0)
-    each = slice(None, None, _OF_A_TURN // _A_TURN)
-    return np.interp(even[: len(mean)] + turns * np.pi, angle, motion.speed)[each], mean[each]
+    each = turning.reshape(whole, _OF_A_TURN, -1).mean(axis=1)
+    window = np.sin(np.pi * (np.arange(turns) + 0.5) / turns) ** 2
+    mean = np.lib.stride_tricks.sliding_window_view(each, turns, axis=0) @ (window / window.sum())
+    return np.interp((np.arange(len(mean)) + turns / 2) * 2 * np.pi, angle, motion.speed), mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,41 +221,32 @@ def steady_end(motion: MotionRun) -> SteadyEnd | None:
     first, last = motion.speeds
     if first != last or motion.time.size < LEAST_SAMPLES or not motion.resolved:
         return None
-    whole = float(motion.time[-1])
+    whole, t = float(motion.time[-1]), motion.time
     window = max(0.2 * whole, min(8 * 2 * np.pi / last, whole) if last else 0.0)
-    since = int(np.searchsorted(motion.time, whole - window))
-    t, z = motion.time[since:] - motion.time[since], motion.z[since:]
+    since = int(np.searchsorted(t, whole - window))
+    t, z = t[since:] - t[since], motion.z[since:]
     mean = _faded_mean(z)
     size = np.abs(z - mean).max(axis=0)
-    most = int(size.argmax())
+    most, eccentricity = int(size.argmax()), motion.eccentricity(since)
     largest = np.maximum(np.abs(motion.z - mean).max(axis=0), np.abs(mean))
     if (size <= 1e-6 * largest).all():
-        return SteadyEnd(mean, size, 0.0, "", True, np.nan, last, np.nan, motion.eccentricity(since))
+        return SteadyEnd(mean, size, 0.0, "", True, np.nan, last, np.nan, eccentricity)
     halves = [z[k * len(z) // 8 :][: len(z) // 2] for k in range(5)]
     means = np.array([_faded_mean(part) for part in halves])
     strength = np.sqrt([_faded_mean(np.abs(part - mean) ** 2).real for part in halves])
     values = np.hstack([strength, means.real, means.imag])
     spread = np.ptp(values, axis=0)
     which = int(spread.argmax())
-    steps = np.diff(values[:, which])
+    ways = np.unique(np.sign(np.diff(values[:, which])))
     trend: Literal["", "grows", "decays", "drifts"] = ""
-    if (steps > 0).all() or (steps < 0).all():
-        trend = "drifts" if which >= strength.shape[1] else "grows" if steps[0] > 0 else "decays"
+    if len(ways) == 1:
+        trend = "drifts" if which >= strength.shape[1] else "grows" if ways[0] > 0 else "decays"
     around = z[:, most] - mean[most]
     frequency = _strongest(t, around)
     period = _period(t, around, 2 * np.pi / (last if motion.system.forced and last else abs(frequency)))
-    return SteadyEnd(
-        mean=mean,
-        amplitude=size,
-        change=float(spread.max() / strength.max()),
-        trend=trend,
-        at_rest=False,
-        frequency=frequency,
-        speed=last,
-        period=period,
-        eccentricity=motion.eccentricity(since),
-        chaotic=bool(np.isnan(period)) and _beside_lines(motion.z[motion.time.size // 2 :, most]) > _BROAD,
-    )
+    rough = bool(np.isnan(period)) and _beside_lines(motion.z[motion.time.size // 2 :, most]) > _BROAD
+    change = float(spread.max() / strength.max())
+    return SteadyEnd(mean, size, change, trend, False, frequency, last, period, eccentricity, rough)
 
 
 def _faded_mean(z: ComplexArray | FloatArray) -> ComplexArray:

@@ -249,8 +249,11 @@ def rotor_system(
     pull[np.abs(pull) < 1e-15 * gravity] = 0.0  # straight down is straight down
     made.weight[planes] = np.outer(pull, load)
     at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
-    bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
-    made.bow[planes[:, at]] = np.outer([1, -1j], bent)
+    if 0 < len(at) < 3:
+        raise ValueError("a bow needs three nodes or more: through two of them a straight shaft passes")
+    if bow:  # (K_bb − K_bo K_oo⁻¹ K_ob) times the bow bends the straight shaft as it is bent at rest
+        bent = (stiffness @ followers(stiffness, at))[at] @ np.array([*bow.values()])
+        made.bow[planes[:, at]] = np.outer([1, -1j], bent)
     return without_followers(made) if isinstance(rotor, SmallModel) else made
 
 
@@ -259,15 +262,21 @@ def without_followers(system: MotionSystem) -> MotionSystem:
 
     They stay where their stiffness depends on speed.
     """
-    still = np.asarray(~(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2))))
-    still[system.law_tables[2]] = False
-    rest, others = np.flatnonzero(still), np.flatnonzero(~still)
-    if not rest.size or np.ptp(system.K[:, rest], axis=0).any():
+    moves = np.array(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2)))
+    moves[system.law_tables[2]] = True
+    if moves.all() or np.ptp(system.K[:, ~moves], axis=0).any():
         return system
-    T = np.zeros((system.size, others.size))
-    T[others, np.arange(others.size)] = 1.0
-    T[rest] = -np.linalg.solve(system.K[0][np.ix_(rest, rest)], system.K[0][np.ix_(rest, others)])
-    return _in_basis(system, T, tuple(system.coordinates[i] for i in others))
+    kept = np.flatnonzero(moves)
+    return _in_basis(system, followers(system.K[0], kept), tuple(system.coordinates[i] for i in kept))
+
+
+def followers(K: FloatArray, kept: IndexArray) -> FloatArray:
+    """Deflections of all unknowns by those k that are kept, where no force acts on the others, (n, k)."""
+    T = np.zeros((len(K), len(kept)))
+    others = np.setdiff1d(np.arange(len(K)), kept)
+    T[kept, np.arange(len(kept))] = 1.0
+    T[others] = -np.linalg.solve(K[np.ix_(others, others)], K[np.ix_(others, kept)])
+    return T
 
 
 def _in_basis(system: MotionSystem, T: FloatArray, coordinates: tuple[str, ...]) -> MotionSystem:
@@ -278,31 +287,6 @@ def _in_basis(system: MotionSystem, T: FloatArray, coordinates: tuple[str, ...])
         **{name: T.T @ getattr(system, name) @ T for name in "MCK"},
         **{name: T.T @ getattr(system, name) for name in ("weight", "unbalance", "bow")},
     )
-
-
-def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> ComplexArray:
-    """Forces that bend the straight shaft as it is bent at rest, N: (K_bb − K_bo K_oo⁻¹ K_ob) times the bow.
-
-    Parameters
-    ----------
-    stiffness
-        Of the free shaft in one plane, N/m, shape (n, n).
-    at
-        Unknowns where the bow is known, b of them; the others follow without a force.
-    bow
-        m, shape (b,).
-
-    Raises
-    ------
-    ValueError
-        If one or two are given: any two points lie on a straight line.
-    """
-    if 0 < len(at) < 3:
-        raise ValueError("a bow needs three nodes or more: through two of them a straight shaft passes")
-    others = np.setdiff1d(np.arange(len(stiffness)), at)
-    across = stiffness[np.ix_(others, at)]
-    held = np.linalg.solve(stiffness[np.ix_(others, others)], across) if len(at) else across
-    return np.asarray((stiffness[np.ix_(at, at)] - across.T @ held) @ bow)
 
 
 def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> MotionSystem:
@@ -332,10 +316,9 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
         raise ValueError(f"modes: from 0 to {others.size} between the kept nodes, not {modes}")
     K, M, n = (system.K[0] + system.K[0].T) / 2, system.M, len(kept)
     inner = np.ix_(others, others)
-    T = np.zeros((system.size, system.size))
-    T[kept, np.arange(n)] = 1.0
-    T[others, :n] = -np.linalg.solve(K[inner], K[np.ix_(others, kept)])
-    T[others, n:] = eigh(K[inner], M[inner])[1]
+    still = np.zeros((system.size, others.size))
+    still[others] = eigh(K[inner], M[inner])[1]
+    T = np.hstack((followers(K, kept), still))
     K, M = T.T @ K @ T, T.T @ M @ T
 
     def frequencies(size: int) -> FloatArray:
