@@ -94,14 +94,14 @@ def threshold(
     linear = linear_rotor(rotor, [known[speed] for speed in sorted(known)])
     stable = _search(linear, lowest, highest)
     ranges = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(known)))[0][:1]
-    guesses = [one.first for one in ranges if one.begins] + [stable.threshold or highest]
+    guess = min([stable.threshold or highest, *(one.first for one in ranges if one.begins)])
     for share, steps in _AROUND:
-        a, b = (float(np.clip(min(guesses) * (1 + s), lowest, highest)) for s in (-share, share))
+        a, b = np.clip([guess * (1 - share), guess * (1 + share)], lowest, highest).tolist()
         near = _search(linear_rotor(rotor, equilibria(system, (a, b))), a, b, steps)
         if near.threshold is None:
             break
+        guess = near.threshold
         stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
-        guesses = [near.threshold]
     again = tuple(
         f"about {speed_text(one.last)} it is stable again; `rotorid campbell` of the file that --output "
         "writes shows all such ranges"

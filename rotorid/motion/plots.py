@@ -12,13 +12,10 @@ from rotorid.base.plot_style import (
     COLORS,
     DARK,
     MARKERS,
-    QUIET,
     VERMILION,
-    WIDTH,
     legend_above,
     legend_below,
     look,
-    new_axes,
     new_figure,
     note,
     plain,
@@ -38,6 +35,7 @@ if TYPE_CHECKING:
 
 _PANELS, _TURNS, _LARGEST_ORDER = 4, 12, 4.0
 """Nodes that are drawn, turns of an orbit, orders of a spectrum."""
+CIRCLE = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
 _LOWEST_PHASE = -315.0
 """Degrees; phases stand from here on through a whole turn."""
 
@@ -66,30 +64,22 @@ def motion_figure(motion: MotionRun) -> Figure:
 
 def orbits_figure(motion: MotionRun) -> Figure:
     """Of each node the last turns, a dot at each turn, and the clearance circle of its bearing."""
-    from scipy.interpolate import CubicSpline
-
     shown, angle = _shown(motion), motion.turned
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
     figure = new_figure(0.9 + 3.2 * rows)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax in axes[len(shown) :]:
-        ax.remove()
     walls = {i: 1e6 * force.wall for force, i in motion.bearings}
     k = int(np.searchsorted(angle, angle[-1] - 2 * np.pi * _TURNS)) if angle[-1] > angle[0] else 0
     marks = 2 * np.pi * np.arange(np.ceil(angle[k] / (2 * np.pi)), np.floor(angle[-1] / (2 * np.pi)) + 1)
-    for i, ax in zip(shown, axes, strict=False):
+    for place, i in enumerate(shown, start=1):
+        ax = figure.add_subplot(rows, columns, place)
         z = 1e6 * motion.z[k:, i]
         ax.plot(z.real, z.imag, linewidth=0.9, color=look(0)["color"])
-        if z.size > 3 and marks.size and angle[-1] > angle[k]:
-            at = CubicSpline(angle[k:], z)(marks)
+        if angle[-1] > angle[k]:
+            at = np.interp(marks, angle[k:], z)
             ax.plot(at.real, at.imag, "o", markersize=4, color=VERMILION, label="once a turn")
-        if wall := walls.get(i):
-            ax.axhline(0, color=QUIET, linewidth=0.5)
-            ax.axvline(0, color=QUIET, linewidth=0.5)
-            turn = wall * np.exp(1j * np.linspace(0, 2 * np.pi, 181))
-            ax.plot(turn.real, turn.imag, color=DARK, linewidth=1.2)
-            note(ax, "clearance", (0.0, wall), (0, 2), color=DARK, ha="center")
+        if i in walls:
+            ax.plot(walls[i] * CIRCLE.real, walls[i] * CIRCLE.imag, color=DARK, label="clearance")
         ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
         ax.set_aspect("equal", adjustable="datalim")
         plain(ax)
@@ -159,7 +149,7 @@ def _draw_spectrum(motion: MotionRun, i: int, ax: Axes) -> None:
     ax.set(ylabel="amplitude, µm", ylim=(0, None))
 
 
-def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes | None = None) -> Axes:
+def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> None:
     """Draw the path of each journal in its clearance circle over speed, with load and rotation.
 
     Parameters
@@ -169,15 +159,9 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     labels
         Of the bearings.
     ax
-        None: axes of a figure of their own.
-
-    Returns
-    -------
-    The axes drawn into.
+        Drawn into.
     """
-    ax = new_axes((WIDTH, 4.6)) if ax is None else ax
-    turn = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
-    ax.plot(turn.real, turn.imag, color=DARK)
+    ax.plot(CIRCLE.real, CIRCLE.imag, color=DARK)
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
@@ -197,12 +181,9 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
     ax.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
     plain(ax)
-    return ax
 
 
-def draw_bifurcations(
-    branches: Sequence[Branch], directions: FloatArray, label: str, ax: Axes | None = None
-) -> Axes:
+def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label: str, ax: Axes) -> None:
     """Draw the amplitude of the first sensor, µm, over speed, rpm.
 
     Stable motions are solid, unstable ones dashed; arrows show where the motion jumps at a fold.
@@ -214,45 +195,35 @@ def draw_bifurcations(
     directions, label
         Unit vectors of what the sensors read, shape (k, n), and the name of the first.
     ax
-        None: axes of a figure of their own.
-
-    Returns
-    -------
-    The axes drawn into.
+        Drawn into.
     """
     from rotorid.motion.branches import KINDS, amplitudes, jumps
 
-    ax = new_axes((WIDTH, 4.6)) if ax is None else ax
     colors = dict(zip(dict.fromkeys(b.kind for b in branches), COLORS, strict=False))
     for branch in branches:
         speeds, sizes = branch.speeds * RPM, 1e6 * amplitudes(branch.points, directions)[:, 0]
-        unstable = ~branch.stable
+        unstable, marker = ~branch.stable, "" if len(speeds) > 1 else "o"
         near = np.append(unstable[1:], False) | np.append(False, unstable[:-1])  # up to the next stable ones
         for part, word, style in ((~unstable, "stable", "-"), (unstable | near, "unstable", "--")):
             if part.any():
-                name = _once(ax, f"{branch.kind}, {word}")
-                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "label": name}
-                drawn["marker"] = "" if len(sizes) > 1 else "o"
+                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "marker": marker}
+                drawn["label"] = f"{branch.kind}, {word}"
                 ax.plot(speeds, np.where(part, sizes, np.nan), style, clip_on=False, **drawn)
-        for orbit in branch.bifurcations:
-            marker, ((size, *_),) = MARKERS[KINDS.index(orbit.bifurcation)], amplitudes([orbit], directions)
-            drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": _once(ax, orbit.bifurcation)}
+        for orbit, (size, *_) in zip(
+            branch.bifurcations, amplitudes(branch.bifurcations, directions), strict=True
+        ):
+            marker = MARKERS[KINDS.index(orbit.bifurcation)]
+            drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": orbit.bifurcation}
             ax.plot(orbit.speed * RPM, 1e6 * size, marker, **drawn)
     for speed, before, after in jumps(branches, directions):
         tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after, before))
-        arrow = {"arrowstyle": "->", "color": DARK, "linewidth": 1.1, "shrinkA": 4, "shrinkB": 1}
-        ax.annotate("", tip, tail, arrowprops=arrow)
-        middle = (speed * RPM, (tip[1] + tail[1]) / 2)
-        where = {"rotation": 90, "va": "center", "ha": "right", "bbox": BOX}
-        note(ax, "jump up" if after[0] > before[0] else "jump down", middle, (-3, 0), color=DARK, **where)
+        ax.annotate("", tip, tail, arrowprops={"arrowstyle": "->", "color": DARK, "shrinkA": 4})
+        where: dict[str, Any] = {"rotation": 90, "va": "center", "ha": "right", "bbox": BOX, "color": DARK}
+        word = "jump up" if after[0] > before[0] else "jump down"
+        note(ax, word, (tip[0], (tip[1] + tail[1]) / 2), (-3, 0), **where)
     ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {label}, µm")
     ax.set_ylim(bottom=0.0)
     plain(ax)
     rad_s_above(ax)
-    legend_above(ax, height=1.12)
-    return ax
-
-
-def _once(ax: Axes, label: str) -> str:
-    """A label that no line has yet, or none."""
-    return "" if label in {line.get_label() for line in ax.lines} else label
+    pairs = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    legend_above(ax, height=1.12, handles=list(pairs.values()), labels=list(pairs))

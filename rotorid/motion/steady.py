@@ -17,7 +17,7 @@ from rotorid.motion.system import MotionSystem
 LEAST_SAMPLES = 64
 _BLOCK, _BLOCKS = 32, 64
 """Turns that a start settles at once, and how often at most."""
-_OF_A_TURN = 64  # samples of the synchronous part
+_A_TURN = 8  # values of the synchronous part
 _TREND, _WANDERS = 1e-3, 1e-2
 """Change at which a motion that goes one way, and one that goes up and down, are not steady."""
 _PERIODIC, _PERIODS = 2e-3, 8
@@ -118,7 +118,7 @@ def _settled(
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
     """Follow the synchronous part of the deflections in x, that of x(t) = Re(X e^{iφ}) + the rest.
 
-    Each value is a mean of so many whole turns, those in the middle weighing more.
+    Each value is a mean over so many whole turns, which fades at both ends.
 
     Parameters
     ----------
@@ -136,8 +136,6 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
     ValueError
         For fewer samples a turn, or fewer turns.
     """
-    from scipy.interpolate import CubicSpline
-
     angle = motion.turned - motion.turned[0]
     whole = int(angle[-1] / (2 * np.pi))
     if whole < turns:
@@ -146,14 +144,14 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
         raise ValueError(
             f"{LEAST_A_TURN} samples a turn are needed at least for the synchronous part: a higher rate"
         )
-    even = np.arange(whole * _OF_A_TURN) * (2 * np.pi / _OF_A_TURN)
-    rising = np.diff(angle, prepend=-1.0) > 0
-    x = CubicSpline(angle[rising], motion.z.real[rising])(even)
-    turning = 2 * x * np.exp(-1j * (motion.turned[0] + even))[:, None]
-    each = turning.reshape(whole, _OF_A_TURN, -1).mean(axis=1)
-    window = np.sin(np.pi * (np.arange(turns) + 0.5) / turns) ** 2
-    mean = np.lib.stride_tricks.sliding_window_view(each, turns, axis=0) @ (window / window.sum())
-    return np.interp((np.arange(len(mean)) + turns / 2) * 2 * np.pi, angle, motion.speed), mean
+    begins = np.arange(_A_TURN * (whole - turns) + 1) * (2 * np.pi / _A_TURN)
+    turning = 2 * motion.z.real * np.exp(-1j * motion.turned)[:, None]
+    mean, steps = [], np.gradient(angle)
+    for begin in begins:
+        part = slice(*np.searchsorted(angle, (begin, begin + 2 * np.pi * turns)))
+        weight = np.sin((angle[part] - begin) / (2 * turns)) ** 2 * steps[part]
+        mean.append(weight @ turning[part] / weight.sum())
+    return np.interp(begins + np.pi * turns, angle, motion.speed), np.array(mean)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from fem import CubicSpring, InternalDamping, JournalBearing, Motion, SqueezeFilm, Stop
 from fem.forces import law, tables
+from rotorid.base.plot_style import new_axes
 from rotorid.motion.branches import DOUBLING, FOLD, HOPF, TORUS, jumps
 from rotorid.motion.collocation import Periodic
 from rotorid.motion.periodic import periodic_motion
@@ -100,10 +101,12 @@ def test_jumps_of_a_squeeze_film_up_and_down():
         far = max(other, key=lambda e: abs(e - before[0]))
         np.testing.assert_allclose(after, far, rtol=3e-3)
     assert sorted(after[0] > before[0] for _, before, after in arrows) == [False, True]
-    ax = draw_bifurcations(found.branches, np.eye(2)[:1], "1")
+    ax = new_axes()
+    draw_bifurcations(found.branches, np.eye(2)[:1], "1", ax)
     assert {text.get_text() for text in ax.texts} >= {"jump up", "jump down"}
-    labels = {line.get_label() for line in ax.lines}
-    assert {"synchronous, stable", "synchronous, unstable", "fold"} <= labels
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"synchronous, stable", "synchronous, unstable", "fold"} == {*labels}
+    assert len(labels) == 3
 
 
 def amplitudes(zeta, cubic, u, speed):
