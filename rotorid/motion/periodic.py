@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,8 +25,8 @@ from rotorid.motion.steady import steady_end, steady_linear
 from rotorid.motion.system import MotionSystem
 
 _COARSE = 1e-3  # more of `Orbit.roughness` is said
-_TURNS, _BLOCKS, _ASKED = 100, 8, 12
-"""Revolutions of motion in time, how often so many more, and at how many speeds."""
+_TURNS, _BLOCKS, _BETWEEN = 100, 8, 10
+"""Revolutions of motion in time, how often so many more, and at how many speeds between both ends."""
 
 
 @dataclass(eq=False)
@@ -65,22 +65,6 @@ class PeriodicMotion:
     def problem(self, turns: int) -> Periodic:
         """What is sought of so many turns, or with a period of its own."""
         return Periodic(self.system, turns, self.low, self.high, self.until)
-
-    def add(self, turns: int, orbit: Orbit) -> bool:
-        """Follow the branch of a motion to both sides; whether there is one."""
-        parts = list[Branch]()
-        for sign, last in ((1.0, self.high), (-1.0, self.low)):
-            if (orbit.speed != last or self.low == self.high) and not any(b.ended == "closed" for b in parts):
-                try:
-                    parts.append(follow(self.problem(turns), orbit, sign * orbit.at_speed))
-                except np.linalg.LinAlgError:
-                    continue
-        if len(parts) == 2:
-            up, down = parts
-            ended = down.ended if down.ended.startswith("stopped") else up.ended
-            parts = [replace(up, orbits=(*reversed(down.orbits), *up.orbits[1:]), ended=ended)]
-        self.branches += parts
-        return bool(parts)
 
     def has(self, turns: int, orbit: Orbit) -> bool:
         """Whether a branch comes through a motion."""
@@ -123,14 +107,12 @@ def periodic_motion(
     linear = all(isinstance(force, InternalDamping) for force in system.forces)
     if linear or not system.forced:
         motion.branches.extend(filter(None, [straight(system, low, high)]))
-    else:
-        _from_rest(motion)
     if linear:
         motion.tried = "All forces are linear: there is one motion at each speed."
     else:
         if limit_cycle:
             _cycles(motion)
-        _in_time(motion, limit_cycle)
+        _search(motion, limit_cycle)
     if motion.late and not motion.branches:
         raise ValueError(f"no periodic motion was found in {max_seconds:.6g} s: raise --max-seconds")
     if not motion.branches:
@@ -158,23 +140,6 @@ def _doubts(branch: Branch, response: bool) -> Iterator[str]:
         yield f"the {branch.kind} branch has too few steps in time: {percent(worst)} % of it may be wrong"
 
 
-def _from_rest(motion: PeriodicMotion) -> None:
-    """Synchronous, from the lowest speed upwards and, if that is another branch, from the highest down."""
-    system, problem = motion.system, motion.problem(1)
-    for speed in dict.fromkeys((motion.low, motion.high)):
-        _, rests, responses = steady_linear(system, [speed])
-        still = np.zeros((1, system.size))
-        rest, response = np.vstack((rests, still)), np.vstack((responses, still))
-        guess = turning(speed, 2 * np.pi / speed, rest[0], response[0])
-        try:
-            orbit = problem.solve(guess, guess.at_speed)[0].orbit
-        except np.linalg.LinAlgError as met:
-            motion.warnings.append(f"at {rpm_text(speed)} no periodic motion is found from rest: {met}")
-            continue
-        if not motion.has(1, orbit):
-            motion.add(1, orbit)
-
-
 def _cycles(motion: PeriodicMotion) -> None:
     """Limit cycles that begin at the Hopf points of rest."""
     problem, n = motion.problem(0), motion.system.size
@@ -189,38 +154,47 @@ def _cycles(motion: PeriodicMotion) -> None:
             continue
 
 
-def _in_time(motion: PeriodicMotion, limit_cycle: bool) -> None:
-    """Follow what motion in time comes to and no branch shows; say what else it does, and what was tried."""
-    remarks: dict[str, dict[str, None]] = {}
-    done = []
-    for speed in _asked(motion):
-        for q, v in _starts(motion.system, speed):
-            end = _reached(motion, speed, q, v)
-            if motion.late:
-                break
-            if isinstance(end, Orbit):
-                end = _kept(motion, end, limit_cycle)
-            if end:
-                remarks.setdefault(end, {})[f"{speed * RPM:.6g}"] = None
-        if motion.late:
-            break
-        done.append(speed)
-    motion.warnings += [f"motion in time {end}, at {listing(at, 'and')} rpm" for end, at in remarks.items()]
-    ends, in_time = (
-        f"{listing([f'{speed * RPM:.6g}' for speed in speeds], 'and')} rpm"
-        for speeds in (dict.fromkeys((motion.low, motion.high)), done)
-    )
-    start = "from rest and from large whirls" if motion.system.forced else "with a large whirl"
-    begun = f"; motion in time was begun {start} at {in_time}" if done else ""
-    motion.tried = f"Motions were followed from rest at {ends}{begun}. Other motions were not sought."
+def _search(motion: PeriodicMotion, limit_cycle: bool) -> None:
+    """Follow what is found at both ends, in the middle and between bifurcations, and say what is not."""
+    low, high, remarks = motion.low, motion.high, dict[str, dict[str, None]]()
 
+    def done(speeds: Iterable[float]) -> list[str]:
+        """Search at these until it is late; at which it was, rpm."""
+        at = []
+        for speed, name in ((speed, f"{speed * RPM:.6g}") for speed in speeds):
+            for end in _ends(motion, speed):
+                words = _kept(motion, end, limit_cycle) if isinstance(end, Orbit) else end
+                if words and not motion.late:
+                    remarks.setdefault(words, {})[name] = None
+            at += [] if motion.late else [name]
+        return at
 
-def _asked(motion: PeriodicMotion) -> list[float]:
-    """Speeds at which motion in time is asked: both ends, and in the middle and between bifurcations."""
+    ends = done(dict.fromkeys((low, high)))
     bifurcations = (orbit.speed for branch in motion.branches for orbit in branch.bifurcations)
-    edges = sorted({motion.low, motion.high, *bifurcations})
-    middles = ((a + b) / 2 for a, b in [(motion.low, motion.high), *itertools.pairwise(edges)])
-    return sorted({motion.low, motion.high, *middles})[:_ASKED]
+    edges = sorted({low, high, *bifurcations})
+    middles = {(a + b) / 2 for a, b in [(low, high), *itertools.pairwise(edges)]} - {low}
+    between = done(sorted(middles)[:_BETWEEN])
+    motion.warnings += [f"{words}, at {listing(at, 'and')} rpm" for words, at in remarks.items()]
+    start = "from rest and from large whirls" if motion.system.forced else "with a large whirl"
+    at = listing([*ends, *between], "and") or "no speed"
+    motion.tried = f"Motion in time was begun {start} at {at} rpm. Other motions were not sought."
+
+
+def _ends(motion: PeriodicMotion, speed: float) -> Iterator[Orbit | str]:
+    """Motions at a speed, or why there is none: that near the linear rotor's, and what others come to in time."""
+    system = motion.system
+    if system.forced and speed in (motion.low, motion.high):
+        _, rests, responses = steady_linear(system, [speed])
+        still = np.zeros((1, system.size))
+        rest, response = np.vstack((rests, still)), np.vstack((responses, still))
+        guess = turning(speed, 2 * np.pi / speed, rest[0], response[0])
+        try:
+            yield motion.problem(1).solve(guess, guess.at_speed)[0].orbit
+        except np.linalg.LinAlgError as met:
+            yield f"no periodic motion is found from rest: {met}"
+    for q, v in _starts(system, speed):
+        if not motion.late:
+            yield _reached(motion, speed, q, v)
 
 
 def _starts(system: MotionSystem, speed: float) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -249,9 +223,9 @@ def _reached(motion: PeriodicMotion, speed: float, q: FloatArray, v: FloatArray)
         try:
             part = run(system, (speed, speed), _TURNS * turn, (q, v))
         except ValueError as problem_met:
-            return f"is not known: {problem_met}"
+            return f"motion in time is not known: {problem_met}"
         if part.stopped:
-            return f"from rest ends: {part.stopped.split(' after ')[0]}"
+            return f"motion in time ends: {part.stopped.split(' after ')[0]}"
         q, v, end = part.q, part.v, steady_end(part)
         if end is None or motion.late:
             break
@@ -266,17 +240,24 @@ def _reached(motion: PeriodicMotion, speed: float, q: FloatArray, v: FloatArray)
                 return again
     if not system.forced and sizes[-1:] < [0.95 * size for size in sizes[_BLOCKS // 2 :][:1]]:
         return ""
-    return f"comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
+    return f"motion in time comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
 
 
 def _kept(motion: PeriodicMotion, end: Orbit, limit_cycle: bool) -> str:
-    """Follow a motion if it is not known; what is not followed, in words."""
+    """Follow a motion to both sides if it is not known; what is not followed, in words."""
     turns = round(end.period * end.speed / (2 * np.pi)) if motion.system.forced else 0
     if motion.has(turns, end):
         return ""
     if turns > 1:
-        return f"comes again after {turns} revolutions only"
+        return f"motion in time comes again after {turns} revolutions only"
     if not turns and not limit_cycle:
-        return "comes to a whirl with a period of its own (--limit-cycle)"
-    known = motion.add(turns, end)
-    return "" if known else "comes to a periodic motion that Newton's method does not find again"
+        return "motion in time comes to a whirl with a period of its own (--limit-cycle)"
+    ways = [sign for sign, last in ((1.0, motion.high), (-1.0, motion.low)) if end.speed != last]
+    for sign in ways or [1.0]:
+        try:
+            motion.branches.append(follow(motion.problem(turns), end, sign * end.at_speed))
+        except np.linalg.LinAlgError as met:
+            return f"a periodic motion is not followed: {met}"
+        if motion.branches[-1].ended == "closed":
+            break
+    return ""
