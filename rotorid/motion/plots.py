@@ -12,6 +12,7 @@ from rotorid.base.plot_style import (
     COLORS,
     DARK,
     MARKERS,
+    TEXT,
     VERMILION,
     legend_above,
     legend_below,
@@ -33,31 +34,34 @@ if TYPE_CHECKING:
     from rotorid.motion.branches import Branch
     from rotorid.motion.equilibrium import Equilibrium
 
-_PANELS, _TURNS, _LARGEST_ORDER = 4, 12, 4.0
+_PANELS, _TURNS, _ORDERS = 4, 12, 4.0
 """Nodes that are drawn, turns of an orbit, orders of a spectrum."""
-CIRCLE = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+CIRCLE = np.array([part(np.linspace(0, 2 * np.pi, 181)) for part in (np.cos, np.sin)])
 _LOWEST_PHASE = -315.0
 """Degrees; phases stand from here on through a whole turn."""
 
 
 def motion_figure(motion: MotionRun) -> Figure:
     """Of each node x and y over time, and at a constant speed the spectrum of the second half beside them."""
-    shown, constant = _shown(motion), motion.speeds[0] == motion.speeds[1]
-    figure = new_figure(1.2 + 1.9 * len(shown))
-    widths = [3, 2] if constant else [1]
+    shown, turn = _shown(motion), motion.speeds[0] / (2 * np.pi)
+    figure, widths = new_figure(1.2 + 1.9 * len(shown)), [3, 2][: 1 + (motion.speeds[0] == motion.speeds[1])]
     axes = figure.subplots(len(shown), len(widths), sharex="col", width_ratios=widths, squeeze=False)
     for i, row in zip(shown, axes, strict=True):
         for k, (name, values) in enumerate((("x", motion.z[:, i].real), ("y", motion.z[:, i].imag))):
-            row[0].plot(motion.time, 1e6 * values, label=name, linewidth=0.7, color=look(k)["color"])
+            row[0].plot(motion.time, 1e6 * values, label=name, linewidth=0.7, color=COLORS[k])
         row[0].set_ylabel(f"node {motion.nodes[i]}, µm")
-        if constant:
-            _draw_spectrum(motion, i, row[1])
+        for ax in row[1:]:
+            z = motion.z[len(motion.z) // 2 :, i]
+            fade = np.hanning(len(z) + 2)[1:-1]
+            lines = np.fft.fftshift(np.abs(np.fft.fft(fade * (z - z.mean())))) / fade.sum()
+            frequency = np.fft.fftshift(np.fft.fftfreq(len(z), motion.time[1])) / (turn or 1.0)
+            ax.plot(frequency, 1e6 * lines, linewidth=1.0, color=COLORS[0])
+            ax.set(ylabel="amplitude, µm", ylim=(0, None), xlim=(-_ORDERS, _ORDERS) if turn else None)
         for ax in row:
             plain(ax)
-    axes[-1, 0].set_xlabel("time, s")
-    if constant:
-        axes[-1, 1].set_xlabel("frequency, cycles a turn" if motion.speeds[0] else "frequency, Hz")
-        axes[0, 1].legend(frameon=False, fontsize="small")
+    against = f"{'cycles a turn' if turn else 'Hz'}, backward < 0"
+    for ax, label in zip(axes[-1], ("time, s", against), strict=False):
+        ax.set_xlabel(label)
     legend_below(figure, [axes[0, 0]])
     return figure
 
@@ -69,17 +73,17 @@ def orbits_figure(motion: MotionRun) -> Figure:
     rows = -(-len(shown) // columns)
     figure = new_figure(0.9 + 3.2 * rows)
     walls = {i: 1e6 * force.wall for force, i in motion.bearings}
-    k = int(np.searchsorted(angle, angle[-1] - 2 * np.pi * _TURNS)) if angle[-1] > angle[0] else 0
-    marks = 2 * np.pi * np.arange(np.ceil(angle[k] / (2 * np.pi)), np.floor(angle[-1] / (2 * np.pi)) + 1)
+    k = int(np.searchsorted(angle, angle[-1] - 2 * np.pi * _TURNS))
+    marks = 2 * np.pi * np.arange(np.ceil(angle[k] / (2 * np.pi)), angle[-1] / (2 * np.pi))
     for place, i in enumerate(shown, start=1):
         ax = figure.add_subplot(rows, columns, place)
         z = 1e6 * motion.z[k:, i]
-        ax.plot(z.real, z.imag, linewidth=0.9, color=look(0)["color"])
-        if angle[-1] > angle[k]:
+        ax.plot(z.real, z.imag, linewidth=0.9, color=COLORS[0])
+        if marks.size:
             at = np.interp(marks, angle[k:], z)
             ax.plot(at.real, at.imag, "o", markersize=4, color=VERMILION, label="once a turn")
         if i in walls:
-            ax.plot(walls[i] * CIRCLE.real, walls[i] * CIRCLE.imag, color=DARK, label="clearance")
+            ax.plot(*walls[i] * CIRCLE, color=DARK, label="clearance")
         ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
         ax.set_aspect("equal", adjustable="datalim")
         plain(ax)
@@ -136,19 +140,6 @@ def _shown(motion: MotionRun) -> list[int]:
     return sorted(sorted(range(len(motion.nodes)), key=lambda i: i not in bearings)[:_PANELS])
 
 
-def _draw_spectrum(motion: MotionRun, i: int, ax: Axes) -> None:
-    """Amplitude of what whirls with the rotation and against it, over orders, or Hz where nothing turns."""
-    z = motion.z[motion.time.size // 2 :, i]
-    weight = np.hanning(z.size + 2)[1:-1]
-    lines = 1e6 * np.abs(np.fft.fft(weight * (z - z.mean()))) / weight.sum()
-    order = np.fft.fftfreq(z.size, motion.time[1]) / (motion.speeds[0] / (2 * np.pi) or 1.0)
-    for sign, label, style in ((1, "with the rotation", look(0)), (-1, "against it", look(1))):
-        part = (sign * order > 0) & ((sign * order < _LARGEST_ORDER) | (motion.speeds[0] == 0))
-        at = np.argsort(sign * order[part])
-        ax.plot(sign * order[part][at], lines[part][at], label=label, **{**style, "linewidth": 1.0})
-    ax.set(ylabel="amplitude, µm", ylim=(0, None))
-
-
 def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> None:
     """Draw the path of each journal in its clearance circle over speed, with load and rotation.
 
@@ -161,24 +152,19 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     ax
         Drawn into.
     """
-    ax.plot(CIRCLE.real, CIRCLE.imag, color=DARK)
+    ax.plot(*CIRCLE, color=DARK)
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
-    for end in (0, -1):
-        inwards = end == 0 and abs(Z[0, 0]) < 0.6  # where neither wall nor the other speed is
-        shift, side = ((7.0, 0.0), "left") if inwards else ((-7.0, 0.0), "right")
-        at = (Z[end, 0].real, Z[end, 0].imag)
-        note(ax, rpm_text(resting[end].speed), at, shift, ha=side, va="center")
-    arrow = {"arrowstyle": "-|>", "color": DARK}
+    for end, z in ((0, Z[0, 0]), (-1, Z[-1, 0])):
+        inwards = end == 0 and abs(z) < 0.6  # where neither wall nor the other speed is
+        shift, side = (7.0, "left") if inwards else (-7.0, "right")
+        note(ax, rpm_text(resting[end].speed), (z.real, z.imag), (shift, 0.0), ha=side, va="center")
     load = resting[-1].load.sum()
-    tip = 0.32 * load / (abs(load) or 1.0)
-    ax.annotate("", (-0.4 + tip.real, 0.45 + tip.imag), (-0.4, 0.45), arrowprops=arrow)
-    note(ax, "load" if load else "no load", (-0.4, 0.45), (0, 4), color=DARK, ha="center")
-    ax.annotate("", (0.36, 0.6), (0.52, 0.4), arrowprops={**arrow, "connectionstyle": "arc3,rad=0.25"})
-    note(ax, "Ω", (0.46, 0.54), (2, 2), color=DARK)
+    where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
     ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
+    ax.set_title(f"{where}; rotation anticlockwise", fontsize=TEXT)
     ax.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
     plain(ax)
 
@@ -201,20 +187,17 @@ def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label:
 
     colors = dict(zip(dict.fromkeys(b.kind for b in branches), COLORS, strict=False))
     for branch in branches:
-        speeds, sizes = branch.speeds * RPM, 1e6 * amplitudes(branch.points, directions)[:, 0]
-        unstable, marker = ~branch.stable, "" if len(speeds) > 1 else "o"
-        near = np.append(unstable[1:], False) | np.append(False, unstable[:-1])  # up to the next stable ones
-        for part, word, style in ((~unstable, "stable", "-"), (unstable | near, "unstable", "--")):
-            if part.any():
-                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "marker": marker}
-                drawn["label"] = f"{branch.kind}, {word}"
-                ax.plot(speeds, np.where(part, sizes, np.nan), style, clip_on=False, **drawn)
-        for orbit, (size, *_) in zip(
-            branch.bifurcations, amplitudes(branch.bifurcations, directions), strict=True
-        ):
-            marker = MARKERS[KINDS.index(orbit.bifurcation)]
-            drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": orbit.bifurcation}
-            ax.plot(orbit.speed * RPM, 1e6 * size, marker, **drawn)
+        speeds = np.array([orbit.speed for orbit in branch.orbits]) * RPM
+        sizes = 1e6 * amplitudes(branch.orbits, directions)[:, 0]
+        kinds = np.array([orbit.bifurcation for orbit in branch.orbits])
+        stable = np.array([orbit.stable for orbit in branch.orbits])
+        for word, style, part in (("stable", "-", stable | (kinds != "")), ("unstable", "--", ~stable)):
+            if (part & (kinds == "")).any():
+                line = {"color": colors[branch.kind], "marker": "" if len(speeds) > 1 else "o"}
+                ax.plot(speeds, np.where(part, sizes, np.nan), style, label=f"{branch.kind}, {word}", **line)
+        for kind, marker in zip(KINDS, MARKERS, strict=False):
+            if (at := kinds == kind).any():
+                ax.plot(speeds[at], sizes[at], marker, color=DARK, markersize=5, zorder=3, label=kind)
     for speed, before, after in jumps(branches, directions):
         tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after, before))
         ax.annotate("", tip, tail, arrowprops={"arrowstyle": "->", "color": DARK, "shrinkA": 4})

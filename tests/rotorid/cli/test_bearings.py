@@ -79,7 +79,7 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     light = fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, density=0.0, forces=forces)
     found = bearings(light, BearingsOptions(speeds=[100.0]))
     assert found.found[0].eccentricity == pytest.approx(0)
-    assert "no load" in [text.get_text() for text in found.figure().axes[0].texts]
+    assert found.figure().axes[0].get_title().startswith("no load")
 
 
 @pytest.mark.parametrize(
