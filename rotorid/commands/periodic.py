@@ -114,7 +114,7 @@ class PeriodicMotions(Delivered):
         branches = [
             {
                 "kind": branch.kind,
-                "turns": branch.turns or None,
+                "turns": branch.orbits[0].turns or None,
                 "ended": branch.ended,
                 "speeds_rad_s": branch.speeds,
                 "periods_s": [_period(branch, p) for p in branch.points],
@@ -136,7 +136,7 @@ class PeriodicMotions(Delivered):
                 ],
                 "tried": motion.tried,
                 "warnings": motion.warnings,
-                "reduction": reduction(motion.system),
+                "reduction": reduction(motion.problem.system),
             }
         )
 
@@ -151,7 +151,7 @@ class PeriodicMotions(Delivered):
             f"{motion.tried}",
             tuple(motion.warnings),
             (
-                *reduction_notes(motion.system),
+                *reduction_notes(motion.problem.system),
                 *(
                     f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
                     f"{self.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
@@ -201,7 +201,7 @@ class PeriodicMotions(Delivered):
             Column("bifurcation", [b.bifurcation for _, _, b in each], str),
             Column("speed_rad_s", [b.speed for _, _, b in each]),
             Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format, "rpm"),
-            Column("whirl_ratio", [_whirl(*one[1:]) for one in each], "{:.4f}".format, "whirl/speed"),
+            Column("whirl_ratio", [_whirl(b) for _, _, b in each], "{:.4f}".format, "whirl/speed"),
             *(
                 Column(f"amplitude_{name}_m", values, _micrometres, f"{name}, µm")
                 for name, values in zip(self.labels, sizes.T, strict=True)
@@ -223,9 +223,9 @@ def _micrometres(metres: float) -> str:
     return f"{1e6 * metres:.4g}"
 
 
-def _whirl(branch: Branch, orbit: Orbit) -> float:
+def _whirl(orbit: Orbit) -> float:
     """Frequency that begins there, of a cycle its own, by the speed; NaN where none begins."""
-    return (orbit.frequency if branch.turns else math.tau / orbit.period) / orbit.speed
+    return (orbit.frequency if orbit.turns else math.tau / orbit.period) / orbit.speed
 
 
 def _period(branch: Branch, orbit: Orbit) -> float:

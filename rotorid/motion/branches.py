@@ -23,6 +23,7 @@ from rotorid.motion.system import MotionSystem
 _LONGEST, _SHORTEST, _CORNER = 0.04, 1e-7, 1e-4
 """Of a step along a branch, by the size of the motion and the range of speeds; shorter ones may turn sharply:
 where a shaft meets its stop, the branch has a corner."""
+_SMALLEST = 0.1  # of a limit cycle, by its first, which is a hundredth of the room: below it is rest
 _FLAT = 1e-8  # change of speed along a branch, by the range, that may be rounding
 _ORBITS, _GRID = 1500, 120
 """Of a branch at most, and of one that is straight."""
@@ -44,21 +45,15 @@ class Branch:
     ----------
     kind
         "synchronous", "limit cycle", or "rest".
-    turns
-        Revolutions in a period, 1, or 0 for a period of its own.
     orbits
         Along the branch, its bifurcations in their places.
     ended
         Why it is no longer.
-    straight
-        Whether it is that of linear equations, which no Newton's method found.
     """
 
     kind: str
-    turns: int
     orbits: tuple[Orbit, ...]
     ended: str
-    straight: bool = False
 
     @property
     def points(self) -> tuple[Orbit, ...]:
@@ -104,9 +99,9 @@ class Branch:
                 around.append((between, bool(stable[k] and stable[k + 1])))
         return around
 
-    def has(self, turns: int, orbit: Orbit) -> bool:
+    def has(self, orbit: Orbit) -> bool:
         """Whether it comes through a motion, or one as large: by largest and smallest deflections."""
-        if self.turns != turns:
+        if self.orbits[0].turns != orbit.turns:
             return False
         extents = np.array([point.extent for point in self.points])
         near = _SAME * orbit.scale[: orbit.start.size].max()
@@ -118,31 +113,29 @@ def follow(problem: Periodic, guess: Orbit, row: FloatArray) -> Branch:
 
     It leaves in the direction in which that grows; LinAlgError if there is no solution at the start.
     """
-    at, _ = problem.solve(guess, row)
+    at = problem.solve(guess, row)
     orbits, length, ended = [at.solution], _LONGEST / 4, ""
-    first, n = at.orbit, at.orbit.start.size
+    first, size = at.orbit, _SMALLEST * at.orbit.scale[: at.orbit.start.size]
     if problem.low == problem.high:
         ended = "one speed"
     else:
         tangent = _tangent(problem, at, row)
     while not ended:
         try:
-            new, onwards, iterations, length = _step(problem, at, tangent, length)
+            new, onwards, length = _step(problem, at, tangent, length)
             passed = _passed(problem, at, tangent, new, onwards, length)
         except np.linalg.LinAlgError as problem_met:
             length /= 2
             ended = f"stopped: {problem_met}" if length < _SHORTEST else ""
             continue
-        for orbit in passed:
-            if not problem.turns and (np.ptp(orbit.ends, axis=0) < 0.1 * first.scale[:n]).all():
-                orbits.append(replace(orbit, bifurcation=""))
-                ended = "joins the motion that it comes from"
-        if ended:
+        if not first.turns and any((np.ptp(orbit.ends, axis=0) < size).all() for orbit in passed):
+            orbits += [replace(orbit, bifurcation="") for orbit in passed]
+            ended = "joins the motion that it comes from"
             break
         orbits += [*passed, new.solution]
         at, tangent = new, onwards
         away = _weights(problem, at) * (at.orbit.unknowns - first.unknowns)
-        if not problem.low < at.orbit.speed < problem.high:
+        if np.isclose(at.orbit.speed, (problem.low, problem.high), rtol=1e-12).any():
             ended = "end of the range of speeds"
         elif len(orbits) > 20 and np.linalg.norm(away) < length:
             ended = "closed"
@@ -150,16 +143,15 @@ def follow(problem: Periodic, guess: Orbit, row: FloatArray) -> Branch:
             ended = f"stopped: {met}"
         elif len(orbits) >= _ORBITS:
             ended = f"stopped: {_ORBITS} points"
-        length = min(_LONGEST, length * (1.5 if iterations < 5 else 1.0 if iterations < 8 else 0.6))
-    kind = "synchronous" if problem.turns else "limit cycle"
-    return Branch(kind, problem.turns, tuple(orbits), ended)
+        length = min(_LONGEST, 1.5 * length)
+    return Branch("synchronous" if first.turns else "limit cycle", tuple(orbits), ended)
 
 
 def _weights(problem: Periodic, at: Linearised) -> FloatArray:
     """By which unknowns count for the length of a branch."""
     size = at.scale
     weights = np.asarray(1 / (size * np.sqrt(size.size - 2)))
-    weights[-2:] = 0.0 if problem.turns else 1 / size[-2], 1 / (problem.high - problem.low)
+    weights[-2:] = 0.0 if at.orbit.turns else 1 / size[-2], 1 / (problem.high - problem.low)
     return weights
 
 
@@ -169,31 +161,26 @@ def _tangent(problem: Periodic, at: Linearised, row: FloatArray) -> FloatArray:
     return np.asarray(change / np.linalg.norm(_weights(problem, at) * change))
 
 
-def _corrected(
-    problem: Periodic, at: Linearised, tangent: FloatArray, length: float
-) -> tuple[Linearised, int, FloatArray]:
-    """The solution at a length along the tangent, iterations, and the row whose value the length is."""
-    row = _weights(problem, at) ** 2 * tangent
-    return *problem.solve(at.moved(tangent * length), row), row
-
-
 def _step(
     problem: Periodic, at: Linearised, tangent: FloatArray, length: float
-) -> tuple[Linearised, FloatArray, int, float]:
-    """The next point, its tangent, iterations, and how long the step was."""
-    new, iterations, row = _corrected(problem, at, tangent, length)
-    onwards = _tangent(problem, new, row)
+) -> tuple[Linearised, FloatArray, float]:
+    """The next point, not beyond the range of speeds, its tangent, and how long the step was."""
     weights, y = _weights(problem, at), at.orbit.unknowns
-    aside = weights * (new.orbit.unknowns - y - tangent * length)
-    turn = (weights * tangent) @ (weights * onwards) / np.linalg.norm(weights * onwards)
-    if length > _CORNER and (np.linalg.norm(aside) > 0.5 * length or turn < 0.9):
+    along = row = weights**2 * tangent
+    ahead = y[-1] + length * tangent[-1]
+    end = min(max(ahead, problem.low), problem.high)
+    if end != ahead:
+        length *= (end - y[-1]) / (ahead - y[-1])
+        row = at.orbit.at_speed
+    new = problem.solve(at.moved(tangent * length), row)
+    onwards, way = _tangent(problem, new, along), new.orbit.unknowns - y
+    if row is along and not problem.low < new.orbit.speed < problem.high:
+        raise np.linalg.LinAlgError("the branch leaves the range of speeds")
+    aside = np.linalg.norm(weights * (way - tangent * length))
+    turn = (along @ onwards) / np.linalg.norm(weights * onwards)
+    if length > _CORNER and (aside > 0.5 * length or turn < 0.9):
         raise np.linalg.LinAlgError("the branch turns too sharply")
-    end = min(max(new.orbit.speed, problem.low), problem.high)
-    if end != new.orbit.speed:
-        new, _ = problem.solve(new.moved(onwards * (end - new.orbit.speed) / onwards[-1]), new.orbit.at_speed)
-        onwards = _tangent(problem, new, row)
-        length = float(row @ (new.orbit.unknowns - y))
-    return new, onwards, iterations, length
+    return new, onwards, float(along @ way)
 
 
 def _passed(
@@ -211,13 +198,18 @@ def _passed(
     if not fold and many == few:
         return []
 
+    row = _weights(problem, at) ** 2 * tangent
+
+    def corrected(s: float) -> Linearised:
+        return problem.solve(at.moved(tangent * s), row)
+
     def test(s: float) -> float:
-        there, _, row = _corrected(problem, at, tangent, s)
+        there = corrected(s)
         if fold:
             return float(_tangent(problem, there, row)[-1])
         return float(np.log(np.abs(there.solution.multipliers[few]) / UNITY))
 
-    there = _corrected(problem, at, tangent, _root(test, 0.0, length))[0]
+    there = corrected(_root(test, 0.0, length))
     value = there.solution.multipliers[few]
     kind, frequency = BRANCH if value.real > 0 else DOUBLING, np.nan
     if fold:
@@ -250,7 +242,7 @@ def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
             values = values[np.isfinite(values)]
             values = values[np.argsort(-values.real, kind="stable")]
             period = 2 * np.pi / speed
-            orbit = turning(float(speed), period, rest, response)
+            orbit = turning(float(speed), period, 1, rest, response)
             every.append((replace(orbit, multipliers=np.exp(period * values)), values))
         return every
 
@@ -283,7 +275,7 @@ def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
             orbits.append(replace(there, bifurcation=kind, frequency=frequency))
         orbits.append(b)
     ended = "end of the range of speeds" if orbits[-1].speed == high else "stopped: it rests no more"
-    return Branch("synchronous" if system.forced else "rest", 1, tuple(orbits), ended, straight=True)
+    return Branch("synchronous" if system.forced else "rest", tuple(orbits), ended)
 
 
 def amplitudes(orbits: Sequence[Orbit], directions: FloatArray) -> FloatArray:

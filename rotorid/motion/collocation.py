@@ -31,8 +31,9 @@ import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.compiled import compiled
-from rotorid.motion.run import run
-from rotorid.motion.system import MotionSystem, add_forces
+from rotorid.motion.rosenbrock import Equations, evaluate
+from rotorid.motion.run import equations_of, run
+from rotorid.motion.system import MotionSystem
 
 _S, LEAST_STEPS, MOST_STEPS = 4, 32, 512
 """Radau's points in a step; steps in a revolution or cycle."""
@@ -62,6 +63,8 @@ class Orbit:
     ----------
     speed, period
         Ω, rad/s, and T, s.
+    turns
+        Revolutions in one period; 0 for a period of its own, of a rotor without unbalance and bow.
     start
         Deflections at the beginning, where the angle of rotation is 0, shape (n,).
     velocities
@@ -75,6 +78,7 @@ class Orbit:
 
     speed: float
     period: float
+    turns: int
     start: FloatArray
     velocities: FloatArray
     multipliers: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))
@@ -154,11 +158,11 @@ class Orbit:
         return np.asarray(along.resampled(512).deflections.reshape(-1, len(directions)))
 
 
-def turning(speed: float, period: float, rest: FloatArray, response: ComplexArray) -> Orbit:
+def turning(speed: float, period: float, turns: int, rest: FloatArray, response: ComplexArray) -> Orbit:
     """The motion rest + Re(response e^{2πit/T})."""
     turned = np.exp(2j * np.pi * (np.arange(LEAST_STEPS)[:, None] + POINTS) / LEAST_STEPS)[..., None]
     velocities = (2j * np.pi / period * turned * response).real
-    return Orbit(speed, period, rest + response.real, velocities)
+    return Orbit(speed, period, turns, rest + response.real, velocities)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +173,6 @@ class Periodic:
     ----------
     system
         What moves.
-    turns
-        Revolutions in one period; 0 for a period of its own, of a rotor without unbalance and bow.
     low, high
         Range of speeds, rad/s.
     until
@@ -178,10 +180,14 @@ class Periodic:
     """
 
     system: MotionSystem
-    turns: int
     low: float
     high: float
     until: float = np.inf
+
+    @property
+    def late(self) -> bool:
+        """Whether the limit of time has come."""
+        return time.monotonic() > self.until
 
     def _equations(self, orbit: Orbit) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Equations of N steps for themselves: what is left, (N, 4 n), and its derivatives.
@@ -189,27 +195,27 @@ class Periodic:
         Derivatives are by the velocities V, (N, 4 n, 4 n), and by q and v at the beginning, T and Ω,
         (N, 4 n, 2 n + 2).
         """
-        system, V, speed = self.system, orbit.velocities, orbit.speed
+        V, speed, M = orbit.velocities, orbit.speed, self.system.M
         N, _, n = V.shape
-        h, M = orbit.period / N, system.M
-        v, Q = np.roll(V[:, -1], 1, axis=0), orbit.deflections
-        C, K, C_speed, K_speed = system.around(speed)
-        F, F_q, F_v, F_speed = _forces_along(*system.law_tables, Q.reshape(-1, n), V.reshape(-1, n), speed)
-        K_t, C_t = K - F_q.reshape(N, _S, n, n), C - F_v.reshape(N, _S, n, n)
-        turned = np.exp(2j * np.pi * self.turns / N * (np.arange(N)[:, None] + POINTS))[..., None]
-        driven = ((system.unbalance * speed**2 + system.bow) * turned).real
+        h, v, Q = orbit.period / N, np.roll(V[:, -1], 1, axis=0), orbit.deflections
+        angles = 2 * np.pi * orbit.turns / N * (np.arange(N)[:, None] + POINTS)
+        at = angles.ravel(), Q.reshape(-1, n), V.reshape(-1, n)
+        states = _along(equations_of(self.system, speed, speed), speed, *at).reshape(N, _S, -1, n)
+        f, by_speed, K_t, C_t = (
+            states[:, :, 2],
+            -states[:, :, 3],
+            -states[:, :, 5 : 5 + n],
+            -states[:, :, 5 + n :],
+        )
         inert = np.einsum("jl,ilk->ijk", _INVERSE / h, V - v[:, None]) @ M.T
-        R = inert + V @ C.T + Q @ K.T - F.reshape(V.shape) - system.weight - driven
         J = np.einsum("jl,kp->jklp", _INVERSE / h, M)[None] + h * np.einsum("jl,ijkp->ijklp", _A, K_t)
         for j in range(_S):
             J[:, j, :, j] += C_t[:, j]
         moved = np.einsum("jl,ilk->ijk", _A, V)
         by_period = (np.einsum("ijkp,ijp->ijk", K_t, moved) - inert / h) / N
-        by_speed = V @ C_speed.T + Q @ K_speed.T - F_speed.reshape(V.shape)
-        by_speed -= (2 * speed * system.unbalance * turned).real
         by_v = np.broadcast_to(np.einsum("j,kp->jkp", -_INVERSE.sum(axis=1) / h, M), K_t.shape)
         others = np.concatenate([K_t, by_v, by_period[..., None], by_speed[..., None]], axis=-1)
-        return R.reshape(N, -1), J.reshape(N, _S * n, _S * n), others.reshape(N, _S * n, -1)
+        return (inert - f).reshape(N, -1), J.reshape(N, _S * n, _S * n), others.reshape(N, _S * n, -1)
 
     def linearised(self, orbit: Orbit) -> Linearised:
         """Newton's equations at an orbit or its guess, all but the unknowns eliminated.
@@ -219,7 +225,7 @@ class Periodic:
         numpy.linalg.LinAlgError
             Where they have no solution, or a force none (a wall), or the limit of time has come.
         """
-        if time.monotonic() > self.until:
+        if self.late:
             raise np.linalg.LinAlgError("time is up")
         V, n = orbit.velocities, orbit.start.size
         N = len(V)
@@ -236,30 +242,33 @@ class Periodic:
         for i in range(N):
             G[i + 1] = P[i, :, : 2 * n] @ G[i]
             G[i + 1, :, 2 * n :] += P[i, :, 2 * n :]
-        return Linearised(orbit, 2 * np.pi * self.turns, S, G)
+        return Linearised(orbit, S, G)
 
-    def newton(self, orbit: Orbit, row: FloatArray) -> tuple[Linearised, int]:
-        """The orbit with the same row · unknowns, and the iterations; LinAlgError without convergence."""
+    def newton(self, orbit: Orbit, row: FloatArray) -> Linearised:
+        """The orbit with the same row · unknowns; LinAlgError without convergence."""
         value, before = row @ orbit.unknowns, np.inf
-        for k in range(14):
+        for _ in range(14):
             at = self.linearised(orbit)
-            orbit, change = at.corrected(row, float(value - row @ orbit.unknowns))
-            if change < 1e-9 or 0.1 * before < change < 1e-6:  # the latter by rounding
-                return self.linearised(orbit), k + 1
-            before = change
-            if not change < 1e3 or not orbit.period > 0:
+            change = at.change(row, float(value - row @ orbit.unknowns))
+            new = at.moved(change, 1.0)
+            moved = np.abs(new.velocities - orbit.velocities) / orbit.scale[orbit.start.size :]
+            orbit, size = new, float(max(moved.max(), (np.abs(change) / at.scale).max()))
+            if size < 1e-9 or 0.1 * before < size < 1e-6:  # the latter by rounding
+                return self.linearised(orbit)
+            before = size
+            if not size < 1e3 or not orbit.period > 0:
                 break
         raise np.linalg.LinAlgError("Newton's method does not converge")
 
-    def solve(self, guess: Orbit, row: FloatArray) -> tuple[Linearised, int]:
+    def solve(self, guess: Orbit, row: FloatArray) -> Linearised:
         """The same with steps in time that are short enough, and longer again where they may be."""
         steps = len(guess.velocities)
         if guess.roughness < _ROUGH / 100 and steps >= 2 * LEAST_STEPS:
             guess = guess.resampled(steps // 2)
-        at, iterations = self.newton(guess, row)
+        at = self.newton(guess, row)
         while at.orbit.roughness > _ROUGH and 2 * len(at.orbit.velocities) <= MOST_STEPS:
-            at, _ = self.newton(at.orbit.resampled(2 * len(at.orbit.velocities)), row)
-        return at, iterations
+            at = self.newton(at.orbit.resampled(2 * len(at.orbit.velocities)), row)
+        return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,8 +279,6 @@ class Linearised:
     ----------
     orbit
         Where.
-    turned
-        Angle of rotation in one period, rad; 0 for a period of its own.
     steps
         Change of the velocities by the state at the beginning of their step, T, Ω and, of what is left of the
         equations, 1, shape (N, 4, n, 2 n + 3).
@@ -280,7 +287,6 @@ class Linearised:
     """
 
     orbit: Orbit
-    turned: float
     steps: FloatArray
     states: FloatArray
 
@@ -293,8 +299,9 @@ class Linearised:
         """Of the unknowns, so that row · change = value; `left` is 0 for a tangent, shape (2 n + 2,)."""
         orbit, scale, n = self.orbit, self.scale, self.orbit.start.size
         kept, missed = np.zeros(scale.size), 0.0
-        if self.turned:
-            kept[-2:], missed = (orbit.speed, orbit.period), self.turned - orbit.period * orbit.speed
+        if orbit.turns:
+            missed = 2 * np.pi * orbit.turns - orbit.period * orbit.speed
+            kept[-2:] = orbit.speed, orbit.period
         else:
             kept[:n] = orbit.velocities[-1, -1] / scale[:n] ** 2
         rows, end = np.array([kept, row]), self.states[-1]
@@ -305,13 +312,6 @@ class Linearised:
         size = np.concatenate([orbit.scale, np.abs(rows * scale).max(axis=1)])
         return np.linalg.solve(matrix * scale / size[:, None], right / size) * scale
 
-    def corrected(self, row: FloatArray, value: float) -> tuple[Orbit, float]:
-        """One step of Newton's method: the next guess, and how much of the motion it changes."""
-        change = self.change(row, value)
-        new = self.moved(change, 1.0)
-        moved = np.abs(new.velocities - self.orbit.velocities) / self.orbit.scale[self.orbit.start.size :]
-        return new, float(max(moved.max(), (np.abs(change) / self.scale).max()))
-
     def moved(self, change: FloatArray, left: float = 0.0) -> Orbit:
         """The orbit with its unknowns changed, along the solution."""
         orbit, n2 = self.orbit, 2 * self.orbit.start.size
@@ -320,7 +320,7 @@ class Linearised:
         by = np.concatenate([states, np.tile(rest, (len(states), 1))], axis=1)
         velocities = orbit.velocities + np.einsum("ijkm,im->ijk", self.steps, by)
         period, speed = orbit.period + float(change[-2]), orbit.speed + float(change[-1])
-        return Orbit(speed, period, orbit.start + change[: n2 // 2], velocities)
+        return Orbit(speed, period, orbit.turns, orbit.start + change[: n2 // 2], velocities)
 
     @cached_property
     def eigen(self) -> tuple[ComplexArray, ComplexArray]:
@@ -333,7 +333,7 @@ class Linearised:
     def solution(self) -> Orbit:
         """The orbit with its multipliers."""
         values = self.eigen[0]
-        if not self.turned:
+        if not self.orbit.turns:
             values = np.append(np.delete(values, np.abs(values - 1).argmin()), 1.0)
         return replace(self.orbit, multipliers=values)
 
@@ -362,15 +362,16 @@ def wall_met(system: MotionSystem, q: FloatArray, near: float = 1.0) -> str:
 
 
 @compiled
-def _forces_along(
-    codes: IndexArray, values: FloatArray, places: IndexArray, Q: FloatArray, V: FloatArray, speed: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """`add_forces` at many points, one a row: F, F_q, F_v, F_speed."""
+def _along(
+    equations: Equations, speed: float, angles: FloatArray, Q: FloatArray, V: FloatArray
+) -> FloatArray:
+    """The states of `evaluate` at many points of a motion, one a row."""
     m, n = Q.shape
-    F, F_q, F_v, F_speed = np.zeros((m, n)), np.zeros((m, n, n)), np.zeros((m, n, n)), np.zeros((m, n))
+    states = np.empty((m, 5 + 2 * n, n))
     for i in range(m):
-        add_forces(codes, values, places, Q[i], V[i], speed, F[i], F_q[i], F_v[i], F_speed[i])
-    return F, F_q, F_v, F_speed
+        states[i, 0], states[i, 1] = Q[i], V[i]
+        evaluate(equations, (angles[i], speed, 0.0), 0.0, states[i])
+    return states
 
 
 def repeating(
@@ -396,9 +397,9 @@ def repeating(
         part = run(system, (speed, speed), end - begin, (q, v), rate=1 / (end - begin), angle=speed * begin)
         q, v = part.q, part.v
         velocities[k] = v
-    guess = Orbit(speed, period, first, velocities.reshape(steps, _S, -1))
+    guess = Orbit(speed, period, turns, first, velocities.reshape(steps, _S, -1))
     try:
-        at, _ = Periodic(system, turns, speed, speed).newton(guess, guess.at_speed)
+        at = Periodic(system, speed, speed).newton(guess, guess.at_speed)
     except np.linalg.LinAlgError:
         return None
     away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]

@@ -14,19 +14,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fem import InternalDamping
-from rotorid.base.arrays import FloatArray
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import listing, percent
 from rotorid.motion.branches import HOPF, Branch, follow, straight
-from rotorid.motion.collocation import UNITY, Orbit, Periodic, repeating, turning
-from rotorid.motion.equilibrium import at_rest, equilibrium, room, whirl_at_rest
-from rotorid.motion.run import run
-from rotorid.motion.steady import steady_end, steady_linear
+from rotorid.motion.collocation import UNITY, Orbit, Periodic, turning
+from rotorid.motion.equilibrium import equilibrium, room, whirl_at_rest
+from rotorid.motion.steady import settled, steady_linear
 from rotorid.motion.system import MotionSystem
 
 _COARSE = 1e-3  # more of `Orbit.roughness` is said
-_TURNS, _BLOCKS, _BETWEEN = 100, 8, 10
-"""Revolutions of motion in time, how often so many more, and at how many speeds between both ends."""
+_BETWEEN = 10
+"""Speeds between both ends, at most, at which motion in time is begun."""
 
 
 @dataclass(eq=False)
@@ -35,12 +33,8 @@ class PeriodicMotion:
 
     Attributes
     ----------
-    system
-        What moves.
-    low, high
-        Range of speeds, rad/s.
-    until
-        When the search had to end, by `time.monotonic`.
+    problem
+        What they are sought of.
     branches
         The first is synchronous, or, without unbalance and bow, at rest.
     warnings
@@ -49,26 +43,14 @@ class PeriodicMotion:
         Where motions were sought, in sentences.
     """
 
-    system: MotionSystem
-    low: float
-    high: float
-    until: float
+    problem: Periodic
     branches: list[Branch] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     tried: str = ""
 
-    @property
-    def late(self) -> bool:
-        """Whether the limit of time has come."""
-        return time.monotonic() > self.until
-
-    def problem(self, turns: int) -> Periodic:
-        """What is sought of so many turns, or with a period of its own."""
-        return Periodic(self.system, turns, self.low, self.high, self.until)
-
-    def has(self, turns: int, orbit: Orbit) -> bool:
+    def has(self, orbit: Orbit) -> bool:
         """Whether a branch comes through a motion."""
-        return any(branch.has(turns, orbit) for branch in self.branches)
+        return any(branch.has(orbit) for branch in self.branches)
 
 
 def periodic_motion(
@@ -103,7 +85,8 @@ def periodic_motion(
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
-    motion = PeriodicMotion(system, low, high, time.monotonic() + max_seconds)
+    problem = Periodic(system, low, high, time.monotonic() + max_seconds)
+    motion = PeriodicMotion(problem)
     linear = all(isinstance(force, InternalDamping) for force in system.forces)
     if linear or not system.forced:
         motion.branches.extend(filter(None, [straight(system, low, high)]))
@@ -113,16 +96,16 @@ def periodic_motion(
         if limit_cycle:
             _cycles(motion)
         _search(motion, limit_cycle)
-    if motion.late and not motion.branches:
+    if problem.late and not motion.branches:
         raise ValueError(f"no periodic motion was found in {max_seconds:.6g} s: raise --max-seconds")
     if not motion.branches:
         equilibrium(system, low)  # its message is the better one
         raise ValueError(f"no periodic motion was found to begin with, {listing(motion.warnings, 'and')}")
-    if motion.late:
+    if problem.late:
         motion.warnings.insert(0, f"the search was stopped after {max_seconds:.6g} s (--max-seconds)")
     if not system.forced:
         motion.warnings.insert(0, "there is no unbalance and no bow: what is synchronous is rest")
-    if limit_cycle and all(branch.turns for branch in motion.branches):
+    if limit_cycle and all(branch.orbits[0].turns for branch in motion.branches):
         motion.warnings.append("no limit cycle found: no Hopf point, and motion in time comes to none")
     for branch in motion.branches:
         motion.warnings += _doubts(branch, linear and system.forced)
@@ -136,126 +119,92 @@ def _doubts(branch: Branch, response: bool) -> Iterator[str]:
     if response and any(abs(abs(orbit.multipliers[0]) - 1) < UNITY - 1 for orbit in branch.points):
         yield "nothing damps a mode: at its critical speed the motion has no bound"
     worst = max(orbit.roughness for orbit in branch.orbits)
-    if worst > _COARSE and not branch.straight:
+    if worst > _COARSE:
         yield f"the {branch.kind} branch has too few steps in time: {percent(worst)} % of it may be wrong"
 
 
 def _cycles(motion: PeriodicMotion) -> None:
     """Limit cycles that begin at the Hopf points of rest."""
-    problem, n = motion.problem(0), motion.system.size
+    problem, n = motion.problem, motion.problem.system.size
     for hopf in [b for branch in motion.branches for b in branch.bifurcations if b.bifurcation == HOPF]:
-        whirl, shape = whirl_at_rest(motion.system, hopf.start, hopf.speed)
-        guess = turning(hopf.speed, 2 * np.pi / whirl, hopf.start, 0.01 * shape)
+        whirl, shape = whirl_at_rest(problem.system, hopf.start, hopf.speed)
+        guess = turning(hopf.speed, 2 * np.pi / whirl, 0, hopf.start, 0.01 * shape)
         row = np.append(shape.real, np.zeros(n + 2))
         try:
-            if not motion.has(0, problem.solve(guess, row)[0].orbit):
+            if not motion.has(problem.solve(guess, row).orbit):
                 motion.branches.append(follow(problem, guess, row))
         except np.linalg.LinAlgError:
             continue
 
 
 def _search(motion: PeriodicMotion, limit_cycle: bool) -> None:
-    """Follow what is found at both ends, in the middle and between bifurcations, and say what is not."""
-    low, high, remarks = motion.low, motion.high, dict[str, dict[str, None]]()
+    """Follow what is found at some speeds, and say what is not."""
+    remarks, done = dict[str, dict[float, None]](), list[float]()
+    for speed in _speeds(motion):
+        for end in _ends(motion, speed):
+            words = _kept(motion, end, limit_cycle) if isinstance(end, Orbit) else end
+            if words and not motion.problem.late:
+                remarks.setdefault(words, {})[speed] = None
+        if motion.problem.late:
+            break
+        done.append(speed)
+    motion.warnings += [f"{words}, at {_listed(at)}" for words, at in remarks.items()]
+    start = "from rest and from large whirls" if motion.problem.system.forced else "with a large whirl"
+    motion.tried = f"Motion in time was begun {start} at {_listed(done)}. Other motions were not sought."
 
-    def done(speeds: Iterable[float]) -> list[str]:
-        """Search at these until it is late; at which it was, rpm."""
-        at = []
-        for speed, name in ((speed, f"{speed * RPM:.6g}") for speed in speeds):
-            for end in _ends(motion, speed):
-                words = _kept(motion, end, limit_cycle) if isinstance(end, Orbit) else end
-                if words and not motion.late:
-                    remarks.setdefault(words, {})[name] = None
-            at += [] if motion.late else [name]
-        return at
 
-    ends = done(dict.fromkeys((low, high)))
+def _listed(speeds: Iterable[float]) -> str:
+    return f"{listing([f'{speed * RPM:.6g}' for speed in sorted(speeds)], 'and') or 'no'} rpm"
+
+
+def _speeds(motion: PeriodicMotion) -> Iterator[float]:
+    """Both ends, and when these are done the middle and those between bifurcations."""
+    low, high = motion.problem.low, motion.problem.high
+    yield from dict.fromkeys((low, high))
     bifurcations = (orbit.speed for branch in motion.branches for orbit in branch.bifurcations)
     edges = sorted({low, high, *bifurcations})
-    middles = {(a + b) / 2 for a, b in [(low, high), *itertools.pairwise(edges)]} - {low}
-    between = done(sorted(middles)[:_BETWEEN])
-    motion.warnings += [f"{words}, at {listing(at, 'and')} rpm" for words, at in remarks.items()]
-    start = "from rest and from large whirls" if motion.system.forced else "with a large whirl"
-    at = listing([*ends, *between], "and") or "no speed"
-    motion.tried = f"Motion in time was begun {start} at {at} rpm. Other motions were not sought."
+    yield from sorted({(a + b) / 2 for a, b in [(low, high), *itertools.pairwise(edges)]} - {low})[:_BETWEEN]
 
 
 def _ends(motion: PeriodicMotion, speed: float) -> Iterator[Orbit | str]:
-    """Motions at a speed, or why there is none: that near the linear rotor's, and what others come to in time."""
-    system = motion.system
-    if system.forced and speed in (motion.low, motion.high):
-        _, rests, responses = steady_linear(system, [speed])
-        still = np.zeros((1, system.size))
-        rest, response = np.vstack((rests, still)), np.vstack((responses, still))
-        guess = turning(speed, 2 * np.pi / speed, rest[0], response[0])
-        try:
-            yield motion.problem(1).solve(guess, guess.at_speed)[0].orbit
-        except np.linalg.LinAlgError as met:
-            yield f"no periodic motion is found from rest: {met}"
-    for q, v in _starts(system, speed):
-        if not motion.late:
-            yield _reached(motion, speed, q, v)
-
-
-def _starts(system: MotionSystem, speed: float) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Deflections and velocities where motion in time begins: rest, and large whirls."""
+    """Motions near the linear rotor's and that motion in time comes to; or, in words, why there is none."""
+    problem, system = motion.problem, motion.problem.system
+    _, rests, responses = steady_linear(system, [speed])
     still = np.zeros(system.size)
-    try:
-        rest = at_rest(system, speed)
-    except ValueError:
-        rest = still
+    rest, response = next(zip(rests, responses, strict=True), (still, still.astype(complex)))
+    starts = [(rest, still)]
     if not system.forced:
-        yield rest + 0.5 * whirl_at_rest(system, rest, speed)[1].real, still
-        return
-    yield rest, still
-    for response in steady_linear(system, [speed])[2]:
+        starts = [(rest + 0.5 * whirl_at_rest(system, rest, speed)[1].real, still)]
+    elif response.any():
         load = speed**2 * system.unbalance + system.bow
         shape = response * np.exp(1j * np.angle(np.vdot(response, load)))  # in phase with the load
         size = 0.9 * np.sqrt(2) * room(system, rest, shape)
-        for large in (size if np.isfinite(size) else 5.0) * shape * np.array([[1.0], [-1j]]):
-            yield rest + large.real, -speed * large.imag
-
-
-def _reached(motion: PeriodicMotion, speed: float, q: FloatArray, v: FloatArray) -> Orbit | str:
-    """What motion in time comes to: one period of it, what else in words, or "" for rest."""
-    system, turn, sizes = motion.system, 2 * np.pi / speed, list[float]()
-    for block in range(_BLOCKS):
+        large = (size if np.isfinite(size) else 5.0) * shape
+        starts += [(rest + whirl.real, -speed * whirl.imag) for whirl in (large, -1j * large)]
+    if system.forced and speed in (problem.low, problem.high):
+        guess = turning(speed, 2 * np.pi / speed, 1, rest, response)
         try:
-            part = run(system, (speed, speed), _TURNS * turn, (q, v))
-        except ValueError as problem_met:
-            return f"motion in time is not known: {problem_met}"
-        if part.stopped:
-            return f"motion in time ends: {part.stopped.split(' after ')[0]}"
-        q, v, end = part.q, part.v, steady_end(part)
-        if end is None or motion.late:
-            break
-        sizes.append(float(end.amplitude.max()))
-        if not system.forced and (end.at_rest or sizes[-1] < 1e-4 * sizes[0]):
-            return ""
-        cycle = turn if system.forced else 2 * np.pi / abs(end.frequency)
-        repeats = np.isfinite(end.period)
-        for period in (cycle, end.period)[: 1 + repeats] if repeats or block == _BLOCKS - 1 else ():
-            again = repeating(system, speed, period, q, v)
-            if again and again.outside == 0:
-                return again
-    if not system.forced and sizes[-1:] < [0.95 * size for size in sizes[_BLOCKS // 2 :][:1]]:
-        return ""
-    return f"motion in time comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
+            yield problem.solve(guess, guess.at_speed).orbit
+        except np.linalg.LinAlgError as met:
+            yield f"no periodic motion is found from rest: {met}"
+    for q, v in starts:
+        if not problem.late:
+            yield settled(system, speed, q, v, until=problem.until)[2]
 
 
 def _kept(motion: PeriodicMotion, end: Orbit, limit_cycle: bool) -> str:
     """Follow a motion to both sides if it is not known; what is not followed, in words."""
-    turns = round(end.period * end.speed / (2 * np.pi)) if motion.system.forced else 0
-    if motion.has(turns, end):
+    if motion.has(end):
         return ""
-    if turns > 1:
-        return f"motion in time comes again after {turns} revolutions only"
-    if not turns and not limit_cycle:
+    if end.turns > 1:
+        return f"motion in time comes again after {end.turns} revolutions only"
+    if not end.turns and not limit_cycle:
         return "motion in time comes to a whirl with a period of its own (--limit-cycle)"
-    ways = [sign for sign, last in ((1.0, motion.high), (-1.0, motion.low)) if end.speed != last]
+    problem = motion.problem
+    ways = [sign for sign, last in ((1.0, problem.high), (-1.0, problem.low)) if end.speed != last]
     for sign in ways or [1.0]:
         try:
-            motion.branches.append(follow(motion.problem(turns), end, sign * end.at_speed))
+            motion.branches.append(follow(problem, end, sign * end.at_speed))
         except np.linalg.LinAlgError as met:
             return f"a periodic motion is not followed: {met}"
         if motion.branches[-1].ended == "closed":

@@ -193,7 +193,10 @@ def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label:
         stable = np.array([orbit.stable for orbit in branch.orbits])
         for word, style, part in (("stable", "-", stable | (kinds != "")), ("unstable", "--", ~stable)):
             if (part & (kinds == "")).any():
-                line = {"color": colors[branch.kind], "marker": "" if len(speeds) > 1 else "o"}
+                line: dict[str, Any] = {
+                    "color": colors[branch.kind],
+                    "marker": "" if len(speeds) > 1 else "o",
+                }
                 ax.plot(speeds, np.where(part, sizes, np.nan), style, label=f"{branch.kind}, {word}", **line)
         for kind, marker in zip(KINDS, MARKERS, strict=False):
             if (at := kinds == kind).any():

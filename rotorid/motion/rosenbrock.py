@@ -109,17 +109,17 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
     t
         s.
     state
-        q, v, f, ∂f/∂t, and the rows of J_q and of J_v, shape (4 + 2 n, n).
+        q, v, f, ∂f/∂Ω, ∂f/∂t, and the rows of J_q and of J_v, shape (5 + 2 n, n).
     """
     codes, values, places, _, damping, stiffness, damping_slope, stiffness_slope, weight, u, b = equations
     angle, first, alpha = turning
     n = state.shape[1]
-    q, v, f, f_t, J_q, J_v = state[0], state[1], state[2], state[3], state[4 : 4 + n], state[4 + n :]
+    (q, v, f, f_speed, f_t), J_q, J_v = state[:5], state[5 : 5 + n], state[5 + n :]
     gain = alpha * t
     speed = first + gain
     turned = np.exp(1j * (angle + (first + 0.5 * gain) * t))
     state[2:] = 0.0
-    add_forces(codes, values, places, q, v, speed, f, J_q, J_v, f_t)
+    add_forces(codes, values, places, q, v, speed, f, J_q, J_v, f_speed)
     for i in range(n):
         linear, slope = 0.0, 0.0
         for j in range(n):
@@ -128,9 +128,9 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
             J_q[i, j] -= stiffness[i, j] + gain * stiffness_slope[i, j]
             J_v[i, j] -= damping[i, j] + gain * damping_slope[i, j]
         force = u[i] * (speed * speed - 1j * alpha) + b[i]
-        rate = 2.0 * u[i] * speed * alpha + 1j * speed * force
         f[i] += weight[i] + linear + gain * slope + (force * turned).real
-        f_t[i] = alpha * (f_t[i] + slope) + (rate * turned).real
+        f_speed[i] += slope + 2.0 * speed * (u[i] * turned).real
+        f_t[i] = alpha * f_speed[i] + speed * (1j * force * turned).real
 
 
 @compiled
@@ -176,8 +176,8 @@ def attempt(
     `state` is that of `evaluate` at t, `now` that at the end of the step; `stages` (p, w), shape (2, 8, n).
     """
     n, M = state.shape[1], equations[3]
-    J_q, (p, w), (slip, pull, right) = state[4 : 4 + n], stages, np.empty((3, n))
-    inverse = M / (GAMMA * h) - state[4 + n :] - GAMMA * h * J_q
+    J_q, (p, w), (slip, pull, right) = state[5 : 5 + n], stages, np.empty((3, n))
+    inverse = M / (GAMMA * h) - state[5 + n :] - GAMMA * h * J_q
     if not invert(inverse):
         return False
     for stage in range(8):
@@ -198,7 +198,7 @@ def attempt(
         if stage:
             evaluate(equations, turning, t + ALPHA[stage] * h, now)
         for i in range(n):
-            right[i] = now[2, i] + h * D[stage] * state[3, i]
+            right[i] = now[2, i] + h * D[stage] * state[4, i]
             for j in range(n):
                 right[i] += M[i, j] * pull[j] + GAMMA * h * J_q[i, j] * slip[j]
         for i in range(n):
@@ -264,7 +264,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     places, n = equations[2], len(q)
     t, end = span
     h, least = steps
-    state, now, stages = np.empty((4 + 2 * n, n)), np.empty((4 + 2 * n, n)), np.empty((2, 8, n))
+    state, now, stages = np.empty((5 + 2 * n, n)), np.empty((5 + 2 * n, n)), np.empty((2, 8, n))
     state[0], state[1] = q, v
     done, written = 0, 0
     evaluate(equations, turning, t, state)

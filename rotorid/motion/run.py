@@ -207,12 +207,12 @@ def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turn
     free = shape[:, size <= _MASSLESS] / unit[:, None]
     if not free.size:
         return v
-    n, equations = system.size, _equations(system, turning[1], turning[1])
-    state = np.zeros((4 + 2 * n, n))
+    n, equations = system.size, equations_of(system, turning[1], turning[1])
+    state = np.zeros((5 + 2 * n, n))
     for _ in range(20):
         state[0], state[1] = q, v
         evaluate(equations, turning, 0.0, state)
-        J = free.T @ state[4 + n :] @ free
+        J = free.T @ state[5 + n :] @ free
         if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
             where = system.coordinates[int(np.abs(free).max(axis=1).argmax())]
             raise ValueError(
@@ -239,10 +239,10 @@ def _pieces(
     for begin, end in itertools.pairwise(ends):
         speed = first + alpha * begin
         turned = (angle + (first + speed) / 2 * begin) % (2 * np.pi)
-        yield (begin, end), _equations(system, speed, first + alpha * end), (turned, speed, alpha)
+        yield (begin, end), equations_of(system, speed, first + alpha * end), (turned, speed, alpha)
 
 
-def _equations(system: MotionSystem, first: float, last: float) -> Equations:
+def equations_of(system: MotionSystem, first: float, last: float) -> Equations:
     """As `advance` takes them, for speeds between two neighbouring knots."""
     middle = (first + last) / 2
     C, K, C_speed, K_speed = system.around(middle)

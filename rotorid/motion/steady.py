@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -9,14 +10,14 @@ from typing import Literal
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.motion.collocation import repeating
+from rotorid.motion.collocation import Orbit, repeating
 from rotorid.motion.equilibrium import at_rest
 from rotorid.motion.run import LEAST_A_TURN, TOLERANCE, MotionRun, run
 from rotorid.motion.system import MotionSystem
 
 LEAST_SAMPLES = 64
-_BLOCK, _BLOCKS = 32, 64
-"""Turns that a start settles at once, and how often at most."""
+_TURNS, _BLOCKS = 100, 8
+"""Turns of a motion that settles, and how often so many more."""
 _A_TURN = 8  # values of the synchronous part
 _TREND, _WANDERS = 1e-3, 1e-2
 """Change at which a motion that goes one way, and one that goes up and down, are not steady."""
@@ -76,7 +77,7 @@ def begin(
         rad/s.
     how
         At rest in equilibrium, or in steady motion: where forces are not linear it begins near the steady
-        motion of the linear rotor and settles for so many turns as it takes, 2048 at most.
+        motion of the linear rotor and settles for so many turns as it takes, 800 at most.
     shift
         Nodes moved from there, x + iy, m.
     tolerance
@@ -93,26 +94,51 @@ def begin(
         if (np.abs(system.at_forces(q + response.real)) <= 0.9 * system.walls).all():
             q, v = q + response.real, (1j * speed * response).real
         if system.forces:
-            q, v, warnings = _settled(system, speed, q, v, tolerance)
+            q, v, end = settled(system, speed, q, v, tolerance)
+            warnings = (f"at the first speed {end}",) if isinstance(end, str) else ()
     q = q.copy()
     for node, by in (shift or {}).items():
         q[[*system.index(node)]] += by.real, by.imag
     return q, v, warnings
 
 
-def _settled(
-    system: MotionSystem, speed: float, q: FloatArray, v: FloatArray, tolerance: float
-) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """After so many turns that a stable motion of one turn is near."""
-    for _ in range(_BLOCKS):
-        part = run(system, (speed, speed), _BLOCK * 2 * np.pi / speed, (q, v), tolerance=tolerance)
+def settled(
+    system: MotionSystem,
+    speed: float,
+    q: FloatArray,
+    v: FloatArray,
+    tolerance: float = TOLERANCE,
+    until: float = np.inf,
+) -> tuple[FloatArray, FloatArray, Orbit | str]:
+    """What motion in time comes to from a state at the angle 0, until `time.monotonic` is so late.
+
+    Returns
+    -------
+    The state in the end, and a stable periodic motion there; or, in words, what else, "" for rest.
+    """
+    turn, sizes = 2 * np.pi / speed, list[float]()
+    for block in range(_BLOCKS):
+        try:
+            part = run(system, (speed, speed), _TURNS * turn, (q, v), tolerance=tolerance)
+        except ValueError as problem:
+            return q, v, f"motion in time is not known: {problem}"
         if part.stopped:
-            raise ValueError(f"while it settles at the first speed {part.stopped}")
-        q, v = part.q, part.v
-        if (orbit := repeating(system, speed, 2 * np.pi / speed, q, v)) and orbit.outside == 0:
-            return orbit.start, orbit.velocities[-1, -1], ()
-    warning = f"at the first speed nothing that comes again each turn is reached in {_BLOCK * _BLOCKS} turns"
-    return q, v, (warning,)
+            return q, v, f"motion in time ends: {part.stopped.split(' after ')[0]}"
+        q, v, end = part.q, part.v, steady_end(part)
+        if end is None or time.monotonic() > until:
+            break
+        sizes.append(float(end.amplitude.max()))
+        if not system.forced and (end.at_rest or sizes[-1] < 1e-4 * sizes[0]):
+            return q, v, ""
+        cycle = turn if system.forced else 2 * np.pi / abs(end.frequency)
+        repeats = np.isfinite(end.period)
+        for period in (cycle, end.period)[: 1 + repeats] if repeats or block == _BLOCKS - 1 else ():
+            orbit = repeating(system, speed, period, q, v)
+            if orbit and orbit.outside == 0:
+                return orbit.start, orbit.velocities[-1, -1], orbit
+    if not system.forced and sizes[-1:] < [0.95 * size for size in sizes[_BLOCKS // 2 :][:1]]:
+        return q, v, ""
+    return q, v, f"motion in time comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
 
 
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
