@@ -14,7 +14,6 @@ Static deflections of the kept nodes are exact. Source: R. R. Craig, M. C. C. Ba
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -122,7 +121,7 @@ class MotionSystem:
     def around(self, speed: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """C and K at a speed and their derivatives by it, (n, n) each; beyond the knots as at their ends."""
         i = max(0, min(int(np.searchsorted(self.knots, speed, "right")) - 1, len(self.knots) - 2))
-        over, past = self.knots[i + 1] - self.knots[i], speed - self.knots[i]
+        over, past = max(self.knots[i + 1] - self.knots[i], 1e-9), speed - self.knots[i]
         C_speed, K_speed = ((each[i + 1] - each[i]) / over for each in (self.C, self.K))
         return self.C[i] + past * C_speed, self.K[i] + past * K_speed, C_speed, K_speed
 
@@ -220,7 +219,6 @@ def rotor_system(
     if lowest > highest:
         raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
     inside = {s for support in rotor.supports for s in support.speeds if lowest < s < highest}
-    end = highest if highest > lowest else lowest * (1 + 1e-6) + 1e-9
     if isinstance(rotor, SmallModel):
         names = tuple(f"x{node}" for node in rotor.nodes)
         stiffness, load = rotor.stiffness, rotor.weight / GRAVITY
@@ -234,20 +232,18 @@ def rotor_system(
         load = plane.M @ np.array([name[0] == "x" for name in names], dtype=float)
 
     def linear(speed: float) -> fem.Motion:
-        speed = min(speed, highest)
         if isinstance(rotor, SmallModel):
             return rotor.motion(speed)
         return fem.equations_of_motion(rotor.linear, speed=speed)
 
-    knots = np.array([lowest, *sorted(inside), end])
+    knots = np.array([lowest, *sorted(inside), highest])
     made = system(linear, knots, forces=rotor.forces, unbalance=unbalance)
     planes = np.array(
         [[made.coordinates.index(name.replace("x", axis, 1)) for name in names] for axis in "xy"]
     )
     angle = np.radians(number(direction, "direction", signed=True))
-    pull = number(gravity, "gravity") * np.array([np.cos(angle), np.sin(angle)])
-    pull[np.abs(pull) < 1e-15 * gravity] = 0.0  # straight down is straight down
-    made.weight[planes] = np.outer(pull, load)
+    way = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
+    made.weight[planes] = number(gravity, "gravity") * np.outer(way, load)
     at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
     if 0 < len(at) < 3:
         raise ValueError("a bow needs three nodes or more: through two of them a straight shaft passes")
@@ -326,16 +322,15 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     full = frequencies(system.size)
-    bends = int((full <= _RIGID * full[-1]).sum())
-    end = max(int((full <= 2 * system.knots[-1]).sum()), min(bends + 2, full.size))
+    bends, end = np.searchsorted(full, (_RIGID * full[-1], 2 * system.knots[-1])).tolist()
+    end = max(end, min(bends + 2, full.size))
 
     def error(modes: int) -> float:
         few = frequencies(n + modes)[bends:end]
         return float(np.max(few / full[bends:end] - 1.0, initial=0.0)) if len(few) == end - bends else np.inf
 
-    if modes is None:  # in pairs of both planes; more of them are never worse
-        pairs = bisect_left(range((others.size + 1) // 2), True, key=lambda n: error(2 * n) <= ENOUGH)
-        modes = min(2 * pairs, others.size)
+    if modes is None:  # in pairs of both planes
+        modes = next((few for few in range(0, others.size, 2) if error(few) <= ENOUGH), others.size)
     names = (*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes)))
     return replace(_in_basis(system, T[:, : n + modes], names), modes=modes, frequency_error=error(modes))
 
