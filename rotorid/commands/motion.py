@@ -15,7 +15,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
-from rotorid.commands.moving import moving
+from rotorid.commands.moving import moving, reduction, reduction_notes
 from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import (
     FASTEST,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from rotorid.commands.moving import Moving
     from rotorid.motion.run import MotionRun
     from rotorid.motion.steady import SteadyEnd
-    from rotorid.motion.system import MotionSystem, ReducedSystem
+    from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
 
 View = Literal["motion", "orbits", "bode"]
@@ -119,8 +119,6 @@ class Motion(Delivered):
     ----------
     motion
         What was found.
-    reduced
-        What moved, if it is a rotor with fewer unknowns than it has.
     end
         What it has come to; None where the speed changes or too little is known.
     error
@@ -133,7 +131,6 @@ class Motion(Delivered):
     """
 
     motion: MotionRun
-    reduced: ReducedSystem | None
     end: SteadyEnd | None
     error: float
     warnings: tuple[str, ...]
@@ -143,7 +140,7 @@ class Motion(Delivered):
         """As JSON types, without the provenance."""
         import numpy as np
 
-        motion, end, reduced = self.motion, self.end, self.reduced
+        motion, end = self.motion, self.end
         ranges = motion.eccentricity() if end is None else end.eccentricity
         nodes = [str(node) for node in motion.nodes]
         deflections = np.stack([motion.z.real, motion.z.imag], axis=2)
@@ -172,7 +169,7 @@ class Motion(Delivered):
                 "eccentricity": dict(zip(self._bearings, ranges.tolist(), strict=True)),
                 "tolerance": motion.tolerance,
                 "position_error": self.error,
-                "reduction": reduced and {"modes": reduced.modes, "frequency_error": reduced.error},
+                "reduction": reduction(motion.system),
                 "warnings": self.warnings,
             }
         )
@@ -181,7 +178,7 @@ class Motion(Delivered):
         """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
         import numpy as np
 
-        from rotorid.motion.periodic import repeating
+        from rotorid.motion.collocation import repeating
         from rotorid.motion.run import run
 
         motion, end = self.motion, self.end
@@ -298,13 +295,13 @@ class Motion(Delivered):
         )
 
     def _notes(self) -> tuple[str, ...]:
-        motion, reduced = self.motion, self.reduced
+        motion = self.motion
         step = 1e3 * motion.time[-1] / motion.steps
         found = (
             f"steps of about {figures(step, 1)} ms, each to {motion.tolerance:g} of how far the rotor moves; "
             f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
         )
-        return found if reduced is None else (*found, reduced.note)
+        return (*found, *reduction_notes(motion.system))
 
     def figure(self) -> Figure:
         """What was asked for: time and spectrum, orbits, or the Bode picture of a run-up."""
@@ -347,13 +344,12 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    reduced, tolerance = None, options.tolerance
+    tolerance = options.tolerance
     if tolerance > LOOSEST / _LOOSER:
         raise ValueError(f"--tolerance {tolerance:g}: {LOOSEST / _LOOSER:.0e} at most")
     if options.modes is not None or system.size > _SMALL:
         with phase("equations"):
-            reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
-        system = reduced.system
+            system = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
     with phase("start"):
         q, v, unsettled = begin(system, ends[0], options.start, shift, tolerance)
     move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
@@ -369,7 +365,6 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
     return Motion(
         motion=found,
-        reduced=reduced,
         end=steady_end(found),
         error=error,
         warnings=(*unsettled, *_warnings(found, error, bool(shift))),

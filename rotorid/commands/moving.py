@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rotorid.base.text import counted, percent
 from rotorid.commands.input_checks import rotor_source
 
 if TYPE_CHECKING:
@@ -50,6 +51,24 @@ class Moving:
         return rotor_system(
             self.model, lowest, highest, unbalance=self.unbalance, bow=self.bow, direction=self.direction
         )
+
+
+def reduction(system: MotionSystem) -> dict[str, Any] | None:
+    """What a reduced system has of the rotor's, for JSON; None of others."""
+    if system.modes is None:
+        return None
+    return {"modes": system.modes, "frequency_error": system.frequency_error}
+
+
+def reduction_notes(system: MotionSystem) -> tuple[str, ...]:
+    """How many unknowns of a rotor move, and what that costs; none where all do."""
+    if system.modes is None:
+        return ()
+    size, modes = counted(system.size, "unknown"), counted(system.modes, "mode")
+    high = f"natural frequencies without films are high by {percent(system.frequency_error)} % at most"
+    if system.frequency_error == float("inf"):
+        high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+    return (f"of the rotor {size} move, {modes} among them; {high}",)
 
 
 def moving(

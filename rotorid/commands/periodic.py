@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,7 +14,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
-from rotorid.commands.moving import Moving, moving
+from rotorid.commands.moving import Moving, moving, reduction, reduction_notes
 from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Band, Sensor, degrees, sensors, speeds
 
@@ -22,8 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.motion.periodic import Bifurcation, Branch, Point, Readings
-    from rotorid.motion.system import MotionSystem, ReducedSystem
+    from rotorid.base.arrays import FloatArray
+    from rotorid.motion.branches import Branch
+    from rotorid.motion.collocation import Orbit
+    from rotorid.motion.periodic import PeriodicMotion
+    from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
 
 _SMALL = 24
@@ -73,110 +77,134 @@ class PeriodicOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicMotions(Delivered):
-    """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced."""
+    """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced.
 
-    readings: Readings
-    reduced: ReducedSystem | None
+    Attributes
+    ----------
+    motion
+        The branches.
+    labels, directions
+        Names of the k sensors, and unit vectors of what they read in the coordinates, shape (k, n).
+    """
+
+    motion: PeriodicMotion
+    labels: tuple[str, ...]
+    directions: FloatArray
+
+    @cached_property
+    def along(self) -> list[FloatArray]:
+        """Amplitudes at the points of each branch, m, shape (points, k)."""
+        return [self._amplitudes(branch.points) for branch in self.motion.branches]
+
+    @cached_property
+    def jumps(self) -> list[tuple[float, FloatArray, FloatArray]]:
+        """Speed, rad/s, amplitudes at a fold and where the motion jumps to from there, m, shape (k,)."""
+        from rotorid.motion.branches import jumps
+
+        return jumps(self.motion.branches, self.directions)
+
+    def _amplitudes(self, orbits: Sequence[Orbit]) -> FloatArray:
+        from rotorid.motion.branches import amplitudes
+
+        return amplitudes(orbits, self.directions)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
-        motion, few = self.readings.motion, self.reduced
+        motion = self.motion
         branches = [
             {
                 "kind": branch.kind,
-                "turns": branch.turns or None,
+                "turns": branch.orbits[0].turns or None,
                 "ended": branch.ended,
                 "speeds_rad_s": branch.speeds,
                 "periods_s": [_period(branch, p) for p in branch.points],
                 "stable": branch.stable,
-                "largest_multiplier": [p.largest for p in branch.points],
-                "steps": max(len(p.orbit.velocities) for p in branch.points),
+                "largest_multiplier": [abs(p.multipliers[0]) for p in branch.points],
+                "steps": max(len(p.velocities) for p in branch.points),
                 "amplitude_m": sizes.T,
             }
-            for branch, sizes in zip(motion.branches, self.readings.along, strict=True)
+            for branch, sizes in zip(motion.branches, self.along, strict=True)
         ]
         return plain(
             {
-                "sensors": self.readings.labels,
+                "sensors": self.labels,
                 "branches": branches,
                 "bifurcations": rows(self._bifurcations()),
                 "jumps": [
                     {"speed_rad_s": speed, "from_m": before, "to_m": after}
-                    for speed, before, after in self.readings.jumps
+                    for speed, before, after in self.jumps
                 ],
                 "tried": motion.tried,
                 "warnings": motion.warnings,
-                "reduction": few and {"modes": few.modes, "frequency_error": few.error},
+                "reduction": reduction(motion.problem.system),
             }
         )
 
     @property
     def answer(self) -> Answer:
         """Where the motion is stable, and the bifurcations; behind it the branches."""
-        bifurcations, motion = self._bifurcations(), self.readings.motion
+        bifurcations, motion = self._bifurcations(), self.motion
         told = [self._judgement(k) for k in range(len(motion.branches))]
         return Answer(
             "\n".join(told),
             f"{text(bifurcations, width=COLUMNS) if bifurcations[0].values else 'No bifurcation.'}\n"
             f"{motion.tried}",
-            motion.warnings,
+            tuple(motion.warnings),
             (
-                *([] if self.reduced is None else [self.reduced.note]),
+                *reduction_notes(motion.problem.system),
                 *(
                     f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
-                    f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
-                    for speed, at, to in self.readings.jumps
+                    f"{self.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
+                    for speed, at, to in self.jumps
                 ),
             ),
         )
 
     def _judgement(self, k: int) -> str:
-        branch, sizes = self.readings.motion.branches[k], 1e6 * self.readings.along[k][:, 0]
+        branch, sizes = self.motion.branches[k], 1e6 * self.along[k][:, 0]
         low, high = min(branch.speeds), max(branch.speeds)
         over = range_text(low, high) if high > low else rpm_text(low)
-        parts = [f"{least * RPM:.6g} to {rpm_text(most)}" for least, most in _stable_ranges(branch)]
+        parts = [f"{least * RPM:.6g} to {rpm_text(most)}" for least, most in branch.stable_ranges]
         where = f"stable at {listing(parts, 'and')}" if parts else "unstable"
         where = "stable throughout" if branch.stable.all() else where
         return (
-            f"Branch {k + 1}, {branch.kind}, {over}, up to {sizes.max():.4g} µm at "
-            f"{self.readings.labels[0]}: {where}."
+            f"Branch {k + 1}, {branch.kind}, {over}, up to {sizes.max():.4g} µm at {self.labels[0]}: {where}."
         )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per point of a branch."""
-        readings = self.readings
-        each = [(k, branch, p) for k, branch in enumerate(readings.motion.branches, 1) for p in branch.points]
-        amplitudes = zip(*(column for values in readings.along for column in values), strict=True)
+        each = [(k, branch, p) for k, branch in enumerate(self.motion.branches, 1) for p in branch.points]
+        amplitudes = zip(*(column for values in self.along for column in values), strict=True)
         return frame(
             (
                 Column("branch", [k for k, _, _ in each]),
                 Column("kind", [branch.kind for _, branch, _ in each]),
-                Column("speed_rad_s", [p.orbit.speed for _, _, p in each]),
+                Column("speed_rad_s", [p.speed for _, _, p in each]),
                 Column("period_s", [_period(branch, p) for _, branch, p in each]),
-                Column("stable", [p.outside == 0 for _, _, p in each]),
-                Column("largest_multiplier", [p.largest for _, _, p in each]),
+                Column("stable", [p.stable for _, _, p in each]),
+                Column("largest_multiplier", [abs(p.multipliers[0]) for _, _, p in each]),
                 *(
                     Column(f"amplitude_{label}_m", values)
-                    for label, values in zip(readings.labels, amplitudes, strict=True)
+                    for label, values in zip(self.labels, amplitudes, strict=True)
                 ),
             )
         )
 
     def _bifurcations(self) -> tuple[Column, ...]:
         """One row a bifurcation."""
-        branches = self.readings.motion.branches
-        each = [(k, branch, b) for k, branch in enumerate(branches, 1) for b in branch.bifurcations]
-        sizes = [size for values in self.readings.at for size in values]
+        branches = enumerate(self.motion.branches, 1)
+        each = [(k, branch, b) for k, branch in branches for b in branch.bifurcations]
+        sizes = self._amplitudes([b for _, _, b in each])
         return (
             Column("branch", [k for k, _, _ in each], str),
             Column("kind", [branch.kind for _, branch, _ in each], str, "motion"),
-            Column("bifurcation", [b.kind for _, _, b in each], str),
-            Column("speed_rad_s", [b.point.orbit.speed for _, _, b in each]),
-            Column("speed_rpm", [b.point.orbit.speed * RPM for _, _, b in each], "{:.6g}".format, "rpm"),
-            Column("whirl_ratio", [_whirl(*one[1:]) for one in each], "{:.4f}".format, "whirl/speed"),
+            Column("bifurcation", [b.bifurcation for _, _, b in each], str),
+            Column("speed_rad_s", [b.speed for _, _, b in each]),
+            Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format, "rpm"),
+            Column("whirl_ratio", [_whirl(b) for _, _, b in each], "{:.4f}".format, "whirl/speed"),
             *(
-                Column(f"amplitude_{name}_m", [m[k] for m in sizes], _micrometres, f"{name}, µm")
-                for k, name in enumerate(self.readings.labels)
+                Column(f"amplitude_{name}_m", values, _micrometres, f"{name}, µm")
+                for name, values in zip(self.labels, sizes.T, strict=True)
             ),
         )
 
@@ -185,38 +213,24 @@ class PeriodicMotions(Delivered):
         from rotorid.base.plot_style import on_figure
         from rotorid.motion.plots import draw_bifurcations
 
-        return on_figure(lambda ax: draw_bifurcations(self.readings, ax), height=4.6)
+        return on_figure(
+            lambda ax: draw_bifurcations(self.motion.branches, self.directions, self.labels[0], ax),
+            height=4.6,
+        )
 
 
 def _micrometres(metres: float) -> str:
     return f"{1e6 * metres:.4g}"
 
 
-def _whirl(branch: Branch, bifurcation: Bifurcation) -> float:
+def _whirl(orbit: Orbit) -> float:
     """Frequency that begins there, of a cycle its own, by the speed; NaN where none begins."""
-    orbit = bifurcation.point.orbit
-    return (bifurcation.frequency if branch.turns else math.tau / orbit.period) / orbit.speed
+    return (orbit.frequency if orbit.turns else math.tau / orbit.period) / orbit.speed
 
 
-def _period(branch: Branch, point: Point) -> float:
+def _period(branch: Branch, orbit: Orbit) -> float:
     """s; NaN for a rotor at rest."""
-    return math.nan if branch.kind == "rest" else point.orbit.period
-
-
-def _stable_ranges(branch: Branch) -> list[tuple[float, float]]:
-    """Speeds of the stretches of a branch that are stable, from bifurcation to bifurcation, rad/s."""
-    found: list[list[float]] = []
-    turns = {one.after: one.point.orbit.speed for one in branch.bifurcations}
-    before = False
-    for k, (speed, stable) in enumerate(zip(branch.speeds, branch.stable, strict=True)):
-        at = [turns[k]] if k in turns and stable != before else []
-        if stable:
-            found = found if before else [*found, []]
-            found[-1] += [*at, speed]
-        elif before:
-            found[-1] += at
-        before = stable
-    return [(min(speeds), max(speeds)) for speeds in found]
+    return math.nan if branch.kind == "rest" else orbit.period
 
 
 @command
@@ -242,7 +256,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     """
     import numpy as np
 
-    from rotorid.motion.periodic import Readings, periodic_motion
+    from rotorid.motion.periodic import periodic_motion
     from rotorid.motion.system import reduced_system
 
     low, high = _range(options.speeds)
@@ -255,8 +269,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
     few = full.size <= _SMALL and options.modes is None
-    reduced = None if few else reduced_system(full, kept, options.modes)
-    system = full if reduced is None else reduced.system
+    system = full if few else reduced_system(full, kept, options.modes)
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
@@ -268,8 +281,12 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
             limit_cycle=options.limit_cycle,
             max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
         )
-    readings = Readings(motion, labels, directions)
-    return PeriodicMotions(readings=readings, reduced=reduced, provenance=provenance(what.files, options))
+    return PeriodicMotions(
+        motion=motion,
+        labels=labels,
+        directions=directions,
+        provenance=provenance(what.files, options),
+    )
 
 
 def _range(given: Band) -> tuple[float, float]:

@@ -79,7 +79,7 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     light = fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, density=0.0, forces=forces)
     found = bearings(light, BearingsOptions(speeds=[100.0]))
     assert found.found[0].eccentricity == pytest.approx(0)
-    assert "no load" in [text.get_text() for text in found.figure().axes[0].texts]
+    assert found.figure().axes[0].get_title().startswith("no load")
 
 
 @pytest.mark.parametrize(
@@ -87,10 +87,9 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     [
         ([JournalBearing(1, "DE", **BEARING)], "nothing holds the rotor, its position is not determined"),
         ([CubicSpring(1, "", 1e6), CubicSpring(5, "", 1e6)], "the rotor has no [[journal_bearing]]"),
-        ([SqueezeFilm(1, "", **BEARING), JournalBearing(5, "", **BEARING)], "squeeze film at node 1 has no "
-         "centring spring"),
+        ([SqueezeFilm(1, "", **BEARING), JournalBearing(5, "", **BEARING)], "a squeeze film its centring spring"),
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=1e5), JournalBearing(5, "", **BEARING)],
-         "touches the squeeze film at node 1 under its weight: it drops by"),
+         "% of its clearance at the squeeze film at node 1"),
     ],
 )  # fmt: skip
 def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):

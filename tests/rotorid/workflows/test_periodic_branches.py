@@ -88,7 +88,7 @@ def test_on_linear_supports_it_is_the_response():
     given = PeriodicOptions(
         speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30", modes=40
     )
-    found = periodic(folder / "rotor.toml", given).readings
+    found = periodic(folder / "rotor.toml", given)
     (branch,) = found.motion.branches
     speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
     options = ResponseOptions(speeds=speeds, sensors="2,12:30")
