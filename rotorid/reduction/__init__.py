@@ -19,11 +19,10 @@ from rotorid.reduction.masses import (
     separate,
 )
 from rotorid.reduction.placement import Placement, book_nodes, rank_nodes
-from rotorid.reduction.reduce import Choices, Reduction, reduce, reduce_measured
+from rotorid.reduction.reduce import Reduction, reduce, reduce_measured
 from rotorid.reduction.small_model import SmallModel, small_model
 
 __all__ = [
-    "Choices",
     "InputErrors",
     "MassErrors",
     "Method",

@@ -10,19 +10,22 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import error_figures
-from rotorid.reduction.masses import Normalisation, RowWeights, design, natural_frequencies
+from rotorid.reduction.masses import design, natural_frequencies
 from rotorid.regression import gain
+
+if TYPE_CHECKING:
+    from rotorid.reduction.reduce import Reduction
 
 DRAWS = 2000
 """Of inputs with their errors."""
@@ -60,7 +63,7 @@ class InputErrors:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = np.array(getattr(self, field.name), dtype=float)
-            if not (np.isfinite(value).all() and (value >= 0).all() and (value < 1).all()):
+            if not ((value >= 0) & (value < 1)).all():
                 raise ValueError(
                     f"errors of {field.name} must be shares from 0 to below 1, such as 0.013 for 1.3 %; "
                     f"got {value}"
@@ -68,119 +71,105 @@ class InputErrors:
             object.__setattr__(self, field.name, value)
 
 
-@dataclass(frozen=True, eq=False)
-class Inputs:
-    """Inputs of formula (50): compliance (n, n), frequencies (k,), shapes (n, k), seals (n,), and choices."""
+def input_names(n: int, k: int) -> dict[str, int]:
+    """Column of each input: "alpha12" (α12 and α21), "omega1", "U31" (mass 3 in mode 1), "c2"."""
+    mark, names, count = "," if n > 9 else "", {}, n * (n + 1) // 2
+    for column, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True)):
+        names[f"alpha{i + 1}{mark}{j + 1}"] = names[f"alpha{j + 1}{mark}{i + 1}"] = column
+    others = [f"omega{j + 1}" for j in range(k)]
+    others += [f"U{i + 1}{mark}{j + 1}" for i in range(n) for j in range(k)]
+    others += [f"c{i + 1}" for i in range(n)]
+    return names | {name: column for column, name in enumerate(others, start=count)}
 
-    alpha: FloatArray
-    omega: FloatArray
-    U: FloatArray
-    springs: FloatArray
-    normalise: Normalisation
-    rows: RowWeights
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the P inputs: "alpha12" (α12 and α21), "omega1", "U31" (mass 3 in mode 1), "c2"."""
-        n, k = self.U.shape
-        mark = "," if n > 9 else ""
-        return (
-            *(f"alpha{i + 1}{mark}{j + 1}" for i in range(n) for j in range(i, n)),
-            *(f"omega{j + 1}" for j in range(k)),
-            *(f"U{i + 1}{mark}{j + 1}" for i in range(n) for j in range(k)),
-            *(f"c{i + 1}" for i in range(n)),
+def recomputed(result: Reduction, changes: FloatArray) -> FloatArray:
+    """Masses and frequencies, (S, 2, n), with the inputs changed by relative `changes`, (S, P)."""
+    n, k = len(result.nodes), result.modes
+    i, j = np.triu_indices(n)
+    a, w, u, c = np.split(changes, np.cumsum([len(i), k, n * k]), axis=1)
+    factors = np.ones((len(changes), n, n))
+    factors[:, i, j] = factors[:, j, i] = 1 + a
+    alpha, springs = result.compliance * factors, result.seal_stiffness * (1 + c)
+    shapes = result.rotor_shapes[:, :k] * (1 + u.reshape(-1, n, k))
+    how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
+    B, D = design(alpha, result.rotor_frequencies[:k] * (1 + w), shapes, seal_stiffness=springs, **how)
+    out = np.full((len(changes), 2, n), np.nan)
+    fine = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(D).all(axis=1)
+    out[fine, 0] = (gain(B[fine]) @ D[fine][..., None])[..., 0].real
+    for s in np.flatnonzero(fine):
+        out[s, 1] = natural_frequencies(alpha[s], out[s, 0], seal_stiffness=springs[s])[0]
+    return out
+
+
+def shift_by(result: Reduction, changes: Mapping[str, float]) -> Shift:
+    """What relative changes of named inputs do; ValueError for others, and for what is not finite."""
+    columns = input_names(len(result.nodes), result.modes)
+    rows = np.zeros((2, max(columns.values()) + 1))
+    for name, value in changes.items():
+        if name not in columns:
+            hint = did_you_mean(name, columns)
+            raise ValueError(f"there is no input {name!r}{hint}: choose among {', '.join(columns)}")
+        if not np.isfinite(value):
+            raise ValueError(f"the change of {name} must be finite; got {value}")
+        rows[0, columns[name]] = value
+    changed, now = recomputed(result, rows)
+    return Shift(*(changed - now))
+
+
+def deviations(result: Reduction, errors: InputErrors) -> FloatArray:
+    """Relative standard deviation of every input, (P,)."""
+    n, k = len(result.nodes), result.modes
+    sizes = {
+        "compliance": (n * (n + 1) // 2,),
+        "frequencies": (k,),
+        "shapes": (n, k),
+        "seal_stiffness": (n,),
+    }
+    parts = []
+    for name, shape in sizes.items():
+        given = np.asarray(getattr(errors, name))
+        if given.shape not in ((), shape):
+            raise ValueError(f"errors of {name} must be one number or have shape {shape}; got {given.shape}")
+        full = np.array(np.broadcast_to(given, shape))
+        if name == "shapes" and given.ndim == 0 and result.normalise == "first":
+            full[0] = 0.0
+        parts.append(full.ravel())
+    return np.concatenate(parts)
+
+
+def errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
+    """What stated errors do, by recomputed draws; NaN where a mode is lost in some of them."""
+    sigma = deviations(result, stated)
+    changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
+    exact, *draws = recomputed(result, np.concatenate((np.zeros((1, sigma.size)), changes)))
+    low, high = np.quantile(draws, (0.15866, 0.84134), axis=0)  # NaN where any draw is
+    masses, frequencies = (high - low) / 2
+    warnings = []
+    if modes := [f"omega{k + 1}" for k in np.flatnonzero(np.isnan(frequencies))]:
+        warnings.append(
+            "some of the drawn inputs give masses that are not positive, and then no "
+            f"{modes[0]}: these errors do not determine {', '.join(modes)}"
         )
+    if wild := [f"m{i + 1}" for i in np.flatnonzero(~(masses < np.abs(exact[0])))]:
+        warnings.append(
+            f"a standard deviation is as large as the mass: {', '.join(wild)} cannot be relied on"
+        )
+    return MassErrors(masses, frequencies, tuple(warnings))
 
-    def recomputed(self, changes: FloatArray) -> FloatArray:
-        """Masses and frequencies, (S, 2, n), with the inputs changed by relative `changes`, (S, P)."""
-        n, k = self.U.shape
-        i, j = np.triu_indices(n)
-        a, w, u, c = np.split(changes, np.cumsum([len(i), k, n * k]), axis=1)
-        factors = np.ones((len(changes), n, n))
-        factors[:, i, j] = factors[:, j, i] = 1 + a
-        alpha, springs = self.alpha * factors, self.springs * (1 + c)
-        shapes = self.U * (1 + u.reshape(-1, n, k))
-        how: dict[str, Any] = {"normalise": self.normalise, "rows": self.rows}
-        B, D = design(alpha, self.omega * (1 + w), shapes, seal_stiffness=springs, **how)
-        out = np.full((len(changes), 2, n), np.nan)
-        fine = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(D).all(axis=1)
-        out[fine, 0] = (gain(B[fine]) @ D[fine][..., None])[..., 0].real
-        for s in np.flatnonzero(fine):
-            out[s, 1] = natural_frequencies(alpha[s], out[s, 0], seal_stiffness=springs[s])[0]
-        return out
 
-    def change(self, changes: Mapping[str, float]) -> FloatArray:
-        """Relative changes of named inputs as a row (1, P); alpha21 is alpha12. ValueError for others."""
-        row = np.zeros((1, len(self.names)))
-        for given, value in changes.items():
-            i, mark, j = given.removeprefix("alpha").partition(",")
-            turned = f"alpha{j},{i}" if mark else f"alpha{i[::-1]}"
-            name = turned if given.startswith("alpha") and given not in self.names else given
-            if name not in self.names:
-                hint = did_you_mean(given, self.names)
-                raise ValueError(f"there is no input {given!r}{hint}: choose among {', '.join(self.names)}")
-            if not np.isfinite(value):
-                raise ValueError(f"the change of {given} must be finite; got {value}")
-            row[0, self.names.index(name)] = value
-        return row
+def mass_sensitivity(result: Reduction) -> FloatArray:
+    """Relative standard deviation of each mass, (n,), per that of all compliances and shapes alike.
 
-    def deviations(self, errors: InputErrors) -> FloatArray:
-        """Relative standard deviation of every input, (P,)."""
-        n, k = self.U.shape
-        sizes = {
-            "compliance": (n * (n + 1) // 2,),
-            "frequencies": (k,),
-            "shapes": (n, k),
-            "seal_stiffness": (n,),
-        }
-        parts = []
-        for name, shape in sizes.items():
-            given = np.asarray(getattr(errors, name))
-            if given.shape not in ((), shape):
-                raise ValueError(
-                    f"errors of {name} must be one number or have shape {shape}; got {given.shape}"
-                )
-            full = np.array(np.broadcast_to(given, shape))
-            if name == "shapes" and given.ndim == 0 and self.normalise == "first":
-                full[0] = 0.0
-            parts.append(full.ravel())
-        return np.concatenate(parts)
-
-    def errors(self, stated: InputErrors) -> MassErrors:
-        """What stated errors do, by recomputed draws; NaN where a mode is lost in some of them."""
-        sigma = self.deviations(stated)
-        changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
-        draws = self.recomputed(np.concatenate((np.zeros((1, sigma.size)), changes)))
-        exact, draws = draws[0], draws[1:]
-        lost = np.asarray(np.isnan(draws).any(axis=0))
-        low, high = np.quantile(np.where(np.isnan(draws), 0.0, draws), (0.15866, 0.84134), axis=0)
-        masses, frequencies = np.where(lost, np.nan, (high - low) / 2)
-        warnings = []
-        if modes := [f"omega{k + 1}" for k in np.flatnonzero(lost[1])]:
-            warnings.append(
-                "some of the drawn inputs give masses that are not positive, and then no "
-                f"{modes[0]}: these errors do not determine {', '.join(modes)}"
-            )
-        wild = np.flatnonzero(np.logical_not(masses < np.abs(exact[0])))
-        if wild.size:
-            names = ", ".join(f"m{i + 1}" for i in wild)
-            warnings.append(f"a standard deviation is as large as the mass: {names} cannot be relied on")
-        return MassErrors(masses, frequencies, tuple(warnings))
-
-    def sensitivity(self) -> FloatArray:
-        """Relative standard deviation of each mass, (n,), per that of all compliances and shapes alike.
-
-        Ordinates at the first mass are exact, and all inputs independent.
-        """
-        used: BoolArray = np.not_equal(self.deviations(InputErrors(compliance=0.5, shapes=0.5)), 0.0)
-        n, k = self.U.shape
-        used[n * (n + 1) // 2 + k : n * (n + 1) // 2 + 2 * k] = False
-        steps = STEP * np.eye(used.size)[used]
-        masses = self.recomputed(np.concatenate((steps, -steps, np.zeros((1, used.size)))))[:, 0]
-        half = len(steps)
-        slopes = (masses[:half] - masses[half:-1]) / (2 * STEP)
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.linalg.norm(slopes, axis=0) / np.abs(masses[-1]))
+    Ordinates at the first mass are exact, and all inputs independent.
+    """
+    n, k = len(result.nodes), result.modes
+    used = deviations(result, InputErrors(compliance=0.5, shapes=0.5)) > 0
+    used[n * (n + 1) // 2 + k :][:k] = False
+    steps = STEP * np.eye(used.size)[used]
+    up, down = (recomputed(result, sign * steps)[:, 0] for sign in (1, -1))
+    (now,) = recomputed(result, np.zeros((1, used.size)))[:, 0]
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.linalg.norm((up - down) / (2 * STEP), axis=0) / np.abs(now))
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,8 +226,9 @@ class Shift(Answered):
     @property
     def answer(self) -> Answer:
         """What each mass and frequency changes by."""
-        masses = ", ".join(f"{change:+.4g}" for change in self.masses)
-        speeds = ", ".join(f"{change * RPM:+.4g}" for change in self.frequencies)
+        masses, speeds = (
+            ", ".join(f"{change:+.4g}" for change in row) for row in (self.masses, self.frequencies * RPM)
+        )
         return Answer(
             f"The changed inputs move the masses by {masses} kg and the frequencies by {speeds} rpm."
         )

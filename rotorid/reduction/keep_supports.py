@@ -19,6 +19,7 @@ import fem
 from fem import GRAVITY, JournalBearing, SqueezeFilm
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
+from rotorid.reduction.masses import bending_stiffness
 from rotorid.reduction.small_model import SmallModel, small_model
 
 RIGID = 1e7
@@ -63,8 +64,7 @@ def held_rigidly(rotor: fem.Rotor, stiffness: float = RIGID) -> fem.Rotor:
             "to keep the supports, the masses are found with the shaft held rigidly at its bearings, journal "
             f"bearings and squeeze films: two nodes at least are needed, this rotor has {len(nodes)}"
         )
-    bending = float((rotor.youngs_modulus * rotor.second_moment).max())
-    stiffness *= 48 * bending / float(np.sum(rotor.length)) ** 3
+    stiffness *= bending_stiffness(rotor)
     tilting = {node: sum(s.tilting_stiffness for s in rotor.supports if s.node == node) for node in nodes}
     return replace(
         rotor,

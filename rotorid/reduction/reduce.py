@@ -16,17 +16,22 @@ from fem.assembly import ignored_inertia
 from rotorid.base.answer import Answer, Answered, together
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, text
+from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
-from rotorid.base.tables import Column as Cells
-from rotorid.base.tables import Table, frame
 from rotorid.base.text import counted, error_figures, percent
-from rotorid.reduction.input_errors import InputErrors, Inputs, MassErrors, Shift
+from rotorid.reduction.input_errors import (
+    InputErrors,
+    MassErrors,
+    Shift,
+    errors_by_draws,
+    mass_sensitivity,
+    shift_by,
+)
 from rotorid.reduction.masses import (
-    BoundedEstimate,
     Normalisation,
     RowWeights,
     Separated,
+    at_bound,
     equivalent_masses,
     like,
     mac,
@@ -52,44 +57,19 @@ _RESIDUAL = "± is one standard deviation from the regression's residuals (model
 
 
 @dataclass(frozen=True, eq=False)
-class Choices:
-    """How a regression was done.
-
-    Attributes
-    ----------
-    source
-        Whether the modes were computed from the rotor or measured.
-    normalise, rows, nonnegative
-        As in `equivalent_masses`.
-    """
-
-    source: Literal["rotor", "measured"]
-    normalise: Normalisation
-    rows: RowWeights
-    nonnegative: bool
-
-    def words(self, modes: int) -> str:
-        """Such as "the first 2 measured modes, rows relative"."""
-        kind = "measured " if self.source == "measured" else ""
-        parts = [f"the first {kind}mode" if modes == 1 else f"the first {modes} {kind}modes"]
-        parts += [] if self.normalise == "first" else [f"shapes scaled by {self.normalise}"]
-        parts += [] if self.rows == "equal" else [f"rows {self.rows}"]
-        parts += ["masses not negative"] if self.nonnegative else []
-        return ", ".join(parts)
-
-
-@dataclass(frozen=True, eq=False)
 class Reduction(Answered):
     """An n-mass model of a rotor beside the rotor itself.
 
     Attributes
     ----------
-    rotor
-        The rotor; None where only its compliance and measured modes are known.
     nodes
         Where the masses stand: node numbers, or labels where there is no rotor.
     modes
         How many modes of the rotor the regression used.
+    source
+        Whether these modes were computed from the rotor or measured.
+    normalise, rows, nonnegative
+        As in `equivalent_masses`.
     masses
         Estimate of the masses, kg, with the scatter of the regression.
     compliance
@@ -100,10 +80,10 @@ class Reduction(Answered):
         Of the n-mass model: rad/s (n,), and at the masses (n, n), scaled to fit the rotor's.
     rotor_frequencies, rotor_shapes
         Of the rotor, computed for its plane at rest or measured: rad/s (j,), and at the masses (n, j).
+    rotor
+        None where only its compliance and measured modes are known.
     rotor_modes
         The computed modes at every node, to draw; None without a rotor.
-    choices
-        How the regression was done: normalisation, row weights, sign of the masses, source of the modes.
     errors
         What stated errors of the inputs do to masses and frequencies; None where none are stated.
     separated
@@ -112,9 +92,12 @@ class Reduction(Answered):
         What a user should know before trusting the model.
     """
 
-    rotor: fem.Rotor | None
     nodes: tuple[int | str, ...]
     modes: int
+    source: Literal["rotor", "measured"]
+    normalise: Normalisation
+    rows: RowWeights
+    nonnegative: bool
     masses: Estimate
     compliance: FloatArray
     seal_stiffness: FloatArray
@@ -122,11 +105,11 @@ class Reduction(Answered):
     shapes: FloatArray
     rotor_frequencies: FloatArray
     rotor_shapes: FloatArray
-    rotor_modes: fem.Modes | None
-    choices: Choices
-    errors: MassErrors | None
-    separated: Separated | None
-    warnings: tuple[str, ...]
+    rotor: fem.Rotor | None = None
+    rotor_modes: fem.Modes | None = None
+    errors: MassErrors | None = None
+    separated: Separated | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def positions(self) -> FloatArray | None:
@@ -145,16 +128,10 @@ class Reduction(Answered):
         """MAC of each mode with the rotor's mode of the same number, shape (n,); NaN where unknown."""
         return self._padded(np.diag(mac(self.shapes, self.rotor_shapes)))
 
-    @property
-    def inputs(self) -> Inputs:
-        """Of formula (50)."""
-        used = self.rotor_frequencies[: self.modes], self.rotor_shapes[:, : self.modes]
-        return Inputs(self.compliance, *used, self.seal_stiffness, self.choices.normalise, self.choices.rows)
-
     @cached_property
     def sensitivity(self) -> FloatArray:
         """Relative standard deviation of each mass per that of compliances and shapes, shape (n,)."""
-        return self.inputs.sensitivity()
+        return mass_sensitivity(self)
 
     @property
     def equations_of_motion(self) -> fem.Motion:
@@ -164,9 +141,8 @@ class Reduction(Answered):
         surroundings take out is for the user to add, or to estimate, or comes with the supports (`small`).
         """
         K = np.linalg.inv(self.compliance) + np.diag(self.seal_stiffness)
-        n = len(self.nodes)
-        names = tuple(f"x{node}" for node in self.nodes)
-        return fem.Motion(np.diag(self.masses.solution), np.zeros((n, n)), (K + K.T) / 2, names, 0.0)
+        M, names = np.diag(self.masses.solution), tuple(f"x{node}" for node in self.nodes)
+        return fem.Motion(M, np.zeros_like(M), (K + K.T) / 2, names, 0.0)
 
     def what_if(self, changes: Mapping[str, float]) -> Shift:
         """Changes of masses and frequencies by relative changes of inputs, such as {"alpha12": 0.013}.
@@ -177,10 +153,7 @@ class Reduction(Answered):
             For an input that does not exist (they are `alpha12`, `U31`, `omega1`, `c2` …), or a change
             that is not finite.
         """
-        inputs = self.inputs
-        row = inputs.change(changes)
-        changed, now = inputs.recomputed(np.concatenate((row, np.zeros_like(row))))
-        return Shift(*(changed - now))
+        return shift_by(self, changes)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
@@ -188,7 +161,10 @@ class Reduction(Answered):
             "nodes": self.nodes,
             "positions_m": self.positions,
             "modes": self.modes,
-            **vars(self.choices),
+            "source": self.source,
+            "normalise": self.normalise,
+            "rows": self.rows,
+            "nonnegative": self.nonnegative,
             "masses_kg": self.masses.solution,
             "masses_std_kg": self.masses.std,
             "mass_sensitivity": self.sensitivity,
@@ -222,32 +198,26 @@ class Reduction(Answered):
         """
         n = len(self.nodes)
         blank = [None] * n
-        at = () if self.positions is None else (Cells("position_m", [*self.positions, *blank]),)
-        modes = {
+        of_masses = {"node": self.nodes, "position_m": self.positions, "mass_kg": self.masses.solution}
+        of_modes = {
             "mode": range(1, n + 1),
             "frequency_rad_s": self.frequencies,
             "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
             "relative_error": self.relative_error,
             "mac": self.mac,
         }
-        columns = (
-            Cells("table", ["masses"] * n + ["modes"] * n),
-            Cells("node", [*self.nodes, *blank]),
-            *at,
-            Cells("mass_kg", [*self.masses.solution, *blank]),
-            *(Cells(name, [*blank, *values]) for name, values in modes.items()),
-        )
-        whole = {"mode": "Int64"} if self.rotor is None else {"mode": "Int64", "node": "Int64"}
-        return frame(Table("masses and modes", columns)).astype(whole)
+        columns = [Column("table", ["masses"] * n + ["modes"] * n)]
+        columns += [Column(key, [*values, *blank]) for key, values in of_masses.items() if values is not None]
+        columns += [Column(key, [*blank, *values]) for key, values in of_modes.items()]
+        return frame(columns).astype({"mode": "Int64"} | ({} if self.rotor is None else {"node": "Int64"}))
 
     @property
     def answer(self) -> Answer:
         """How well the masses stand for the rotor, the masses, and both frequencies beside each other."""
-        whole = "" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
+        whole = " kg" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
         masses = Answer(
-            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from "
-            f"{self.choices.words(self.modes)}, formula (50), together "
-            f"{self.masses.solution.sum():.1f}{whole or ' kg'}.\n"
+            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from {self._choices()}, "
+            f"formula (50), together {self.masses.solution.sum():.1f}{whole}.\n"
             f"{self._judgement()}; condition number {self.masses.condition_number:.3g}.",
             f"{text(self._mass_columns())}\n\n{text(self._mode_columns())}",
             self.warnings[::-1],  # of the model as it came out before those of what it is made for
@@ -257,28 +227,40 @@ class Reduction(Answered):
         if (apart := self.separated) is not None:
             a, b = apart.supports
             columns = (
-                Column("node", apart.nodes, str, "mass at node"),
-                Column("a", 100 * apart.fractions[:, 0], "{:.4g}".format, f"% on node {a}"),
-                Column("b", 100 * apart.fractions[:, 1], "{:.4g}".format, f"% on node {b}"),
-                Column("delta", np.diag(apart.delta), "{:.6g}".format, "shaft on rigid supports, m/N"),
+                Column("mass at node", apart.nodes, str),
+                Column(f"% on node {a}", 100 * apart.fractions[:, 0], "{:.4g}".format),
+                Column(f"% on node {b}", 100 * apart.fractions[:, 1], "{:.4g}".format),
+                Column("shaft on rigid supports, m/N", np.diag(apart.delta), "{:.6g}".format),
             )
             words = f"The shaft apart from its supports at nodes {a} and {b}, {apart.span:.6g} m apart."
             more.append(Answer(words, tables=(text(columns),), more="shares of the supports"))
         return together([masses, *more])
 
+    def _choices(self) -> str:
+        """Such as "the first 2 measured modes, rows relative"."""
+        kind = "measured " if self.source == "measured" else ""
+        first = f"the first {kind}mode" if self.modes == 1 else f"the first {self.modes} {kind}modes"
+        others = {
+            f"shapes scaled by {self.normalise}": self.normalise != "first",
+            f"rows {self.rows}": self.rows != "equal",
+            "masses not negative": self.nonnegative,
+        }
+        return ", ".join([first, *(words for words, chosen in others.items() if chosen)])
+
     def _judgement(self) -> str:
         """How near the modes are."""
-        errors, macs = np.abs(self.relative_error[: self.modes]), self.mac[: self.modes]
+        k, apart = self.modes, self.relative_error
         if (self.masses.solution <= 0).any():
             return "NO physical model, a mass is not positive"
-        if not np.isfinite(errors).all():
+        if not np.isfinite(apart[:k]).all():
             return "NO model of these modes, not all of them vibrate"
-        whose = "measured" if self.choices.source == "measured" else "rotor's"
-        words = f"Frequencies within {percent(round(errors.max(), 8))} % of the {whose}, MAC {macs.min():.4g}"
-        k = self.modes
-        if k < len(self.nodes) and np.isfinite(self.relative_error[k]):
-            words += f"; mode {k + 1} off by {100 * self.relative_error[k]:+.3g} %"
-        return words
+        whose, largest = self._whose("rotor's"), percent(round(np.abs(apart[:k]).max(), 8))
+        words = f"Frequencies within {largest} % of the {whose}, MAC {self.mac[:k].min():.4g}"
+        following = apart[k : k + 1]
+        return words + "".join(f"; mode {k + 1} off by {100 * e:+.3g} %" for e in following if np.isfinite(e))
+
+    def _whose(self, rotor: str) -> str:
+        return "measured" if self.source == "measured" else rotor
 
     def _mass_columns(self) -> tuple[Column, ...]:
         std, positions = self.masses.std, self.positions
@@ -289,15 +271,14 @@ class Reduction(Answered):
 
     def _mode_columns(self) -> tuple[Column, ...]:
         model, other = self.frequencies, self._padded(self.rotor_frequencies)
-        whose = "measured" if self.choices.source == "measured" else "rotor"
         still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
         return (
             Column("mode", range(1, len(self.nodes) + 1), str),
-            Column("model", model * RPM, "{:.1f}".format, "model, rpm"),
+            Column("model, rpm", model * RPM, "{:.1f}".format),
             Column("rad/s", model, "{:.4f}".format),
-            Column("rotor", other * RPM, "{:.1f}".format, f"{whose}, rpm"),
-            Column("rotor_rad_s", other, "{:.4f}".format, "rad/s"),
-            Column("error", 100 * self.relative_error, "{:+.3f}".format, "error, %"),
+            Column(f"{self._whose('rotor')}, rpm", other * RPM, "{:.1f}".format),
+            Column("rad/s", other, "{:.4f}".format),
+            Column("error, %", 100 * self.relative_error, "{:+.3f}".format),
             Column("MAC", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format),
             *((Column("", still, str),) if any(still) else ()),
         )
@@ -368,32 +349,39 @@ def reduce(  # noqa: PLR0913
             "pedestals no mass in the rotor file (the equivalent masses then hold it), or use computed modes"
         )
     full = fem.critical_speeds(plane, n)
-    index = np.array(places) - 1
+    shapes = full.shapes[np.array(places) - 1]
     seals, apart = np.zeros(n), None
     if supports_apart:
-        bare, seals = _without_seals(plane, places)
-        apart = separate(bare, places)
-        zero = np.zeros(1)
-        stiffness = [
-            sum(float(s.dynamic_stiffness(zero)[0, 0, 0].real) for s in bare.supports if s.node == node)
-            for node in apart.supports
-        ]
-        alpha = apart.compliance(stiffness)
+        kept, zero = [], np.zeros(1)
+        for support in plane.supports:
+            if support.kind == "seal" and support.node in places and support.plain:
+                seals[places.index(support.node)] += float(support.stiffness)
+            else:
+                kept.append(support)
+        apart = separate(dataclasses.replace(plane, supports=kept), places)
+        alpha = apart.compliance(
+            [
+                sum(float(s.dynamic_stiffness(zero)[0, 0, 0].real) for s in kept if s.node == node)
+                for node in apart.supports
+            ]
+        )
     else:
         alpha = fem.compliance(plane, places)
-    if measured is None:
-        omega, shapes = full.frequencies, full.shapes[index]
-    else:
-        omega, shapes = _modes(measured, n)
-        remarks += _other_modes(omega, full.frequencies, shapes, full.shapes[index], places)
-    source: Literal["rotor", "measured"] = "rotor" if measured is None else "measured"
-    how = Choices(source, normalise, rows, nonnegative)
-    result = _reduced(places, alpha, seals, omega, shapes, modes, how, errors)
-    ours = ignored_inertia(full.rotor)
-    together_kg, total = float(result.masses.solution.sum()), rotor.total_mass
+    modes_of = full.frequencies, shapes
+    if measured is not None:
+        modes_of = _modes(measured, n)
+        remarks += _other_modes(*modes_of, full.frequencies, shapes, places)
+    result = _reduced(
+        *(places, alpha, seals, *modes_of, modes, errors),
+        source="rotor" if measured is None else "measured",
+        normalise=normalise,
+        rows=rows,
+        nonnegative=nonnegative,
+    )
+    sum_kg, total = float(result.masses.solution.sum()), rotor.total_mass
     heavy = (
-        f"the masses weigh {together_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they stand "
-        "where it hardly moves; use other nodes"
+        f"the masses weigh {sum_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they stand where "
+        "it hardly moves; use other nodes"
     )
     return dataclasses.replace(
         result,
@@ -403,9 +391,9 @@ def reduce(  # noqa: PLR0913
         warnings=(
             *remarks,
             *ignored_inertia(rotor),
-            *(warning for warning in full.warnings if warning not in ours),
+            *(warning for warning in full.warnings if warning not in ignored_inertia(full.rotor)),
             *result.warnings,
-            *([heavy] if together_kg > HEAVY * total else []),
+            *([heavy] if sum_kg > HEAVY * total else []),
         ),
     )
 
@@ -448,12 +436,13 @@ def reduce_measured(  # noqa: PLR0913
     alpha = np.asarray(compliance, dtype=float)
     n = len(alpha)
     omega, U = _modes((frequencies, shapes), n)
-    places = tuple(nodes) if nodes is not None else tuple(range(1, n + 1))
+    places = tuple(range(1, n + 1)) if nodes is None else tuple(nodes)
     if len(places) != n or len(set(places)) != n:
         raise ValueError(f"{n} different names of places are needed; got {list(places)}")
     seals = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,)).copy()
-    how = Choices("measured", normalise, rows, nonnegative)
-    return _reduced(places, alpha, seals, omega, U, len(omega) if modes is None else modes, how, errors)
+    used = len(omega) if modes is None else modes
+    how = {"source": "measured", "normalise": normalise, "rows": rows, "nonnegative": nonnegative}
+    return _reduced(places, alpha, seals, omega, U, used, errors, **how)
 
 
 def _reduced(
@@ -463,16 +452,15 @@ def _reduced(
     omega: FloatArray,
     shapes: FloatArray,
     modes: int,
-    choices: Choices,
     errors: InputErrors | None,
+    **how: Any,  # noqa: ANN401
 ) -> Reduction:
     """The regression and its checks, whatever the inputs come from."""
     n, most = len(places), min(len(places), len(omega))
     if not 1 <= modes <= most:
         raise ValueError(f"{n} masses can use 1 … {most} modes; got {modes}")
-    used = omega[:modes], shapes[:, :modes]
-    how: dict[str, Any] = {"seal_stiffness": seals, "normalise": choices.normalise, "rows": choices.rows}
-    estimate = equivalent_masses(alpha, *used, **how, nonnegative=choices.nonnegative)
+    regression = {key: value for key, value in how.items() if key != "source"}
+    estimate = equivalent_masses(alpha, omega[:modes], shapes[:, :modes], seal_stiffness=seals, **regression)
     if not estimate.full_rank:
         raise ValueError(
             f"the first {counted(modes, 'mode')} cannot determine the masses at nodes {list(places)}: "
@@ -483,7 +471,6 @@ def _reduced(
     j = compared.shape[1]
     model[:, :j] = like(model[:, :j], compared)
     result = Reduction(
-        rotor=None,
         nodes=places,
         modes=modes,
         masses=estimate,
@@ -493,42 +480,33 @@ def _reduced(
         shapes=model,
         rotor_frequencies=omega[:n],
         rotor_shapes=compared,
-        rotor_modes=None,
-        choices=choices,
-        errors=None,
-        separated=None,
-        warnings=(),
+        **how,
     )
-    warnings = [*_at_bounds(estimate, errors), *_of_regression(result)]
-    if errors is not None and not _bounded(estimate):
-        result = dataclasses.replace(result, errors=result.inputs.errors(errors))
-    return dataclasses.replace(result, warnings=tuple(warnings))
+    bound = how["nonnegative"] and at_bound(estimate).any()
+    drawn = errors_by_draws(result, errors) if errors is not None and not bound else None
+    return dataclasses.replace(result, errors=drawn, warnings=tuple(_warnings(result, errors)))
 
 
-def _bounded(estimate: Estimate) -> tuple[str, ...]:
-    """Names of masses at the bound 0."""
-    return estimate.at_bounds if isinstance(estimate, BoundedEstimate) else ()
-
-
-def _at_bounds(estimate: Estimate, errors: InputErrors | None) -> list[str]:
-    """What to say of masses at the bound 0."""
-    if not (names := _bounded(estimate)):
-        return []
-    more = "" if errors is None else ", and what the stated errors do was not computed"
-    return [
-        f"at the bound 0, the modes ask for less than nothing there: {', '.join(names)}; no standard "
-        f"deviation is given, those of the others hold this fixed{more}; leave these places out"
-    ]
-
-
-def _of_regression(result: Reduction) -> list[str]:
-    """Masses that are not positive, modes of other shape, an ill-conditioned regression, frequencies off."""
-    warnings = [
-        f"the mass at node {node} is {mass:.4g} kg, not positive: no physical model; use other nodes, more "
-        "modes, or masses that are not negative (nonnegative)"
-        for node, mass in zip(result.nodes, result.masses.solution, strict=True)
-        if mass <= 0 and not result.choices.nonnegative
-    ]
+def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
+    """Masses at their bound or not positive, modes of other shape, an ill-conditioned regression."""
+    warnings, masses = [], result.masses
+    if result.nonnegative and (held := at_bound(masses)).any():
+        more = "" if errors is None else ", and what the stated errors do was not computed"
+        names = ", ".join(name for name, zero in zip(masses.names, held, strict=True) if zero)
+        warnings.append(
+            f"at the bound 0, the modes ask for less than nothing there: {names}; no standard deviation is "
+            f"given, those of the others hold this fixed{more}; leave these places out"
+        )
+    elif (masses.solution <= 0).any():
+        which = ", ".join(
+            f"{mass:.4g} kg at node {node}"
+            for node, mass in zip(result.nodes, masses.solution, strict=True)
+            if mass <= 0
+        )
+        warnings.append(
+            f"a mass is not positive, {which}: no physical model; use other nodes, more modes, or "
+            "--nonnegative"
+        )
     if np.isnan(result.frequencies).any():
         warnings.append("with these masses the model has modes that do not vibrate")
     warnings += [
@@ -540,23 +518,23 @@ def _of_regression(result: Reduction) -> list[str]:
     if (result.sensitivity > SENSITIVE / 0.01).any():
         moves = ", ".join(f"{x:.0f} %" for x in result.sensitivity)
         warnings.append(
-            f"the regression is ill-conditioned (condition number {result.masses.condition_number:.1f}): "
+            f"the regression is ill-conditioned (condition number {masses.condition_number:.1f}): "
             f"errors of 1 % in the compliances and shapes move the masses by {moves}; more modes make them "
             "firmer"
         )
-    far = [(k, e) for k, e in enumerate(result.relative_error, start=1) if abs(e) > OFF]
+    far = [f"mode {k} by {100 * e:+.1f} %" for k, e in enumerate(result.relative_error, 1) if abs(e) > OFF]
     if far:
-        which = ", ".join(f"mode {k} by {100 * e:+.1f} %" for k, e in far)
         warnings.append(
-            f"frequencies of the model are far off: {which}; use it below them, or more masses or other nodes"
+            f"frequencies of the model are far off: {', '.join(far)}; use it below them, or more masses or "
+            "other nodes"
         )
     return warnings
 
 
 def _other_modes(
     omega: FloatArray,
-    rotor_omega: FloatArray,
     measured: FloatArray,
+    rotor_omega: FloatArray,
     computed: FloatArray,
     places: tuple[int, ...],
 ) -> list[str]:
@@ -567,15 +545,14 @@ def _other_modes(
         for k, (f, g) in enumerate(zip(omega, rotor_omega, strict=False), start=1)
         if abs(f / g - 1) > APART
     ]
-    agreement = mac(measured, computed)
+    agreement, turn = mac(measured, computed), 1.0 - 2.0 * np.eye(len(places))
     for k in np.flatnonzero(np.diag(agreement) < ALIKE):
-        best, hint = int(np.argmax(agreement[k])), ""
-        flips = 1.0 - 2.0 * np.eye(len(measured))
-        turned = mac(flips * measured[:, k : k + 1], computed[:, k : k + 1])[:, 0]
+        best, turned = int(agreement[k].argmax()), mac(turn * measured[:, [k]], computed[:, [k]])
+        hint = ""
         if agreement[k, best] >= ALIKE:
             hint = f" but of its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing?"
         elif turned.max() >= ALIKE:
-            hint = f": is its sign at node {places[int(np.argmax(turned))]} right?"
+            hint = f": is its sign at node {places[int(turned.argmax())]} right?"
         remarks.append(
             f"the shape of measured mode {k + 1} is not that of the rotor's mode {k + 1} (MAC "
             f"{agreement[k, k]:.2f}){hint}"
@@ -584,9 +561,8 @@ def _other_modes(
 
 
 def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, FloatArray]:
-    """Frequencies and shapes as arrays that fit n masses."""
-    omega, shapes = (np.asarray(part, dtype=float) for part in measured)
-    omega = np.atleast_1d(omega)
+    """Frequencies and shapes as arrays that fit n masses; `design` looks at their numbers."""
+    omega, shapes = np.atleast_1d(np.asarray(measured[0], float)), np.asarray(measured[1], float)
     if shapes.shape != (n, len(omega)):
         raise ValueError(
             f"shapes must be (n, k) for {n} masses and {len(omega)} frequencies; got {shapes.shape}"
@@ -594,11 +570,3 @@ def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, F
     if not (np.isfinite(omega).all() and np.isfinite(shapes).all()):
         raise ValueError("frequencies and shapes must be finite numbers")
     return omega, shapes
-
-
-def _without_seals(plane: fem.Rotor, places: tuple[int, ...]) -> tuple[fem.Rotor, FloatArray]:
-    """The plane without its seals at the masses, and their stiffness."""
-    taken = [s for s in plane.supports if s.kind == "seal" and s.node in places and s.plain]
-    stiffness = np.array([sum(float(s.stiffness) for s in taken if s.node == node) for node in places])
-    kept = [s for s in plane.supports if s not in taken]
-    return dataclasses.replace(plane, supports=kept), stiffness

@@ -35,10 +35,11 @@ from fem.assembly import (
 )
 from fem.forces import kind_of
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray, read_only
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds, number
 from rotorid.base.text import counted, listing
-from rotorid.reduction.masses import held, mass_nodes, plane_at_rest
+from rotorid.reduction.condensation import held, static_shapes
+from rotorid.reduction.masses import mass_nodes, plane_at_rest
 
 LOST = 1e-3
 """Relative rounding error of a static shape."""
@@ -363,9 +364,9 @@ def small_model(
     try:
         m = np.array(masses, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError("masses must be numbers in kg, one for each node") from None
+        m = np.empty(0)
     if m.shape != (len(places),):
-        raise ValueError(f"{len(places)} nodes need as many masses, not an array of shape {m.shape}")
+        raise ValueError(f"{len(places)} nodes need as many masses, numbers in kg")
     for place, mass in zip(places, m, strict=True):
         if not (np.isfinite(mass) and mass > 0):
             raise ValueError(
@@ -376,9 +377,10 @@ def small_model(
     linear = rotor.linear
     acting = {*(s.node for s in rotor.supports), *(force.node for force in rotor.forces)}
     kept = (*places, *sorted(acting - set(places)))
-    T = static_shapes(linear, kept)
     k, n = len(kept), len(places)
-    Q, A = project(both_planes(linear, complex_coordinate=False), T), assemble(linear)
+    A = assemble(linear)
+    T = _shaft_shapes(linear, A.shaft, np.array([A.deflection(node) for node in kept], dtype=np.intp))
+    Q = project(both_planes(linear, complex_coordinate=False), T)
     ones = np.zeros((A.size, 1))
     ones[A.deflections] = 1.0
     remarks = [*ignored_inertia(rotor)]
@@ -403,9 +405,14 @@ def small_model(
         forces=rotor.forces,
         warnings=tuple(remarks),
     )
-    ratios = _ratios(modal_damping)
-    at_rest = plane_at_rest(rotor, None)[0].supports
-    return replace(model, damping=_modal(model, at_rest, ratios)) if any(ratios) else model
+    ratios = np.array(modal_damping, dtype=float)
+    if ratios.ndim != 1 or not ((ratios >= 0) & (ratios < 1)).all():
+        raise ValueError(
+            "modal_damping must be a list of damping ratios, one for each of the first modes, each from 0 to "
+            f"below 1 (0.02 is 2 %), not {modal_damping}"
+        )
+    springs = plane_at_rest(rotor, None)[0].supports
+    return replace(model, damping=_modal(model, springs, ratios)) if ratios.any() else model
 
 
 def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
@@ -413,57 +420,34 @@ def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
     return matrix if np.abs(matrix).max() > NONE * np.abs(whole).max() else np.zeros_like(matrix)
 
 
-def static_shapes(rotor: fem.Rotor, kept: tuple[int, ...]) -> FloatArray:
-    """Shapes of the shaft for a unit deflection of each kept node, shape (size, k): K_oo X_o = −K_od."""
-    from scipy.linalg.lapack import dpbtrf, dpbtrs
-
-    if free_motions(rotor, set(kept)):
+def _shaft_shapes(rotor: fem.Rotor, band: FloatArray, at: IndexArray) -> FloatArray:
+    """Shapes of the shaft for a unit deflection of each kept node, at these unknowns, shape (size, k)."""
+    if free_motions(rotor, set(at)):
         raise ValueError(
             "one node, with or without a mass, does not hold the shaft: it can turn about it; give masses or "
             "supports at two nodes at least, or tilting stiffness"
         )
-    A = assemble(rotor)
-    at = np.array([A.deflection(node) for node in kept], dtype=np.intp)
-    unit = np.zeros((A.size, len(kept)))
-    unit[at, np.arange(len(kept))] = 1.0
-    load = -multiply(A.shaft, unit)
-    load[at] = 0.0
-    band = held(A.shaft, at)
-    factor, info = dpbtrf(band)
-    X = dpbtrs(factor, load)[0] if info == 0 else load
-    moved = np.abs(X).max(axis=0) > 0
-    if info != 0 or (rounding_error(band, X[:, moved]) > LOST).any():
+    T, _ = static_shapes(band, at)
+    X = T.copy()
+    X[at] = 0.0
+    if (rounding_error(held(band, at), X[:, X.any(axis=0)]) > LOST).any():
         raise ValueError(
             f"the static shapes of {rotor.n_elements} elements are lost in float64; join neighbouring "
             "elements (50 to 200 are ample for a rotor)"
         )
-    return np.asarray(unit + X)
+    return T
 
 
-def _ratios(modal_damping: Sequence[float]) -> tuple[float, ...]:
-    """Damping ratios of the first modes; ValueError for what is no list of numbers from 0 to below 1."""
-    try:
-        ratios = tuple(float(ratio) for ratio in modal_damping)
-    except (TypeError, ValueError):
-        raise ValueError(
-            "modal_damping must be a list of damping ratios, one for each of the first modes"
-        ) from None
-    for ratio in ratios:
-        if not 0 <= ratio < 1:
-            raise ValueError(f"a damping ratio is at least 0 and below 1 (0.02 is 2 %), not {ratio}")
-    return ratios
-
-
-def _modal(model: SmallModel, at_rest: Sequence[fem.Support], ratios: tuple[float, ...]) -> FloatArray:
+def _modal(model: SmallModel, springs: Sequence[fem.Support], ratios: FloatArray) -> FloatArray:
     """Damping matrix (k, k) of given ratios of the first modes of the plane x on these springs."""
     from scipy.linalg import eigh
 
     on = np.flatnonzero(model.masses)
-    if len(ratios) > on.size:
+    if ratios.size > on.size:
         raise ValueError(
-            f"{len(ratios)} damping ratios are given, but each plane has {on.size} modes: leave some out"
+            f"{ratios.size} damping ratios are given, but each plane has {on.size} modes: leave some out"
         )
-    springs = [replace(support, tilting_stiffness=0.0) for support in at_rest]
+    springs = [replace(support, tilting_stiffness=0.0) for support in springs]
     still = replace(model, supports=springs, material_damping=_zero(), gyroscopic=_zero())
     K = still.motion(0.0, "x", condensed=True).K
     squares, shapes = eigh((K + K.T) / 2, np.diag(model.masses[on]))
@@ -471,11 +455,10 @@ def _modal(model: SmallModel, at_rest: Sequence[fem.Support], ratios: tuple[floa
         raise ValueError(
             "the plane x at rest is pushed aside by a negative stiffness: no damping ratios exist"
         )
-    first = slice(len(ratios))
-    omega = np.sqrt(np.maximum(squares[first], 0.0))
-    momentum = model.masses[on][:, None] * shapes[:, first]  # shapes have φᵀ M φ = 1
+    omega = np.sqrt(np.maximum(squares[: ratios.size], 0.0))
+    momentum = model.masses[on, None] * shapes[:, : ratios.size]  # shapes have φᵀ M φ = 1
     C = np.zeros_like(model.stiffness)
-    C[np.ix_(on, on)] = (momentum * (2 * np.array(ratios) * omega)) @ momentum.T
+    C[np.ix_(on, on)] = (momentum * (2 * ratios * omega)) @ momentum.T
     return C
 
 
@@ -487,30 +470,24 @@ def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
     R = (1; −K_oo⁻¹ K_om) and, for the forces, L = (1, −K_mo K_oo⁻¹): L G R. ValueError where other damping
     acts on a coordinate without mass, or no stiffness holds it.
     """
-    massive = np.diag(motion.M) > 0
-    on, off = np.flatnonzero(massive), np.flatnonzero(~massive)
-    if not off.size:
-        return motion
+    on, off = (np.flatnonzero(there) for there in (np.diag(motion.M) > 0, np.diag(motion.M) <= 0))
     damping = np.abs(motion.C - gyroscopic)
-    touched = np.maximum(damping[off].max(axis=1), damping[:, off].max(axis=0))
-    present = touched > NONE * max(float(np.abs(motion.C).max()), float(damping.max()))
-    if present.any():
-        name = motion.coordinates[int(off[int(np.argmax(present))])]
+    touched = np.maximum(damping.max(axis=0), damping.max(axis=1))[off]
+    if (bad := off[touched > NONE * max(np.abs(motion.C).max(), damping.max())]).size:
+        name = motion.coordinates[bad[0]]
         raise ValueError(
             f"damping acts on {name!r}, which has no mass: it cannot be condensed into stiffness; keep the "
             "supports, or take the state space"
         )
-    Koo = motion.K[np.ix_(off, off)]
-    sigma = np.linalg.svd(Koo, compute_uv=False)
-    if sigma[-1] <= NONE * sigma[0]:
+    K, (size, *_) = motion.K, motion.K.shape
+    Koo = K[np.ix_(off, off)]
+    if off.size and np.linalg.cond(Koo) >= 1 / NONE:
         raise ValueError(
             "supports without mass can move without force: they cannot be condensed; give them stiffness"
         )
-    L, R = np.zeros((on.size, massive.size)), np.zeros((massive.size, on.size))
-    L[:, on] = R[on] = np.eye(on.size)
-    R[off] = -np.linalg.solve(Koo, motion.K[np.ix_(off, on)])
-    L[:, off] = -np.linalg.solve(Koo.T, motion.K[np.ix_(on, off)].T).T
-    grid = np.ix_(on, on)
-    K = motion.K[grid] + motion.K[np.ix_(on, off)] @ R[off]
-    C = (motion.C - gyroscopic)[grid] + L @ gyroscopic @ R
-    return fem.Motion(motion.M[grid], C, K, tuple(motion.coordinates[i] for i in on), motion.speed)
+    L, R = np.eye(size)[on], np.eye(size)[:, on]
+    R[off] = -np.linalg.solve(Koo, K[np.ix_(off, on)])
+    L[:, off] = -np.linalg.solve(Koo.T, K[np.ix_(on, off)].T).T
+    C = (motion.C - gyroscopic)[np.ix_(on, on)] + L @ gyroscopic @ R
+    kept = tuple(motion.coordinates[i] for i in on)
+    return fem.Motion(motion.M[np.ix_(on, on)], C, L @ K @ R, kept, motion.speed)

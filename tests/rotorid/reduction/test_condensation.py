@@ -139,7 +139,7 @@ def test_a_massless_shaft_with_discs_at_the_masters_is_exact_for_every_method():
         np.testing.assert_allclose(row.frequencies, result.rotor_frequencies, rtol=1e-9)
         np.testing.assert_allclose(row.mac, 1.0, rtol=1e-9)
         np.testing.assert_allclose(row.K, np.linalg.inv(fem.compliance(rotor, (3, 6))), rtol=1e-7)
-    assert [row.diagonal for row in result.rows] == [False, False, True]
+    assert [row.masses is not None for row in result.rows] == [False, False, True]
     np.testing.assert_allclose(result.row("regression").masses, masses, rtol=1e-7)
     assert result.row("Guyan").masses is None
 

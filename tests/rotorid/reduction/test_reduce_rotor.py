@@ -238,13 +238,12 @@ def test_the_plane_at_rest_of_an_anisotropic_gyroscopic_rotor():
     np.testing.assert_allclose(a.rotor_frequencies, b.rotor_frequencies, rtol=1e-9)
     assert "plane x of the rotor at rest" in a.warnings[0]
     assert "masses of the pedestals are left out" in a.warnings[1]
-    assert "not the same in x and y" in a.warnings[2]
-    assert "100 rad/s, the lowest of their tables" in a.warnings[3]
+    assert "100 rad/s, the lowest of their tables" in a.warnings[2]
     assert not any("gyroscopic" in text for text in a.warnings[1:])
     assert not any("at rest" in text for text in b.warnings)
     stiffer = reduce(turning, [4, 8], 2, speed=500.0)
     assert (stiffer.rotor_frequencies > a.rotor_frequencies).all()
-    assert "500 rad/s, chosen in their tables" in stiffer.warnings[3]
+    assert "500 rad/s, chosen in their tables" in stiffer.warnings[2]
     with pytest.raises(ValueError, match="its table holds 100 to 500"):
         reduce(turning, [4, 8], 2, speed=50.0)
 
