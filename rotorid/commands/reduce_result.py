@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         Placement,
         Reduction,
         ResponseCost,
-        Shift,
         SmallModel,
         StabilityCost,
     )
@@ -41,7 +40,7 @@ class ReducedRotor(Parts):
     ----------
     result
         The masses.
-    placement, methods, response, stability, shift
+    placement, methods, response, stability
         What was asked for beside them.
     small
         The model in both planes, with supports, forces and what turns, couples and damps.
@@ -58,7 +57,6 @@ class ReducedRotor(Parts):
     methods: Methods | None = None
     response: ResponseCost | None = None
     stability: StabilityCost | None = None
-    shift: Shift | None = None
     small: SmallModel | None = None
     keeps_supports: bool = False
     damping: Sequence[float] = ()
@@ -71,7 +69,6 @@ class ReducedRotor(Parts):
         """The masses, and what was asked for beside them."""
         return {
             "": self.result,
-            "what_if": self.shift,
             "placement": self.placement,
             "methods": self.methods,
             "response": self.response,

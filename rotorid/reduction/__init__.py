@@ -8,7 +8,7 @@ from rotorid.reduction.comparison import (
     stability_threshold,
 )
 from rotorid.reduction.condensation import Method, Methods, compare_methods
-from rotorid.reduction.input_errors import InputErrors, MassErrors, Shift
+from rotorid.reduction.input_errors import InputErrors, MassErrors
 from rotorid.reduction.keep_supports import check_free, held_nodes, held_rigidly, keep_supports
 from rotorid.reduction.masses import (
     Separated,
@@ -31,7 +31,6 @@ __all__ = [
     "Reduction",
     "ResponseCost",
     "Separated",
-    "Shift",
     "SmallModel",
     "StabilityCost",
     "book_nodes",

@@ -79,7 +79,7 @@ class ResponseCost(Answered):
     def relative_difference(self) -> FloatArray:
         """|small − full| by the largest |full| at the same speed, shape (S, C, P); NaN at standstill."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            size = np.abs(self.full).max(axis=(1, 2))[:, None, None]
+            size = np.abs(self.full).max(axis=(1, 2), keepdims=True)
             return np.asarray(np.abs(self.small - self.full) / size)
 
     @property
@@ -112,17 +112,17 @@ class ResponseCost(Answered):
         speed, sensor, plane = self.where
         bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
         details = (
-            "the difference is in percent of the largest influence coefficient at the same speed",
-            f"worst at {rpm_text(speed)}: reading at node {label(sensor)}, unbalance at node {plane}",
-            f"left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
-            f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands or 'none'}, rpm)",
+            f"In percent of the largest influence coefficient at the same speed; worst at {rpm_text(speed)}, "
+            f"reading at node {label(sensor)}, unbalance at node {plane}. Left out: "
+            f"{np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
+            f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands or 'none'}, rpm)."
         )
         return Answer(
             f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
             f"{counted(len(self.nodes), 'mass', 'masses')} is within {_percent(size['largest'])} of the full "
             f"rotor's, median {_percent(size['median'])}.",
             warnings=self.warnings,
-            tables=("\n".join(fill(sentence(text), COLUMNS, subsequent_indent="  ") for text in details),),
+            tables=(fill(details, COLUMNS, subsequent_indent="  "),),
             more="where the response differs most",
         )
 
@@ -176,16 +176,14 @@ def compare_response(
     `fem.influence` has it, too. The critical speeds are those of the undamped rotor, as
     `fem.critical_speeds` gives them: bands are left out around them also where damping is large.
     """
-    nodes = small.massive
     if not (np.isfinite(bands) and 0 <= bands < 1):
         raise ValueError(f"the bands are a part of the critical speed, 0 to below 1, not {bands!r}")
+    nodes, (small, remarks) = small.massive, _undamped(small)
     omega = _default_speeds(rotor, bands) if speeds is None else checked_speeds(speeds, ascending=True)
     sensors: tuple[SensorLike, ...] = nodes
     if not rotor.symmetric:
-        sensors = (*((node, 0.0) for node in nodes), *((node, 90.0) for node in nodes))
-    full = fem.influence(rotor, nodes, sensors, omega)
-    small, remarks = _undamped(small)
-    response = small.response(omega)[:, : len(sensors)]
+        sensors = tuple((node, angle) for angle in (0.0, 90.0) for node in nodes)
+    full, response = fem.influence(rotor, nodes, sensors, omega), small.response(omega)[:, : len(sensors)]
     try:
         criticals = critical_speeds_below(rotor, omega[-1] / (1 - bands) * (1 - 1e-9))
     except ValueError as problem:
@@ -201,8 +199,7 @@ def compare_response(
         )
     remarks += [f"full rotor: {warning}" for warning in full.warnings]
     cost = ResponseCost(omega, full.W, response, nodes, sensors, criticals, float(bands), excluded)
-    largest = cost.sizes["largest"]
-    if not largest <= CLOSE:
+    if not (largest := cost.sizes["largest"]) <= CLOSE:
         remarks.append(
             f"at {cost.where[0]:.6g} rad/s the small model is {_percent(largest)} off: take more masses, "
             "other nodes or more modes, or use it below this speed"
@@ -213,20 +210,17 @@ def compare_response(
 def _undamped(small: SmallModel) -> tuple[SmallModel, list[str]]:
     """The model without damping of the surroundings, and what to say of it."""
     remark = "the modal damping of the small model is left out of this comparison: the full rotor has none"
-    damped = bool(small.damping.any())
-    return replace(small, damping=np.zeros_like(small.damping)), [remark] * damped
+    return replace(small, damping=0 * small.damping), [remark] * bool(small.damping.any())
 
 
 def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:
     """Up to 1.1 times the second critical speed of each plane, within the tables; with the bands' ends."""
     criticals = np.sort(fem.critical_speeds(rotor, 2 if rotor.symmetric else 4).frequencies)
     tables = [support.speeds for support in rotor.supports if support.speeds]
-    first = max((table[0] for table in tables), default=0.0)
-    last = min((table[-1] for table in tables), default=np.inf)
-    top = min(1.1 * float(criticals[-1]), last)
-    even = np.linspace(max(first, top / POINTS), top, POINTS)
-    ends = np.concatenate((criticals * (1 - bands), criticals * (1 + bands)))
-    return np.unique(np.concatenate((even, ends[(ends > even[0]) & (ends < top)])))
+    top = min([1.1 * float(criticals[-1]), *(table[-1] for table in tables)])
+    even = np.linspace(max([top / POINTS, *(table[0] for table in tables)]), top, POINTS)
+    ends = np.outer((1 - bands, 1 + bands), criticals)
+    return np.union1d(even, ends[(ends > even[0]) & (ends < top)])
 
 
 def _percent(part: float) -> str:
@@ -301,44 +295,42 @@ class StabilityCost(Answered):
     @property
     def answer(self) -> Answer:
         """What the reduction costs, in words and a table."""
-        table = Table(
-            "stability",
-            (
-                Column("model", ("full rotor", counted(len(self.nodes), "mass", "masses"))),
-                *(Column(*column, "{:.6g}".format) for column in self._both()),
-                Column("direction", [_way(each.direction) for each in (self.full, self.small)]),
-                Column("modes watched", (self.n_full, self.n_small)),
-            ),
+        both = (self.full, self.small)
+        rows: dict[str, list[float | None]] = {
+            "threshold, rpm": [each.threshold and each.threshold * RPM for each in both],
+            "whirl there, rpm": [each.frequency and each.frequency * RPM for each in both],
+            "by speed": [each.whirl_ratio for each in both],
+            "least log decrement": [each.margin for each in both],
+        }
+        ways = [each.direction and DIRECTION_NAMES[each.direction] for each in both]
+        columns = (
+            Column("model", ("full rotor", counted(len(self.nodes), "mass", "masses"))),
+            *(Column(name, values, "{:.6g}".format) for name, values in rows.items()),
+            Column("direction", ways),
+            Column("modes watched", (self.n_full, self.n_small)),
         )
         return Answer(
             sentence(self._verdict()),
             warnings=self.warnings,
-            tables=(terminal(table),),
+            tables=(terminal(Table("stability", columns)),),
             more="both thresholds of stability",
         )
 
-    def _both(self) -> list[tuple[str, list[float | None]]]:
-        both = (self.full, self.small)
-        return [
-            ("threshold, rpm", [each.threshold and each.threshold * RPM for each in both]),
-            ("whirl there, rpm", [each.frequency and each.frequency * RPM for each in both]),
-            ("by speed", [each.whirl_ratio for each in both]),
-            ("least log decrement", [each.margin for each in both]),
-        ]
-
     def _verdict(self) -> str:
-        where, begin = f"from {range_text(self.speeds[0], self.speeds[-1])}", rpm_text(self.speeds[0])
-        if self.relative_difference is None and self.full.status == self.small.status == "stable":
-            decrements = np.concatenate((self.full_decrement, self.small_decrement))
-            if np.nan_to_num(np.abs(decrements)).max() < UNDAMPED:
+        where, apart = f"from {range_text(self.speeds[0], self.speeds[-1])}", self.relative_difference
+        if self.full.status == self.small.status == "stable":
+            decrements = np.nan_to_num((self.full_decrement, self.small_decrement))
+            if np.abs(decrements).max() < UNDAMPED:
                 return f"no damping acts on either model {where}: no motion grows, and none decays"
             return f"both models are stable {where}"
-        words = {"stable": f"is stable {where}", "unstable": f"is unstable already at {begin}"}
+        words = {
+            "stable": f"is stable {where}",
+            "unstable": f"is unstable already at {rpm_text(self.speeds[0])}",
+        }
         full, small = (
             words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
             for each in (self.full, self.small)
         )
-        apart = self.relative_difference
         percent = "" if apart is None else f": {100 * apart:+.3g} %"
         disagree = "" if self.full.status == self.small.status else "the models disagree: "
         return f"{disagree}the full rotor {full}, the small model {small}{percent}"
@@ -398,14 +390,14 @@ def compare_stability(
     n_full = checked_number(rotor, min(max(8, n_small), available_modes(rotor)) if n is None else n)
     full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n_full, steps=steps)
     of_small = fem.threshold_of(whirl)
-    full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
-    small_decrement, small_frequency = _least_damped(whirl)
     a, b = full.frequency, of_small.frequency
     if a and b and abs(b / a - 1) > APART:
         remarks.append(
             f"the full rotor loses stability with whirl at {a:.6g} rad/s, the small model with {b:.6g} "
             "rad/s: not the same mode; use other nodes or more masses"
         )
+    full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
+    small_decrement, small_frequency = _least_damped(whirl)
     return StabilityCost(
         speeds=speeds,
         full_decrement=full_decrement,
@@ -431,7 +423,3 @@ def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
     away = np.array(runs_away(whirl))
     frequency = np.abs(whirl.values.imag)[rows, k]
     return np.where(away, -np.inf, decrements[rows, k]), np.where(away, np.nan, frequency)
-
-
-def _way(direction: float | None) -> str:
-    return "" if direction is None else DIRECTION_NAMES[direction]

@@ -1,14 +1,12 @@
 """Errors of the inputs of formula (50), and what they do to masses and frequencies.
 
 The inputs, compliances, frequencies, shapes and stiffnesses of seals, are changed and masses and frequencies
-computed anew: of one input for a question, of each in turn for the sensitivity, of all at random by their
-stated errors for ±.
+computed anew: of each in turn for the sensitivity, of all at random by their stated errors for ±.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +17,6 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import error_figures
 from rotorid.reduction.masses import design, natural_frequencies
 from rotorid.regression import gain
@@ -71,17 +68,6 @@ class InputErrors:
             object.__setattr__(self, field.name, value)
 
 
-def input_names(n: int, k: int) -> dict[str, int]:
-    """Column of each input: "alpha12" (α12 and α21), "omega1", "U31" (mass 3 in mode 1), "c2"."""
-    mark, names, count = "," if n > 9 else "", {}, n * (n + 1) // 2
-    for column, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True)):
-        names[f"alpha{i + 1}{mark}{j + 1}"] = names[f"alpha{j + 1}{mark}{i + 1}"] = column
-    others = [f"omega{j + 1}" for j in range(k)]
-    others += [f"U{i + 1}{mark}{j + 1}" for i in range(n) for j in range(k)]
-    others += [f"c{i + 1}" for i in range(n)]
-    return names | {name: column for column, name in enumerate(others, start=count)}
-
-
 def recomputed(result: Reduction, changes: FloatArray) -> FloatArray:
     """Masses and frequencies, (S, 2, n), with the inputs changed by relative `changes`, (S, P)."""
     n, k = len(result.nodes), result.modes
@@ -94,26 +80,12 @@ def recomputed(result: Reduction, changes: FloatArray) -> FloatArray:
     how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
     B, D = design(alpha, result.rotor_frequencies[:k] * (1 + w), shapes, seal_stiffness=springs, **how)
     out = np.full((len(changes), 2, n), np.nan)
-    fine = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(D).all(axis=1)
-    out[fine, 0] = (gain(B[fine]) @ D[fine][..., None])[..., 0].real
-    for s in np.flatnonzero(fine):
-        out[s, 1] = natural_frequencies(alpha[s], out[s, 0], seal_stiffness=springs[s])[0]
+    fine = np.isfinite(B).all(axis=(1, 2))
+    masses = (gain(B[fine]) @ D[fine][..., None])[..., 0]
+    out[fine] = np.stack(
+        (masses, natural_frequencies(alpha[fine], masses, seal_stiffness=springs[fine])[0]), axis=1
+    )
     return out
-
-
-def shift_by(result: Reduction, changes: Mapping[str, float]) -> Shift:
-    """What relative changes of named inputs do; ValueError for others, and for what is not finite."""
-    columns = input_names(len(result.nodes), result.modes)
-    rows = np.zeros((2, max(columns.values()) + 1))
-    for name, value in changes.items():
-        if name not in columns:
-            hint = did_you_mean(name, columns)
-            raise ValueError(f"there is no input {name!r}{hint}: choose among {', '.join(columns)}")
-        if not np.isfinite(value):
-            raise ValueError(f"the change of {name} must be finite; got {value}")
-        rows[0, columns[name]] = value
-    changed, now = recomputed(result, rows)
-    return Shift(*(changed - now))
 
 
 def deviations(result: Reduction, errors: InputErrors) -> FloatArray:
@@ -204,31 +176,3 @@ class MassErrors(Answered):
         masses, speeds = (", ".join(map(error_figures, row)) for row in (self.masses, self.frequencies * RPM))
         words = f"By the stated errors the masses are ± {masses} kg, the frequencies ± {speeds} rpm."
         return Answer(words, warnings=self.warnings)
-
-
-@dataclass(frozen=True, eq=False)
-class Shift(Answered):
-    """What given changes of the inputs do.
-
-    Attributes
-    ----------
-    masses, frequencies
-        Changes, kg and rad/s, shape (n,) each.
-    """
-
-    masses: FloatArray
-    frequencies: FloatArray
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
-        return plain({"masses_kg": self.masses, "frequencies_rad_s": self.frequencies})
-
-    @property
-    def answer(self) -> Answer:
-        """What each mass and frequency changes by."""
-        masses, speeds = (
-            ", ".join(f"{change:+.4g}" for change in row) for row in (self.masses, self.frequencies * RPM)
-        )
-        return Answer(
-            f"The changed inputs move the masses by {masses} kg and the frequencies by {speeds} rpm."
-        )

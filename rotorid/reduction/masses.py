@@ -229,40 +229,40 @@ def at_bound(masses: Estimate) -> BoolArray:
 def natural_frequencies(
     compliance: ArrayLike, masses: ArrayLike, *, seal_stiffness: ArrayLike = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Natural frequencies and shapes of a model in compliance form.
+    """Natural frequencies and shapes of a model in compliance form, or of many at once.
 
     Parameters
     ----------
     compliance, seal_stiffness
-        As in `equivalent_masses`.
+        As in `design`.
     masses
-        kg, shape (n,). Masses that are zero or negative are taken as they are.
+        kg, shape (…, n). Masses that are zero or negative are taken as they are.
 
     Returns
     -------
-    Frequencies, rad/s, ascending, shape (n,), NaN where a mode does not vibrate (only with masses that are
-    not positive); shapes (n, n), a column per mode, scaled to the largest entry = 1.
+    Frequencies, rad/s, ascending, shape (…, n), NaN where a mode does not vibrate (only with masses that are
+    not positive); shapes (…, n, n), a column per mode, scaled to the largest entry = 1.
     """
-    alpha = np.asarray(compliance, dtype=float)
-    m = np.asarray(masses, dtype=float)
-    n = len(alpha)
-    springs = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,))
-    flexibility = np.linalg.solve(np.eye(n) + alpha * springs, alpha)
-    flexibility = (flexibility + flexibility.T) / 2
-    if (m > 0).all():
-        root = np.sqrt(m)
-        lam, vectors = np.linalg.eigh(root[:, None] * flexibility * root)
-        shapes = vectors / root[:, None]
-    else:
-        complex_lam, complex_shapes = np.linalg.eig(flexibility * m)
-        real = np.abs(complex_lam.imag) <= 1e-9 * np.abs(complex_lam)
-        lam, shapes = np.where(real, complex_lam.real, np.nan), complex_shapes.real
+    alpha, m = np.asarray(compliance, dtype=float), np.asarray(masses, dtype=float)
+    n = m.shape[-1]
+    springs = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), m.shape)[..., None, :]
+    flexible = np.linalg.solve(np.eye(n) + alpha * springs, alpha)
+    flexible = (flexible + np.swapaxes(flexible, -1, -2)) / 2
+    lam, shapes, positive = np.empty_like(m), np.empty_like(flexible), (m > 0).all(axis=-1)
+    root = np.sqrt(m[positive])[..., None]
+    lam[positive], vectors = np.linalg.eigh(root * flexible[positive] * np.swapaxes(root, -1, -2))
+    shapes[positive] = vectors / root
+    if not positive.all():
+        values, vectors = np.linalg.eig(flexible[~positive] * m[~positive][..., None, :])
+        real = np.abs(values.imag) <= 1e-9 * np.abs(values)
+        lam[~positive], shapes[~positive] = np.where(real, values.real, np.nan), vectors.real
+    largest = np.nan_to_num(np.abs(lam)).max(axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        omega = np.where(lam > 1e-15 * np.nanmax(np.abs(lam)), 1.0 / np.sqrt(lam), np.nan)
-    order = np.argsort(omega)  # NaN last
-    omega, shapes = omega[order], shapes[:, order]
-    largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], axis=0)
-    return omega, shapes / largest
+        omega = np.where(lam > 1e-15 * largest, 1.0 / np.sqrt(lam), np.nan)
+    order = np.argsort(omega, axis=-1)  # NaN last
+    shapes = np.take_along_axis(shapes, order[..., None, :], axis=-1)
+    top = np.abs(shapes).argmax(axis=-2, keepdims=True)
+    return np.take_along_axis(omega, order, axis=-1), shapes / np.take_along_axis(shapes, top, axis=-2)
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
@@ -271,11 +271,11 @@ def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Parameters
     ----------
     a, b
-        Shapes at the same points, (n, j) and (n, k).
+        Shapes at the same points, (…, n, j) and (…, n, k).
 
     Returns
     -------
-    (j, k), 1 where two shapes are proportional, 0 where they are orthogonal.
+    (…, j, k), 1 where two shapes are proportional, 0 where they are orthogonal.
 
     Examples
     --------
@@ -283,7 +283,8 @@ def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
     array([[1., 0.]])
     """
     A, B = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    return np.asarray((A.T @ B) ** 2 / np.outer((A**2).sum(axis=0), (B**2).sum(axis=0)))
+    sizes = (A**2).sum(axis=-2)[..., :, None] * (B**2).sum(axis=-2)[..., None, :]
+    return np.asarray((np.swapaxes(A, -1, -2) @ B) ** 2 / sizes)
 
 
 def like(shapes: FloatArray, reference: FloatArray) -> FloatArray:
@@ -322,17 +323,12 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
     ]
     model = dataclasses.replace(rotor.model, gyroscopic=False)
     plane = dataclasses.replace(rotor, supports=supports, model=model)
-    coupled = any(support.coupled for support in rotor.supports)
-    remarks = []
-    if rotor.model.gyroscopic or coupled or not rotor.symmetric:
+    remarks, pedestals = [], any(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
+    if rotor.model.gyroscopic or not rotor.symmetric or any(s.coupled for s in rotor.supports) or pedestals:
+        masses = ", and the masses of the pedestals are left out" if pedestals else ""
         remarks.append(
             "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
-            "of the rotor at rest, without gyroscopic effect and cross-coupling, and the plane y may differ"
-        )
-    if any(support.pedestal is not None and support.pedestal.mass > 0 for support in rotor.supports):
-        remarks.append(
-            "the masses of the pedestals are left out here, of the rotor and of the model: they come back in "
-            "the small model (response, stability, model file)"
+            f"of the rotor at rest{masses}; all that comes back in the small model"
         )
     if not rotor.constant:
         which = "the lowest of" if speed is None else "chosen in"

@@ -20,7 +20,14 @@ from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.text import counted
-from rotorid.reduction.masses import Normalisation, RowWeights, design, plane_at_rest
+from rotorid.reduction.masses import (
+    Normalisation,
+    RowWeights,
+    design,
+    mac,
+    natural_frequencies,
+    plane_at_rest,
+)
 from rotorid.regression import RCOND
 
 if TYPE_CHECKING:
@@ -330,13 +337,13 @@ def rank_nodes(
         A, U = alpha[chosen[:, :, None], chosen[:, None, :]], shapes[chosen]
         masses, condition = _masses(A, omega[:modes], U[..., :modes], normalise, rows)
         parts.append((chosen, masses, condition, *_compared(A, masses, omega, U)))
-    chosen, masses, condition, frequencies, error, mac, worst = (
+    chosen, masses, condition, frequencies, error, agreement, worst = (
         np.concatenate(part) for part in zip(*parts, strict=True)
     )
     # best error first, of equal errors the larger MAC, then the lighter; then masses not positive,
     # then nothing determined
     good, known = np.isfinite(error), np.isfinite(condition)
-    keys = np.where(good, (masses.sum(axis=1), -mac, error), 0.0)
+    keys = np.where(good, (masses.sum(axis=1), -agreement, error), 0.0)
     # rounded: differences of 1e-10 are float64's, and then the order of the nodes decides
     order = np.lexsort((*np.round(keys, 10), np.where(good, 0, np.where(known, 1, 2))))
     nodes = np.array(places, dtype=np.int32)[chosen[order]]
@@ -353,7 +360,7 @@ def rank_nodes(
         masses=masses[order],
         frequencies=frequencies[order],
         error=error[order],
-        mac=mac[order],
+        mac=agreement[order],
         worst_mode=worst[order],
         condition=condition[order],
         ranked=int(good.sum()),
@@ -462,18 +469,14 @@ def _compared(
     NaN, and mode 0, where the masses are not all positive or the model does not vibrate in n modes.
     """
     frequencies, each = np.full_like(masses, np.nan), np.full_like(masses, np.nan)
-    positive = np.flatnonzero((masses > 0).all(axis=1))  # False for NaN
-    root = np.sqrt(masses[positive])
-    lam, V = np.linalg.eigh(root[:, :, None] * A[positive] * root[:, None, :])
-    vibrates = lam[:, 0] > 1e-15 * lam[:, -1]
-    positive, root, lam, V = positive[vibrates], root[vibrates], lam[vibrates, ::-1], V[vibrates, :, ::-1]
-    frequencies[positive] = 1.0 / np.sqrt(lam)
-    model, reference = V / root[:, :, None], U[positive]
-    size = (model**2).sum(axis=1) * (reference**2).sum(axis=1)
-    product = (model * reference).sum(axis=1) ** 2
+    positive = np.flatnonzero((masses > 0).all(axis=1))  # none with NaN
+    frequencies[positive], model = natural_frequencies(A[positive], masses[positive])
+    with np.errstate(invalid="ignore"):
+        each[positive] = np.diagonal(mac(model, U[positive]), axis1=1, axis2=2)
+    vibrates = np.asarray(np.isfinite(frequencies).all(axis=1, keepdims=True))
     # a rotor's mode that does not move these nodes is not in the model: MAC 0
-    each[positive] = np.divide(product, size, out=np.zeros_like(size), where=size > 0)
-    worst = np.where(np.isfinite(each[:, 0]), each.argmin(axis=1) + 1, 0)
+    frequencies, each = np.where(vibrates, (frequencies, np.nan_to_num(each)), np.nan)
+    worst = np.where(vibrates.ravel(), each.argmin(axis=1) + 1, 0)
     return frequencies, np.abs(frequencies / omega - 1.0).max(axis=1), each.min(axis=1), worst
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -19,14 +19,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, error_figures, percent
-from rotorid.reduction.input_errors import (
-    InputErrors,
-    MassErrors,
-    Shift,
-    errors_by_draws,
-    mass_sensitivity,
-    shift_by,
-)
+from rotorid.reduction.input_errors import InputErrors, MassErrors, errors_by_draws, mass_sensitivity
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,
@@ -144,17 +137,6 @@ class Reduction(Answered):
         M, names = np.diag(self.masses.solution), tuple(f"x{node}" for node in self.nodes)
         return fem.Motion(M, np.zeros_like(M), (K + K.T) / 2, names, 0.0)
 
-    def what_if(self, changes: Mapping[str, float]) -> Shift:
-        """Changes of masses and frequencies by relative changes of inputs, such as {"alpha12": 0.013}.
-
-        Raises
-        ------
-        ValueError
-            For an input that does not exist (they are `alpha12`, `U31`, `omega1`, `c2` …), or a change
-            that is not finite.
-        """
-        return shift_by(self, changes)
-
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
         document: dict[str, Any] = {
@@ -196,20 +178,39 @@ class Reduction(Answered):
         Masses have node, position and mass; modes have number, frequencies, error and MAC. Cells of the other
         kind are blank.
         """
-        n = len(self.nodes)
-        blank = [None] * n
-        of_masses = {"node": self.nodes, "position_m": self.positions, "mass_kg": self.masses.solution}
-        of_modes = {
-            "mode": range(1, n + 1),
-            "frequency_rad_s": self.frequencies,
-            "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
-            "relative_error": self.relative_error,
-            "mac": self.mac,
-        }
-        columns = [Column("table", ["masses"] * n + ["modes"] * n)]
-        columns += [Column(key, [*values, *blank]) for key, values in of_masses.items() if values is not None]
-        columns += [Column(key, [*blank, *values]) for key, values in of_modes.items()]
-        return frame(columns).astype({"mode": "Int64"} | ({} if self.rotor is None else {"node": "Int64"}))
+        import pandas as pd
+
+        n, parts = len(self.nodes), {"masses": self._of_masses(), "modes": self._of_modes()}
+        frames = [
+            frame((Column("table", [kind] * n), *(each for each in columns if each.name)))
+            for kind, columns in parts.items()
+        ]
+        whole = {"mode": "Int64"} if self.rotor is None else {"mode": "Int64", "node": "Int64"}
+        return pd.concat(frames, ignore_index=True).astype(whole)
+
+    def _of_masses(self) -> tuple[Column, ...]:
+        """Node, position and mass; what has no name is printed alone."""
+        positions, std, three = self.positions, self.masses.std, "{:.3f}".format
+        at = () if positions is None else (Column("position_m", positions, three, "at, m"),)
+        spread = () if std is None else (Column("", std, error_figures, "±"),)
+        masses = Column("mass_kg", self.masses.solution, three, "mass, kg")
+        return (Column("node", self.nodes, str), *at, masses, *spread)
+
+    def _of_modes(self) -> tuple[Column, ...]:
+        """Number, both frequencies, error and MAC; what has no name is printed alone."""
+        model, other = self.frequencies, self._padded(self.rotor_frequencies)
+        still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
+        one, four = "{:.1f}".format, "{:.4f}".format
+        return (
+            Column("mode", range(1, len(self.nodes) + 1), str),
+            Column("", model * RPM, one, "model, rpm"),
+            Column("frequency_rad_s", model, four, "rad/s"),
+            Column("", other * RPM, one, "rotor, rpm" if self.source == "rotor" else "measured, rpm"),
+            Column("rotor_frequency_rad_s", other, four, "rad/s"),
+            Column("relative_error", self.relative_error, lambda e: f"{100 * e:+.3f}", "error, %"),
+            Column("mac", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format, "MAC"),
+            *((Column("", still, str),) if any(still) else ()),
+        )
 
     @property
     def answer(self) -> Answer:
@@ -219,9 +220,9 @@ class Reduction(Answered):
             f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from {self._choices()}, "
             f"formula (50), together {self.masses.solution.sum():.1f}{whole}.\n"
             f"{self._judgement()}; condition number {self.masses.condition_number:.3g}.",
-            f"{text(self._mass_columns())}\n\n{text(self._mode_columns())}",
+            f"{text(self._of_masses())}\n\n{text(self._of_modes())}",
             self.warnings[::-1],  # of the model as it came out before those of what it is made for
-            (_RESIDUAL,) if self.masses.std is not None else (),
+            () if self.masses.std is None else (_RESIDUAL,),
         )
         more = [] if self.errors is None else [self.errors.answer]
         if (apart := self.separated) is not None:
@@ -254,33 +255,11 @@ class Reduction(Answered):
             return "NO physical model, a mass is not positive"
         if not np.isfinite(apart[:k]).all():
             return "NO model of these modes, not all of them vibrate"
-        whose, largest = self._whose("rotor's"), percent(round(np.abs(apart[:k]).max(), 8))
-        words = f"Frequencies within {largest} % of the {whose}, MAC {self.mac[:k].min():.4g}"
-        following = apart[k : k + 1]
-        return words + "".join(f"; mode {k + 1} off by {100 * e:+.3g} %" for e in following if np.isfinite(e))
-
-    def _whose(self, rotor: str) -> str:
-        return "measured" if self.source == "measured" else rotor
-
-    def _mass_columns(self) -> tuple[Column, ...]:
-        std, positions = self.masses.std, self.positions
-        at = () if positions is None else (Column("at, m", positions, "{:.3f}".format),)
-        spread = () if std is None else (Column("±", std, error_figures),)
-        masses = Column("mass, kg", self.masses.solution, "{:.3f}".format)
-        return (Column("node", self.nodes, str), *at, masses, *spread)
-
-    def _mode_columns(self) -> tuple[Column, ...]:
-        model, other = self.frequencies, self._padded(self.rotor_frequencies)
-        still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
+        whose, largest = {"rotor": "rotor's"}.get(self.source, "measured"), np.abs(apart[:k]).max()
+        following = [f"; mode {k + 1} off by {100 * e:+.3g} %" for e in apart[k : k + 1] if np.isfinite(e)]
         return (
-            Column("mode", range(1, len(self.nodes) + 1), str),
-            Column("model, rpm", model * RPM, "{:.1f}".format),
-            Column("rad/s", model, "{:.4f}".format),
-            Column(f"{self._whose('rotor')}, rpm", other * RPM, "{:.1f}".format),
-            Column("rad/s", other, "{:.4f}".format),
-            Column("error, %", 100 * self.relative_error, "{:+.3f}".format),
-            Column("MAC", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format),
-            *((Column("", still, str),) if any(still) else ()),
+            f"Frequencies within {percent(round(largest, 8))} % of the {whose}, MAC {self.mac[:k].min():.4g}"
+            + "".join(following)
         )
 
     def _padded(self, values: FloatArray) -> FloatArray:
@@ -509,24 +488,23 @@ def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
         )
     if np.isnan(result.frequencies).any():
         warnings.append("with these masses the model has modes that do not vibrate")
-    warnings += [
-        f"mode {k} of the model does not have the shape of the rotor's (MAC {value:.2f}, below {ALIKE}): "
-        "do not rely on its frequency; use other nodes or more masses"
-        for k, value in enumerate(result.mac[: result.modes], start=1)
-        if not value >= ALIKE
+    modes = zip(result.relative_error.tolist(), result.mac.tolist(), strict=True)
+    far = [
+        f"mode {k} by {100 * error:+.1f} %, MAC {shape:.2f}"
+        for k, (error, shape) in enumerate(modes, start=1)
+        if abs(error) > OFF or (k <= result.modes and not shape >= ALIKE)
     ]
+    if far:
+        warnings.append(
+            f"the model is far off: {'; '.join(far)}; do not rely on these frequencies and shapes, use other "
+            "nodes or more masses"
+        )
     if (result.sensitivity > SENSITIVE / 0.01).any():
         moves = ", ".join(f"{x:.0f} %" for x in result.sensitivity)
         warnings.append(
             f"the regression is ill-conditioned (condition number {masses.condition_number:.1f}): "
             f"errors of 1 % in the compliances and shapes move the masses by {moves}; more modes make them "
             "firmer"
-        )
-    far = [f"mode {k} by {100 * e:+.1f} %" for k, e in enumerate(result.relative_error, 1) if abs(e) > OFF]
-    if far:
-        warnings.append(
-            f"frequencies of the model are far off: {', '.join(far)}; use it below them, or more masses or "
-            "other nodes"
         )
     return warnings
 

@@ -104,10 +104,7 @@ def placement(**changes):
         "pareto": np.array([0, 1]),
         "considered": 4,
         "check": 2,
-        "best_by_frequency": 0,
-        "best_by_mac": 1,
-        "compromise": 1,
-        "book": 2,
+        "named": {"best_by_frequency": 0, "best_by_mac": 1, "compromise": 1, "book_rule": 2},
         "rotor": rotor23(),
     }
     return SimpleNamespace(**fields | changes)

@@ -237,13 +237,13 @@ def test_the_plane_at_rest_of_an_anisotropic_gyroscopic_rotor():
     np.testing.assert_allclose(a.masses.solution, b.masses.solution, rtol=1e-9)
     np.testing.assert_allclose(a.rotor_frequencies, b.rotor_frequencies, rtol=1e-9)
     assert "plane x of the rotor at rest" in a.warnings[0]
-    assert "masses of the pedestals are left out" in a.warnings[1]
-    assert "100 rad/s, the lowest of their tables" in a.warnings[2]
+    assert "masses of the pedestals are left out" in a.warnings[0]
+    assert "100 rad/s, the lowest of their tables" in a.warnings[1]
     assert not any("gyroscopic" in text for text in a.warnings[1:])
-    assert not any("at rest" in text for text in b.warnings)
+    assert not any("their tables" in text for text in b.warnings)
     stiffer = reduce(turning, [4, 8], 2, speed=500.0)
     assert (stiffer.rotor_frequencies > a.rotor_frequencies).all()
-    assert "500 rad/s, chosen in their tables" in stiffer.warnings[2]
+    assert "500 rad/s, chosen in their tables" in stiffer.warnings[1]
     with pytest.raises(ValueError, match="its table holds 100 to 500"):
         reduce(turning, [4, 8], 2, speed=50.0)
 
@@ -254,4 +254,6 @@ def test_a_mode_of_another_shape_is_said(rotor):
     clumsy = reduce(rotor, [3, 4, 5], 3)
     low = clumsy.mac < 0.9
     assert low.any()
-    assert [f"mode {k + 1} of the model" in " ".join(clumsy.warnings) for k in range(3)] == low.tolist()
+    assert [f"mode {k + 1} by " in " ".join(clumsy.warnings) for k in range(3)] == (
+        low | (np.abs(clumsy.relative_error) > 0.1)
+    ).tolist()
