@@ -97,10 +97,9 @@ class ReducedRotor(Parts):
 
         parts = (self.stability, self.response, self.methods, self.placement, self.result)
         part: Any = next(part for part in parts if part is not None)
-        ratios = (1, 1) if part is self.methods else (3, 2)
-        two = part is self.methods or part is self.response
+        two = part is self.response
         figure = new_figure(6.2 if two else 5.0)
-        pair = [*figure.subplots(2, sharex=True, height_ratios=ratios)] if two else figure.add_subplot()
+        pair = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
         plot(part, pair)
         return figure
 

@@ -1,7 +1,7 @@
 """Errors of the inputs of formula (50), and what they do to masses and frequencies.
 
-The inputs, compliances, frequencies, shapes and stiffnesses of seals, are changed and masses and frequencies
-computed anew: of each in turn for the sensitivity, of all at random by their stated errors for ±.
+The inputs, compliances, frequencies, shapes and stiffnesses of seals, are drawn at random by their stated
+errors, and masses and frequencies computed anew.
 """
 
 from __future__ import annotations
@@ -18,16 +18,13 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.text import error_figures
-from rotorid.reduction.masses import design, natural_frequencies
-from rotorid.regression import gain
+from rotorid.reduction.masses import design, natural_frequencies, solve_many
 
 if TYPE_CHECKING:
     from rotorid.reduction.reduce import Reduction
 
 DRAWS = 2000
 """Of inputs with their errors."""
-STEP = 1e-5
-"""Relative, of an input, for derivatives by central differences."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +76,11 @@ def recomputed(result: Reduction, changes: FloatArray) -> FloatArray:
     shapes = result.rotor_shapes[:, :k] * (1 + u.reshape(-1, n, k))
     how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
     B, D = design(alpha, result.rotor_frequencies[:k] * (1 + w), shapes, seal_stiffness=springs, **how)
+    masses, _ = solve_many(B, D)
     out = np.full((len(changes), 2, n), np.nan)
-    fine = np.isfinite(B).all(axis=(1, 2))
-    masses = (gain(B[fine]) @ D[fine][..., None])[..., 0]
-    out[fine] = np.stack(
-        (masses, natural_frequencies(alpha[fine], masses, seal_stiffness=springs[fine])[0]), axis=1
-    )
+    fine = np.isfinite(masses).all(axis=1)
+    omega, _ = natural_frequencies(alpha[fine], masses[fine], seal_stiffness=springs[fine])
+    out[fine] = np.stack((masses[fine], omega), axis=1)
     return out
 
 
@@ -127,21 +123,6 @@ def errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
             f"a standard deviation is as large as the mass: {', '.join(wild)} cannot be relied on"
         )
     return MassErrors(masses, frequencies, tuple(warnings))
-
-
-def mass_sensitivity(result: Reduction) -> FloatArray:
-    """Relative standard deviation of each mass, (n,), per that of all compliances and shapes alike.
-
-    Ordinates at the first mass are exact, and all inputs independent.
-    """
-    n, k = len(result.nodes), result.modes
-    used = deviations(result, InputErrors(compliance=0.5, shapes=0.5)) > 0
-    used[n * (n + 1) // 2 + k :][:k] = False
-    steps = STEP * np.eye(used.size)[used]
-    up, down = (recomputed(result, sign * steps)[:, 0] for sign in (1, -1))
-    (now,) = recomputed(result, np.zeros((1, used.size)))[:, 0]
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.linalg.norm((up - down) / (2 * STEP), axis=0) / np.abs(now))
 
 
 @dataclass(frozen=True, eq=False)

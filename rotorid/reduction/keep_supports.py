@@ -20,7 +20,7 @@ from fem import GRAVITY, JournalBearing, SqueezeFilm
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.reduction.masses import bending_stiffness
-from rotorid.reduction.small_model import SmallModel, small_model
+from rotorid.reduction.small_model import SmallModel, condense, modal
 
 RIGID = 1e7
 """Stiffness of a rigid support by that of a shaft on two of them."""
@@ -114,29 +114,19 @@ def keep_supports(
     """
     rigid = held_nodes(rotor)
     check_free(rigid, nodes)
-    model = small_model(rotor, nodes, masses)
-    at, n = rotor.positions[np.array(model.nodes) - 1], len(nodes)
-    rest = [i for i, node in enumerate(model.nodes) if node in rigid]
-    every, z = model.masses.copy(), rotor.positions
+    kept = sorted({*nodes, *(s.node for s in rotor.supports), *(force.node for force in rotor.forces)})
+    model = condense(rotor, tuple(kept), dict(zip(nodes, masses.tolist(), strict=True)))
+    every, z, damping = model.masses.copy(), rotor.positions, np.zeros_like(model.stiffness)
+    at, rest = z[np.array(kept) - 1], np.flatnonzero(np.isin(kept, rigid))
     shaft = rotor.density * rotor.area * rotor.length * (z[:-1] + z[1:]) / 2
     moment = float(shaft.sum() + sum(disc.mass * z[disc.node - 1] for disc in rotor.discs))
     lacking = rotor.total_mass - every.sum(), moment - float(every @ at)
     every[rest] = _shared(model.weight[rest] / GRAVITY, at[rest], *lacking)
-    damping = np.zeros_like(model.stiffness)
     if modal_damping:
-        on_rigid = small_model(held_rigidly(rotor), nodes, masses, modal_damping=modal_damping)
-        damping[:n, :n] = on_rigid.damping[:n, :n]
-    order = np.argsort(model.nodes)
-    grid = np.ix_(order, order)
-    sorted_model = replace(
-        model,
-        nodes=tuple(model.nodes[i] for i in order),
-        masses=every[order],
-        weight=model.weight[order],
-        damping=damping[grid],
-        **{name: getattr(model, name)[grid] for name in ("stiffness", "material_damping", "gyroscopic")},
-    )
-    return replace(sorted_model, warnings=(*model.warnings, *_of_masses(rotor, sorted_model)))
+        places = [kept.index(node) for node in nodes]
+        damping[np.ix_(places, places)] = modal(held_rigidly(rotor), nodes, masses, modal_damping)
+    model = replace(model, masses=every, damping=damping)
+    return replace(model, warnings=(*model.warnings, *_of_masses(rotor, model)))
 
 
 def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> FloatArray:
@@ -171,7 +161,7 @@ def _of_masses(rotor: fem.Rotor, model: SmallModel) -> list[str]:
             "the masses are too large to leave some for the supports: together "
             f"{model.masses.sum():.1f} kg of the rotor's {total:.1f} kg; use other nodes or more modes"
         )
-    if bare := [str(node) for node, mass in zip(model.nodes, model.masses, strict=True) if mass == 0]:
+    if bare := [str(node) for node in model.nodes if node not in model.massive]:
         remarks.append(
             f"no mass stands at node {listing(bare, 'and')}, where supports or forces act: the shaft follows "
             "there without inertia; better let a mass stand there, with --nodes"

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 import fem
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.regression import Estimate, least_squares
+from rotorid.regression import RCOND, Estimate, least_squares
 
 Normalisation = Literal["first", "largest", "length"]
 """Each shape scaled to 1 at the first mass, to 1 at its largest entry, or to unit length."""
@@ -224,6 +224,26 @@ def _nonnegative(free: Estimate, B: FloatArray, D: FloatArray, weights: FloatArr
 def at_bound(masses: Estimate) -> BoolArray:
     """Which determined masses stand at the bound 0: the modes ask for less than nothing there, shape (n,)."""
     return np.equal(masses.values, 0.0)
+
+
+def solve_many(B: FloatArray, D: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Masses (t, n) and condition numbers (t,) of many regressions; NaN masses where they are not determined.
+
+    Columns are scaled to length 1 first. The condition number is NaN where a shape cannot be scaled, inf
+    where the rank is deficient.
+    """
+    masses, condition = np.full((len(B), B.shape[2]), np.nan), np.full(len(B), np.nan)
+    usable = np.flatnonzero(np.isfinite(B).all(axis=(1, 2)))
+    B, D = B[usable], D[usable]
+    scale = np.linalg.norm(B, axis=1)
+    scale[scale == 0] = 1.0
+    left, s, right = np.linalg.svd(B / scale[:, None, :], full_matrices=False)
+    determined = s[:, -1] > RCOND * s[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        condition[usable] = np.where(determined, s[:, 0] / s[:, -1], np.inf)
+        solved = np.einsum("tin,ti,tn,tnj->tj", left, D, 1 / s, right, optimize=True) / scale
+    masses[usable[determined]] = solved[determined]
+    return masses, condition
 
 
 def natural_frequencies(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import chain, combinations, islice
 from math import comb
 from typing import TYPE_CHECKING, Any
@@ -27,8 +26,8 @@ from rotorid.reduction.masses import (
     mac,
     natural_frequencies,
     plane_at_rest,
+    solve_many,
 )
-from rotorid.regression import RCOND
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,12 +128,6 @@ class Placement(Answered):
         """Number of choices T."""
         return len(self.nodes)
 
-    @cached_property
-    def pareto(self) -> IndexArray:
-        """Rows that no other beats in both error and MAC: the trade-off, by ascending error."""
-        mac = self.mac[: self.ranked]
-        return np.flatnonzero(mac > np.maximum.accumulate([-np.inf, *mac])[:-1])
-
     @property
     def best_by_frequency(self) -> int | None:
         """Row of the smallest frequency error; None where no choice is ranked."""
@@ -143,22 +136,20 @@ class Placement(Answered):
     @property
     def best_by_mac(self) -> int | None:
         """Row of the largest smallest MAC (of equals the one of smaller error); None: no choice is ranked."""
-        return int(self.pareto[-1]) if self.ranked else None
+        return int(np.argmax(self.mac[: self.ranked])) if self.ranked else None
 
     @property
     def compromise(self) -> int | None:
-        """Row of the trade-off that loses least, as a factor, against both bests; None: no choice is ranked.
+        """Row that loses least, as a factor, against both bests; None: no choice is ranked.
 
-        The row that minimises max(error / smallest error, (1 − MAC) / smallest (1 − MAC)), after errors
-        are raised to 0.1 % and 1 − MAC to 0.01 at least, below which they are equally good: the knee of the
-        trade-off on logarithmic axes.
+        It minimises max(error / smallest error, (1 − MAC) / smallest (1 − MAC)), after errors are raised to
+        0.1 % and 1 − MAC to 0.01 at least, below which they are equally good. No choice beats it in both.
         """
         if not self.ranked:
             return None
-        front = self.pareto
-        error = np.maximum(self.error[front], SMALL_ERROR)
-        loss = np.maximum(1.0 - self.mac[front], SMALL_LOSS)
-        return int(front[np.argmin(np.maximum(error / error.min(), loss / loss.min()))])
+        error = np.maximum(self.error[: self.ranked], SMALL_ERROR)
+        loss = np.maximum(1.0 - self.mac[: self.ranked], SMALL_LOSS)
+        return int(np.argmin(np.maximum(error / error.min(), loss / loss.min())))
 
     @property
     def named(self) -> dict[str, int | None]:
@@ -184,7 +175,6 @@ class Placement(Answered):
                 Column("smallest_mac", self.mac),
                 Column("worst_mode", self.worst_mode),
                 Column("condition_number", self.condition),
-                Column("trade_off", np.isin(rows, self.pareto)),
             )
         )
         return table.astype({"rank": "Int64"})
@@ -197,7 +187,6 @@ class Placement(Answered):
             | {
                 "rotor_frequencies_rad_s": self.rotor_frequencies,
                 "choices": [self._choice(i) for i in range(min(top, self.ranked))],
-                "trade_off": [self._choice(i) for i in self.pareto.tolist()],
                 "frequency_match_with_wrong_shapes": len(self.traps()),
             }
             | {key: None if row is None else self._choice(row) for key, row in self.named.items()}
@@ -330,12 +319,13 @@ def rank_nodes(
     full = fem.critical_speeds(plane, n)
     alpha = fem.compliance(plane, places)
     shapes, omega = full.shapes[np.array(places) - 1], full.frequencies
+    how: dict[str, Any] = {"normalise": normalise, "rows": rows}
     every, parts = combinations(range(len(places)), n), []
     size = max(1, CHUNK // (n * n * (modes + 3)))
     while (flat := np.fromiter(chain.from_iterable(islice(every, size)), dtype=np.intp)).size:
         chosen = flat.reshape(-1, n)
         A, U = alpha[chosen[:, :, None], chosen[:, None, :]], shapes[chosen]
-        masses, condition = _masses(A, omega[:modes], U[..., :modes], normalise, rows)
+        masses, condition = solve_many(*design(A, omega[:modes], U[..., :modes], **how))
         parts.append((chosen, masses, condition, *_compared(A, masses, omega, U)))
     chosen, masses, condition, frequencies, error, agreement, worst = (
         np.concatenate(part) for part in zip(*parts, strict=True)
@@ -368,8 +358,7 @@ def rank_nodes(
         undetermined=int(np.isinf(condition).sum()),
         at_node=int(np.isnan(condition).sum()),
         modes=modes,
-        normalise=normalise,
-        rows=rows,
+        **how,
         rotor_frequencies=omega,
         candidates=places,
         book=book,
@@ -437,28 +426,6 @@ def _number(value: int, most: int, name: str, words: str) -> int:
     if not 1 <= number <= most:
         raise ValueError(f"{name} is {number}, but {words} 1 … {most}")
     return number
-
-
-def _masses(
-    A: FloatArray, omega: FloatArray, U: FloatArray, normalise: Normalisation, rows: RowWeights
-) -> tuple[FloatArray, FloatArray]:
-    """Masses (t, n) and condition numbers (t,) of (50); NaN masses where they are not determined.
-
-    The condition number is NaN where a shape cannot be scaled, inf where the rank is deficient.
-    """
-    B, D = design(A, omega, U, normalise=normalise, rows=rows)
-    masses, condition = np.full(A.shape[:2], np.nan), np.full(len(A), np.nan)
-    usable = np.flatnonzero(np.isfinite(B).all(axis=(1, 2)))
-    B, D = B[usable], D[usable]
-    scale = np.linalg.norm(B, axis=1)
-    scale[scale == 0] = 1.0
-    left, s, right = np.linalg.svd(B / scale[:, None, :], full_matrices=False)
-    determined = s[:, -1] > RCOND * s[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        condition[usable] = np.where(determined, s[:, 0] / s[:, -1], np.inf)
-        solved = np.einsum("tin,ti,tn,tnj->tj", left, D, 1 / s, right, optimize=True) / scale
-    masses[usable[determined]] = solved[determined]
-    return masses, condition
 
 
 def _compared(

@@ -11,7 +11,9 @@ from rotorid.base.plot_style import (
     ABOVE_SCALE,
     BLUE,
     COLORS,
+    DARK,
     MARKERS,
+    QUIET,
     TEXT,
     VERMILION,
     WIDTH,
@@ -44,7 +46,6 @@ SMALLEST_ERROR, SAME_SHAPE = 1e-4, 1e-6
 """Frequency errors, %, and values of 1 − MAC, below which these are drawn as these."""
 HATCHES = ("", "////", "....", "xxxx")
 """Bars that differ without colour."""
-DARK, LINE = "#2f3640", "#6b7480"
 FULL: dict[str, Any] = {"color": BLUE, "linewidth": 2.4}
 SMALL: dict[str, Any] = {"color": VERMILION, "linewidth": 1.7, "linestyle": (0, (4, 2))}
 """The full rotor and its small model where both are curves."""
@@ -80,7 +81,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
             axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
         near = np.diff(np.sort(x)).min(initial=np.inf) < 0.1 * np.ptp(rotor.positions)
         axes.secondary_xaxis("top").set_xticks(x, labels, rotation=90 * near, fontsize=TEXT)
-        axes.vlines(x, -2, 2, color=LINE, linewidth=0.8, linestyle=":", zorder=2)
+        axes.vlines(x, -2, 2, color=QUIET, linewidth=0.8, linestyle=":", zorder=2)
         axes.set(xlabel="position, m", ylabel="mode shape, rotor's largest = 1")
         axes.set_title(f"{n}-mass model (points) and rotor (lines)", pad=10)
     points = shapes[:, :shown] / scale[:shown]
@@ -94,45 +95,44 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
             words += f", {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}" if known else ")"
         style: dict[str, Any] = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
         axes.plot(x, points[:, k], MARKERS[k], **style, label=f"mode {k + 1}: {words}")
-    axes.axhline(0.0, color=LINE, linewidth=0.8, zorder=3)
+    axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
     height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
     axes.set_ylim(-height, height)
     legend_above(axes, 1, 0.75, -0.15 if rotor is not None else 1.0)
     return axes
 
 
-def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
-    """Draw what methods of reduction lose: frequency errors with their sign, and 1 − MAC, as bars.
+def plot_methods(methods: Methods, ax: Axes | None = None) -> Axes:
+    """Draw frequency errors of methods of reduction as bars, with sign, and with the MAC of each shape.
 
-    Two axes, for the errors and for the shapes; of many modes the first six are drawn.
+    Of many modes the first six are drawn.
     """
-    above, below = new_pair(6.0, (1, 1)) if axes is None else axes
+    axes = ax or new_axes((WIDTH, 5.0))
+    plain(axes)
     n, width = min(len(methods.nodes), MOST_MODES), 0.84 / len(methods.rows)
     for i, row in enumerate(methods.rows):
         x = np.arange(n) + (i - (len(methods.rows) - 1) / 2) * width
-        errors, losses = 100 * row.relative_error[:n], np.maximum(1 - row.mac[:n], 0.0)
-        macs = ["none" if np.isnan(loss) else f"{1 - loss:.4f}" for loss in losses]
+        errors = 100 * row.relative_error[:n]
         style: dict[str, Any] = {
             "color": COLORS[i],
             "hatch": HATCHES[i],
             "edgecolor": "white",
             "linewidth": 0,
         }
-        for ax, tops, texts in ((above, errors, map(_percent, errors)), (below, losses, macs)):
-            bars = ax.bar(x, np.nan_to_num(tops), 0.92 * width, label=row.name, **style)
-            ax.bar_label(bars, [*texts], padding=3, rotation=90, fontsize=TEXT, color=DARK)
-    for ax in (above, below):
-        plain(ax)
-        ax.grid(visible=False, axis="x")
-        ax.axhline(0.0, color=DARK, linewidth=0.8)
-        ax.margins(y=0.3)
-    above.set_ylabel("frequency error, %")
-    below.set_ylabel("1 − MAC at the masses\n(written: MAC)")
+        bars = axes.bar(x, np.nan_to_num(errors), 0.92 * width, label=row.name, **style)
+        texts = [
+            f"{_percent(error)}, MAC {agreement:.4f}"
+            for error, agreement in zip(errors, row.mac, strict=False)
+        ]
+        axes.bar_label(bars, texts, padding=3, rotation=90, fontsize=TEXT)
+    axes.axhline(0.0, color=DARK, linewidth=0.8)
+    axes.margins(y=0.6)
     ticks = [f"mode {k + 1}\n{f * RPM:.0f} rpm" for k, f in enumerate(methods.rotor_frequencies[:n])]
-    below.set_xticks(range(n), ticks)
+    axes.set_xticks(range(n), ticks)
+    axes.set_ylabel("frequency error, %")
     title = f"reduced to nodes {', '.join(map(str, methods.nodes))}"
-    legend_above(above, len(methods.rows), title=title, title_fontsize="medium")
-    return above, below
+    legend_above(axes, len(methods.rows), title=title, title_fontsize="medium")
+    return axes
 
 
 def _percent(error: float) -> str:
@@ -173,8 +173,6 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     bar = axes.figure.colorbar(points, ax=axes, label="condition number of the regression", pad=0.02)
     plain_numbers(bar.ax)
     plain_numbers(axes)
-    front, words = placement.pareto, "trade-off: no other choice is better in both"
-    axes.step(x[front], y[front], "-o", where="pre", color=COLORS[1], mfc="none", label=words, zorder=3)
     rows = {row for row in placement.named.values() if row is not None and row in ranked}
     for k, row in enumerate(sorted(rows), start=2):
         names = " and ".join(NAMED[key] for key, other in placement.named.items() if other == row)

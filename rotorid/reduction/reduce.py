@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,7 +18,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, error_figures, percent
-from rotorid.reduction.input_errors import InputErrors, MassErrors, errors_by_draws, mass_sensitivity
+from rotorid.reduction.input_errors import InputErrors, MassErrors, errors_by_draws
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,
@@ -33,13 +32,12 @@ from rotorid.reduction.masses import (
     plane_at_rest,
     separate,
 )
+from rotorid.reduction.placement import BADLY
 from rotorid.regression.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SENSITIVE = 0.1
-"""Where input errors of 1 % move a mass by more than this share, the regression is called ill-conditioned."""
 HEAVY = 1.05
 """Masses that weigh more than this times the rotor are named."""
 ALIKE = 0.9
@@ -121,11 +119,6 @@ class Reduction(Answered):
         """MAC of each mode with the rotor's mode of the same number, shape (n,); NaN where unknown."""
         return self._padded(np.diag(mac(self.shapes, self.rotor_shapes)))
 
-    @cached_property
-    def sensitivity(self) -> FloatArray:
-        """Relative standard deviation of each mass per that of compliances and shapes, shape (n,)."""
-        return mass_sensitivity(self)
-
     @property
     def equations_of_motion(self) -> fem.Motion:
         """M x'' + K x = f of the small model: masses, and the inverse of the compliance.
@@ -149,7 +142,6 @@ class Reduction(Answered):
             "nonnegative": self.nonnegative,
             "masses_kg": self.masses.solution,
             "masses_std_kg": self.masses.std,
-            "mass_sensitivity": self.sensitivity,
             "compliance_m_per_N": self.compliance,
             "seal_stiffness_N_per_m": self.seal_stiffness,
             "natural_frequencies_rad_s": self.frequencies,
@@ -469,25 +461,22 @@ def _reduced(
 def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
     """Masses at their bound or not positive, modes of other shape, an ill-conditioned regression."""
     warnings, masses = [], result.masses
-    if result.nonnegative and (held := at_bound(masses)).any():
+    wrong = [
+        f"{mass:.4g} kg at node {node}"
+        for node, mass in zip(result.nodes, masses.solution, strict=True)
+        if mass <= 0
+    ]
+    if wrong and result.nonnegative:
         more = "" if errors is None else ", and what the stated errors do was not computed"
-        names = ", ".join(name for name, zero in zip(masses.names, held, strict=True) if zero)
         warnings.append(
-            f"at the bound 0, the modes ask for less than nothing there: {names}; no standard deviation is "
-            f"given, those of the others hold this fixed{more}; leave these places out"
+            f"at the bound 0, the modes ask for less than nothing there: {', '.join(wrong)}; the standard "
+            f"deviations of the others hold this fixed{more}; leave these places out"
         )
-    elif (masses.solution <= 0).any():
-        which = ", ".join(
-            f"{mass:.4g} kg at node {node}"
-            for node, mass in zip(result.nodes, masses.solution, strict=True)
-            if mass <= 0
-        )
+    elif wrong:
         warnings.append(
-            f"a mass is not positive, {which}: no physical model; use other nodes, more modes, or "
+            f"a mass is not positive, {', '.join(wrong)}: no physical model; use other nodes, more modes, or "
             "--nonnegative"
         )
-    if np.isnan(result.frequencies).any():
-        warnings.append("with these masses the model has modes that do not vibrate")
     modes = zip(result.relative_error.tolist(), result.mac.tolist(), strict=True)
     far = [
         f"mode {k} by {100 * error:+.1f} %, MAC {shape:.2f}"
@@ -499,12 +488,11 @@ def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
             f"the model is far off: {'; '.join(far)}; do not rely on these frequencies and shapes, use other "
             "nodes or more masses"
         )
-    if (result.sensitivity > SENSITIVE / 0.01).any():
-        moves = ", ".join(f"{x:.0f} %" for x in result.sensitivity)
+    if masses.condition_number > BADLY:
         warnings.append(
-            f"the regression is ill-conditioned (condition number {masses.condition_number:.1f}): "
-            f"errors of 1 % in the compliances and shapes move the masses by {moves}; more modes make them "
-            "firmer"
+            f"the regression is ill-conditioned (condition number {masses.condition_number:.1f}): errors of "
+            "1 % in the compliances and shapes can move the masses by up to that many percent; more modes "
+            "make them firmer"
         )
     return warnings
 
@@ -517,24 +505,25 @@ def _other_modes(
     places: tuple[int, ...],
 ) -> list[str]:
     """What to say where the measured rotor is not that of the model: frequencies, then shapes."""
-    remarks = [
-        f"the measured frequency {k}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
-        f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
-        for k, (f, g) in enumerate(zip(omega, rotor_omega, strict=False), start=1)
-        if abs(f / g - 1) > APART
-    ]
+    remarks = []
     agreement, turn = mac(measured, computed), 1.0 - 2.0 * np.eye(len(places))
-    for k in np.flatnonzero(np.diag(agreement) < ALIKE):
-        best, turned = int(agreement[k].argmax()), mac(turn * measured[:, [k]], computed[:, [k]])
-        hint = ""
-        if agreement[k, best] >= ALIKE:
-            hint = f" but of its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing?"
-        elif turned.max() >= ALIKE:
-            hint = f": is its sign at node {places[int(turned.argmax())]} right?"
-        remarks.append(
-            f"the shape of measured mode {k + 1} is not that of the rotor's mode {k + 1} (MAC "
-            f"{agreement[k, k]:.2f}){hint}"
-        )
+    for k, (f, g) in enumerate(zip(omega.tolist(), rotor_omega.tolist(), strict=False)):
+        if abs(f / g - 1) > APART:
+            remarks.append(
+                f"the measured frequency {k + 1}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
+                f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
+            )
+        if agreement[k, k] < ALIKE:
+            best, turned = int(agreement[k].argmax()), mac(turn * measured[:, [k]], computed[:, [k]])
+            hint = ""
+            if agreement[k, best] >= ALIKE:
+                hint = f" but of its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing?"
+            elif turned.max() >= ALIKE:
+                hint = f": is its sign at node {places[int(turned.argmax())]} right?"
+            remarks.append(
+                f"the shape of measured mode {k + 1} is not that of the rotor's (MAC "
+                f"{agreement[k, k]:.2f}){hint}"
+            )
     return remarks
 
 

@@ -39,7 +39,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds, number
 from rotorid.base.text import counted, listing
 from rotorid.reduction.condensation import held, static_shapes
-from rotorid.reduction.masses import mass_nodes, plane_at_rest
+from rotorid.reduction.masses import mass_nodes, natural_frequencies, plane_at_rest
 
 LOST = 1e-3
 """Relative rounding error of a static shape."""
@@ -240,14 +240,11 @@ class SmallModel(Answered):
         ValueError
             For a speed outside the table of a support.
         """
-        omega = checked_speeds(speeds)
-        Q = self.equations(complex_coordinate=None)
+        omega, Q = checked_speeds(speeds), self.equations(complex_coordinate=None)
         # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
         n = Q.size if Q.P.planes == 2 else 2 * Q.size
-        K = np.real(self.equations().at(omega[:1])[1][0]).diagonal()[: len(self.nodes)]
-        massive = self.masses > 0
-        scale = float(np.sqrt(np.median(np.abs(K[massive]) / self.masses[massive])))
-        return solve(Q, omega, n, scale)
+        K, on = np.abs(Q.at(omega[:1])[1][0].diagonal()), np.flatnonzero(self.masses)
+        return solve(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
 
     def response(self, speeds: ArrayLike) -> ComplexArray:
         """Response at the masses to unbalance at the masses, as `fem.influence` defines it.
@@ -367,17 +364,23 @@ def small_model(
         m = np.empty(0)
     if m.shape != (len(places),):
         raise ValueError(f"{len(places)} nodes need as many masses, numbers in kg")
-    for place, mass in zip(places, m, strict=True):
+    others = {*(each.node for each in rotor.supports), *(each.node for each in rotor.forces)}
+    model = condense(rotor, (*places, *sorted(others.difference(places))), dict(zip(places, m, strict=True)))
+    damping, n = np.zeros_like(model.stiffness), len(places)
+    damping[:n, :n] = modal(rotor, places, m, modal_damping)
+    return replace(model, damping=damping)
+
+
+def condense(rotor: fem.Rotor, kept: tuple[int, ...], masses: Mapping[int, float]) -> SmallModel:
+    """The small model whose nodes are these, with masses, kg, at some of them."""
+    for place, mass in masses.items():
         if not (np.isfinite(mass) and mass > 0):
             raise ValueError(
                 f"the mass at node {place} is {mass:.4g} kg, not positive: a physical model needs positive "
                 "masses, use other nodes or more modes, or non-negative least squares, and leave out nodes "
                 "without mass"
             )
-    linear = rotor.linear
-    acting = {*(s.node for s in rotor.supports), *(force.node for force in rotor.forces)}
-    kept = (*places, *sorted(acting - set(places)))
-    k, n = len(kept), len(places)
+    linear, k = rotor.linear, len(kept)
     A = assemble(linear)
     T = _shaft_shapes(linear, A.shaft, np.array([A.deflection(node) for node in kept], dtype=np.intp))
     Q = project(both_planes(linear, complex_coordinate=False), T)
@@ -394,9 +397,9 @@ def small_model(
             "the inertia of tilting sections and discs is in the small model only as far as the masses were "
             "fitted to modes that know it; no moment of inertia is added"
         )
-    model = SmallModel(
+    return SmallModel(
         nodes=kept,
-        masses=np.concatenate((m, np.zeros(k - n))),
+        masses=np.array([masses.get(node, 0.0) for node in kept]),
         weight=GRAVITY * (T.T @ multiply(A.mass, ones)[:, 0]),
         stiffness=_without_rounding(Q.K0[:k, :k], A.shaft[-1, A.deflections]),
         material_damping=_without_rounding(Q.D0[:k, :k], A.material[-1, A.deflections]),
@@ -405,19 +408,11 @@ def small_model(
         forces=rotor.forces,
         warnings=tuple(remarks),
     )
-    ratios = np.array(modal_damping, dtype=float)
-    if ratios.ndim != 1 or not ((ratios >= 0) & (ratios < 1)).all():
-        raise ValueError(
-            "modal_damping must be a list of damping ratios, one for each of the first modes, each from 0 to "
-            f"below 1 (0.02 is 2 %), not {modal_damping}"
-        )
-    springs = plane_at_rest(rotor, None)[0].supports
-    return replace(model, damping=_modal(model, springs, ratios)) if ratios.any() else model
 
 
 def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
     """Zero where all is rounding of the shaft's entries, as of two nodes, which nothing bends."""
-    return matrix if np.abs(matrix).max() > NONE * np.abs(whole).max() else np.zeros_like(matrix)
+    return matrix * float(np.abs(matrix).max() > NONE * np.abs(whole).max())
 
 
 def _shaft_shapes(rotor: fem.Rotor, band: FloatArray, at: IndexArray) -> FloatArray:
@@ -438,28 +433,25 @@ def _shaft_shapes(rotor: fem.Rotor, band: FloatArray, at: IndexArray) -> FloatAr
     return T
 
 
-def _modal(model: SmallModel, springs: Sequence[fem.Support], ratios: FloatArray) -> FloatArray:
-    """Damping matrix (k, k) of given ratios of the first modes of the plane x on these springs."""
-    from scipy.linalg import eigh
-
-    on = np.flatnonzero(model.masses)
-    if ratios.size > on.size:
+def modal(rotor: fem.Rotor, nodes: Sequence[int], m: FloatArray, ratios: Sequence[float]) -> FloatArray:
+    """Damping matrix (n, n) of given ratios of the first modes of formula (50)'s model, the plane at rest."""
+    zeta = np.array(ratios, dtype=float)
+    if zeta.ndim != 1 or zeta.size > m.size or not ((zeta >= 0) & (zeta < 1)).all():
         raise ValueError(
-            f"{ratios.size} damping ratios are given, but each plane has {on.size} modes: leave some out"
+            "modal_damping must be a list of damping ratios, one for each of the first modes, from 0 to "
+            f"below 1 (0.02 is 2 %), not {ratios}; each plane has {m.size} modes"
         )
-    springs = [replace(support, tilting_stiffness=0.0) for support in springs]
-    still = replace(model, supports=springs, material_damping=_zero(), gyroscopic=_zero())
-    K = still.motion(0.0, "x", condensed=True).K
-    squares, shapes = eigh((K + K.T) / 2, np.diag(model.masses[on]))
-    if squares[0] < -1e-9 * np.abs(squares).max():
+    if not zeta.any():
+        return np.zeros((m.size, m.size))
+    omega, shapes = natural_frequencies(fem.compliance(plane_at_rest(rotor, None)[0], nodes), m)
+    if np.isnan(omega).any():
         raise ValueError(
             "the plane x at rest is pushed aside by a negative stiffness: no damping ratios exist"
         )
-    omega = np.sqrt(np.maximum(squares[: ratios.size], 0.0))
-    momentum = model.masses[on, None] * shapes[:, : ratios.size]  # shapes have φᵀ M φ = 1
-    C = np.zeros_like(model.stiffness)
-    C[np.ix_(on, on)] = (momentum * (2 * ratios * omega)) @ momentum.T
-    return C
+    momentum = m[:, None] * shapes
+    sizes = 2 * omega / (shapes * momentum).sum(axis=0)
+    first = momentum[:, : zeta.size]
+    return np.asarray((first * (zeta * sizes[: zeta.size])) @ first.T)
 
 
 def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
@@ -488,6 +480,5 @@ def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
     L, R = np.eye(size)[on], np.eye(size)[:, on]
     R[off] = -np.linalg.solve(Koo, K[np.ix_(off, on)])
     L[:, off] = -np.linalg.solve(Koo.T, K[np.ix_(on, off)].T).T
-    C = (motion.C - gyroscopic)[np.ix_(on, on)] + L @ gyroscopic @ R
     kept = tuple(motion.coordinates[i] for i in on)
-    return fem.Motion(motion.M[np.ix_(on, on)], C, L @ K @ R, kept, motion.speed)
+    return fem.Motion(L @ motion.M @ R, L @ motion.C @ R, L @ K @ R, kept, motion.speed)

@@ -192,7 +192,6 @@ def test_lumped_rotor_is_the_full_one():
     assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=1e-8)
     assert (cost.small.mode, cost.small.direction) == (cost.full.mode, cost.full.direction)
     assert cost.small_decrement == pytest.approx(cost.full_decrement, rel=1e-6, abs=1e-9)
-    assert cost.small_frequency == pytest.approx(cost.full_frequency, rel=1e-6)
     assert cost.warnings == ()
 
 
@@ -216,7 +215,7 @@ def test_compressor(nodes, modes):
 def test_decrements_are_those_of_the_eigenvalues():
     small = compressor((8, 14, 20), 1)
     cost = compare_stability(small, 1600.0, lowest=110.0, steps=5)
-    campbell = fem.campbell(small.rotor, cost.speeds, cost.n_full)
+    campbell = fem.campbell(small.rotor, cost.speeds, 8)
     assert cost.full_decrement == pytest.approx(np.nanmin(campbell.log_decrements, axis=1), rel=1e-6)
     for k, speed in enumerate(cost.speeds):
         values = small.eigenvalues(speed)
@@ -224,7 +223,6 @@ def test_decrements_are_those_of_the_eigenvalues():
         decrements = -2 * np.pi * values.real / values.imag
         least = int(np.argmin(decrements))
         assert cost.small_decrement[k] == pytest.approx(decrements[least], rel=1e-7)
-        assert cost.small_frequency[k] == pytest.approx(values[least].imag, rel=1e-7)
 
 
 def test_running_away():
@@ -351,8 +349,3 @@ def test_bad_input(highest, options, message):
     for function in (compare_stability, stability_threshold):
         with pytest.raises(ValueError, match=message):
             function(jeffcott(), highest, **options)
-
-
-def test_too_many_modes():
-    with pytest.raises(ValueError, match="5 modes cannot be found"):
-        compare_stability(jeffcott(), 100.0, n=5)

@@ -75,21 +75,20 @@ def test_shapes_of_the_model_stand_on_those_of_the_rotor():
 
 def test_bars_of_the_methods_hold_errors_and_mac():
     methods = compare_methods(rotor23(), (7, 12, 18))
-    above, below = plot_methods(methods)
+    ax = plot_methods(methods)
     for i, row in enumerate(methods.rows):
-        errors = np.array([bar.get_height() for bar in above.containers[i]])
+        errors = np.array([bar.get_height() for bar in ax.containers[i]])
         np.testing.assert_allclose(errors, 100 * row.relative_error, rtol=1e-9)
-        losses = np.array([bar.get_y() + bar.get_height() for bar in below.containers[i]])
-        np.testing.assert_allclose(losses, np.maximum(1 - row.mac, 0.0), rtol=1e-6)
-        assert {bar.get_hatch() for bar in above.containers[i]} == {HATCHES[i]}
-    assert {ax.get_yscale() for ax in (above, below)} == {"linear"}
-    assert all(ax.get_ylim()[0] <= 0 < ax.get_ylim()[1] for ax in (above, below))
-    assert legend_of(above) == [row.name for row in methods.rows]
-    low, high = above.get_ylim()
+        assert {bar.get_hatch() for bar in ax.containers[i]} == {HATCHES[i]}
+        for k in range(3):
+            assert f"MAC {row.mac[k]:.4f}" in ax.texts[3 * i + k].get_text()
+    assert ax.get_yscale() == "linear"
+    assert ax.get_ylim()[0] <= 0 < ax.get_ylim()[1]
+    assert legend_of(ax) == [row.name for row in methods.rows]
+    low, high = ax.get_ylim()
     assert low < -8.2
     assert high > 7.5
-    assert apart(texts_of(above))
-    assert apart(texts_of(below))
+    assert apart(texts_of(ax))
 
 
 def placement(**changes):
@@ -101,7 +100,6 @@ def placement(**changes):
         "error": np.array([0.003, 0.011, 0.08, np.nan]),
         "mac": np.array([0.06, 0.99, 0.97, np.nan]),
         "condition": np.array([24.0, 17.0, 18.0, 900.0]),
-        "pareto": np.array([0, 1]),
         "considered": 4,
         "check": 2,
         "named": {"best_by_frequency": 0, "best_by_mac": 1, "compromise": 1, "book_rule": 2},

@@ -42,28 +42,6 @@ def test_the_one_mode_regression_says_that_it_is_ill_conditioned(rotor):
     assert [round(r.masses.condition_number, 1) for r in (one, two, three)] == [63.2, 18.3, 1.4]
     assert any("ill-conditioned" in w for w in one.warnings)
     assert three.warnings == ()
-    assert (one.sensitivity > 30).all()
-    assert (three.sensitivity < 1.2).all()
-
-
-def test_sensitivity_predicts_what_the_printed_rounding_of_one_compliance_does():
-    """α12 printed 1.3 % high moves a one-mode mass by 15 %: the first-order sensitivity knows it."""
-    sensitivity = reduce_measured(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).sensitivity
-    good = equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
-    rng = np.random.default_rng(0)
-    draws = []
-    for _ in range(1500):
-        noise = rng.normal(scale=1e-4, size=(3, 3))
-        alpha = COMPLIANCE * (1 + np.tril(noise) + np.tril(noise, -1).T)
-        U = SHAPES[:, :1] * (1 + np.array([[0.0], *rng.normal(scale=1e-4, size=(2, 1))]))
-        draws.append(equivalent_masses(alpha, FREQUENCIES[:1], U).values)
-    # 1500 draws know a standard deviation to 1.8 %
-    np.testing.assert_allclose(np.std(draws, axis=0) / good / 1e-4, sensitivity, rtol=0.08)
-    printed = COMPLIANCE.copy()
-    printed[0, 1] = printed[1, 0] = 1.12e-7
-    moved = equivalent_masses(printed, FREQUENCIES[:1], SHAPES[:, :1]).values / good - 1
-    assert np.abs(moved).max() > 0.15
-    assert (np.abs(moved) < 0.0134 * sensitivity).all()
 
 
 def test_a_rotor_that_is_three_masses_gets_them_back():
