@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 import fem
 from fem import (
-    DIRECTION_NAMES,
     SensorLike,
     Whirl,
     available_modes,
@@ -27,7 +26,6 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.tables import Column, Table, terminal
 from rotorid.base.text import counted, sentence
 from rotorid.reduction.small_model import SmallModel
 
@@ -286,24 +284,12 @@ class StabilityCost(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What the reduction costs, in words and a table."""
-        both = (self.full, self.small)
-        rows: dict[str, list[float | None]] = {
-            "threshold, rpm": [each.threshold and each.threshold * RPM for each in both],
-            "whirl there, rpm": [each.frequency and each.frequency * RPM for each in both],
-            "by speed": [each.whirl_ratio for each in both],
-            "least log decrement": [each.margin for each in both],
-        }
-        ways = [each.direction and DIRECTION_NAMES[each.direction] for each in both]
-        columns = (
-            Column("model", ("full rotor", counted(len(self.nodes), "mass", "masses"))),
-            *(Column(name, values, "{:.6g}".format) for name, values in rows.items()),
-            Column("direction", ways),
-        )
+        """What the reduction costs, in words."""
+        lines = {"full rotor": self.full, f"{len(self.nodes)}-mass model": self.small}
         return Answer(
             sentence(self._verdict()),
             warnings=self.warnings,
-            tables=(terminal(Table("stability", columns)),),
+            tables=("\n".join(fill(f"{name}: {each.sentence()}", COLUMNS) for name, each in lines.items()),),
             more="both thresholds of stability",
         )
 

@@ -199,25 +199,19 @@ def _nonnegative(free: Estimate, B: FloatArray, D: FloatArray, weights: FloatArr
     """The masses ≥ 0 with the least residual; covariance of the regression of the positive masses alone."""
     from scipy.optimize import nnls
 
-    norms, n = np.linalg.norm(B, axis=0), len(free.names)
+    norms = np.linalg.norm(B, axis=0)
     start, _ = nnls(B / np.where(norms > 0, norms, 1.0), D / (np.linalg.norm(D) or 1.0))
-    kept, solution, full = np.flatnonzero(start > 0), np.zeros(n), None
-    if kept.size:
-        inner = least_squares(B[:, kept], D, names=[free.names[j] for j in kept], weights=weights)
-        solution[kept] = inner.solution
-        if inner.covariance is not None:
-            full = np.zeros((n, n))
-            full[np.ix_(kept, kept)] = inner.covariance
-    determined = ~np.isnan(free.values)
-    sure = determined & (solution != 0)
+    inner = least_squares(B * (start > 0), D, names=free.names, weights=weights)
+    solution, unknown = inner.solution * (start > 0), np.where(np.isnan(free.values), np.nan, 0.0)
+    covariance = inner.covariance
     return dataclasses.replace(
         free,
-        values=np.where(determined, solution, np.nan),
+        values=unknown + solution,
         solution=solution,
-        residuals=D - B @ solution,
-        covariance=None if full is None else np.where(np.outer(sure, sure), full, np.nan),
-        solution_covariance=full,
-        dof=int(np.count_nonzero(weights)) - kept.size,
+        residuals=inner.residuals,
+        covariance=None if covariance is None else covariance + np.add.outer(unknown, unknown),
+        solution_covariance=inner.solution_covariance,
+        dof=inner.dof,
     )
 
 

@@ -54,36 +54,26 @@ SMALL: dict[str, Any] = {"color": VERMILION, "linewidth": 1.7, "linestyle": (0, 
 def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     """Draw the shapes of the n-mass model (points) over the rotor's (lines) and the rotor itself.
 
-    Without a rotor the measured shapes (hollow) stand beside those of the model, place by place. Of many
-    modes the first six are drawn.
+    Without a rotor the lines join the measured places. Of many modes the first six are drawn.
     """
     from fem import draw_rotor
     from fem.plots import smooth_shapes
 
     axes = ax or new_axes((WIDTH, 5.0))
     rotor, full, n = reduction.rotor, reduction.rotor_modes, len(reduction.nodes)
-    shapes, measured, x = reduction.shapes, reduction.rotor_shapes, np.arange(n, dtype=float)
-    shown, scale = min(n, MOST_MODES, measured.shape[1]), np.abs(measured).max(axis=0)
-    labels = [f"{mass:.3g} kg".replace("-", "−") for mass in reduction.masses.solution]
-    if rotor is None or full is None:
-        plain(axes)
-        for k in range(shown):
-            axes.plot(x, measured[:, k] / scale[k], MARKERS[k], color=COLORS[k], mfc="white", ms=14)
-        axes.set_xticks(x, [f"{node}\n{words}" for node, words in zip(reduction.nodes, labels, strict=True)])
-        axes.set(xlim=(-0.4, n - 0.6), xlabel="place of the mass")
-        axes.set_ylabel("mode shape, largest measured = 1 (hollow: measured)")
-    else:
+    shapes, curves, x = reduction.shapes, reduction.rotor_shapes, np.arange(n, dtype=float)
+    labels, along = [f"{mass:.3g} kg".replace("-", "−") for mass in reduction.masses.solution], x
+    scale = np.abs(curves).max(axis=0)
+    axes.set(xlabel="place of the mass", ylabel="mode shape, largest = 1")
+    if rotor is not None and full is not None:
         at = np.array(reduction.nodes, dtype=int) - 1
         draw_rotor(rotor, axes, height=0.22)
-        x, shapes, shown = rotor.positions[at], like(shapes, full.shapes[at]), min(n, MOST_MODES)
-        scale, (along, curves) = np.abs(full.shapes).max(axis=0), smooth_shapes(full)
-        for k in range(shown):
-            axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
-        near = np.diff(np.sort(x)).min(initial=np.inf) < 0.1 * np.ptp(rotor.positions)
-        axes.secondary_xaxis("top").set_xticks(x, labels, rotation=90 * near, fontsize=TEXT)
-        axes.vlines(x, -2, 2, color=QUIET, linewidth=0.8, linestyle=":", zorder=2)
-        axes.set(xlabel="position, m", ylabel="mode shape, rotor's largest = 1")
-        axes.set_title(f"{n}-mass model (points) and rotor (lines)", pad=10)
+        x, shapes, scale = rotor.positions[at], like(shapes, full.shapes[at]), np.abs(full.shapes).max(axis=0)
+        along, curves = smooth_shapes(full)
+        axes.set_xlabel("position, m")
+    else:
+        axes.set_xticks(x, [str(node) for node in reduction.nodes])
+    shown = min(n, MOST_MODES, curves.shape[1])
     points = shapes[:, :shown] / scale[:shown]
     points[:, np.isnan(reduction.frequencies[:shown])] = np.nan
     for k, (f, error) in enumerate(
@@ -91,14 +81,17 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     ):
         words = f"{f * RPM:.0f} rpm ({f:.5g} rad/s" if np.isfinite(f) else "does not vibrate"
         if np.isfinite(f):
-            known = np.isfinite(error)
-            words += f", {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}" if known else ")"
+            words += f", {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}"
         style: dict[str, Any] = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
+        axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
         axes.plot(x, points[:, k], MARKERS[k], **style, label=f"mode {k + 1}: {words}")
+    near = np.diff(np.sort(x)).min(initial=np.inf) < 0.1 * np.ptp(along)
+    axes.secondary_xaxis("top").set_xticks(x, labels, rotation=90 * near, fontsize=TEXT)
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
     height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
     axes.set_ylim(-height, height)
-    legend_above(axes, 1, 0.75, -0.15 if rotor is not None else 1.0)
+    axes.set_title(f"{n}-mass model (points) and {reduction.source} (lines)", pad=10)
+    legend_above(axes, 1, 0.75, -0.15)
     return axes
 
 

@@ -194,7 +194,7 @@ class SmallModel(Answered):
         speed = number(speed, "speed")
         Q, names = self.equations(), self.coordinates
         D, K = (matrix[0] for matrix in Q.at(np.array([speed])))
-        inside = np.array([plane == "both" or name.removeprefix("foot_")[0] == "x" for name in names])
+        inside = np.array([plane == "both" or "y" not in name for name in names])
         across = np.ix_(inside, ~inside)
         if D[across].any() or K[across].any():
             raise ValueError("the planes x and y of this rotor are coupled: take both")
@@ -462,22 +462,20 @@ def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
     R = (1; −K_oo⁻¹ K_om) and, for the forces, L = (1, −K_mo K_oo⁻¹): L G R. ValueError where other damping
     acts on a coordinate without mass, or no stiffness holds it.
     """
-    on, off = (np.flatnonzero(there) for there in (np.diag(motion.M) > 0, np.diag(motion.M) <= 0))
-    damping = np.abs(motion.C - gyroscopic)
+    massive, K, damping = np.diag(motion.M) > 0, motion.K, np.abs(motion.C - gyroscopic)
+    on, off = np.flatnonzero(massive), np.flatnonzero(~massive)
     touched = np.maximum(damping.max(axis=0), damping.max(axis=1))[off]
     if (bad := off[touched > NONE * max(np.abs(motion.C).max(), damping.max())]).size:
-        name = motion.coordinates[bad[0]]
         raise ValueError(
-            f"damping acts on {name!r}, which has no mass: it cannot be condensed into stiffness; keep the "
-            "supports, or take the state space"
+            f"damping acts on {motion.coordinates[bad[0]]!r}, which has no mass: it cannot be condensed into "
+            "stiffness; keep the supports, or take the state space"
         )
-    K, (size, *_) = motion.K, motion.K.shape
     Koo = K[np.ix_(off, off)]
     if off.size and np.linalg.cond(Koo) >= 1 / NONE:
         raise ValueError(
             "supports without mass can move without force: they cannot be condensed; give them stiffness"
         )
-    L, R = np.eye(size)[on], np.eye(size)[:, on]
+    L, R = np.eye(len(K))[on], np.eye(len(K))[:, on]
     R[off] = -np.linalg.solve(Koo, K[np.ix_(off, on)])
     L[:, off] = -np.linalg.solve(Koo.T, K[np.ix_(on, off)].T).T
     kept = tuple(motion.coordinates[i] for i in on)
