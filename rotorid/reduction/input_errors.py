@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 DRAWS = 2000
 """Of inputs with their errors."""
+NAMES = ("m", "omega")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,18 +112,13 @@ def errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
     changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
     exact, *draws = recomputed(result, np.concatenate((np.zeros((1, sigma.size)), changes)))
     low, high = np.quantile(draws, (0.15866, 0.84134), axis=0)  # NaN where any draw is
-    masses, frequencies = (high - low) / 2
-    warnings = []
-    if modes := [f"omega{k + 1}" for k in np.flatnonzero(np.isnan(frequencies))]:
-        warnings.append(
-            "some of the drawn inputs give masses that are not positive, and then no "
-            f"{modes[0]}: these errors do not determine {', '.join(modes)}"
-        )
-    if wild := [f"m{i + 1}" for i in np.flatnonzero(~(masses < np.abs(exact[0])))]:
-        warnings.append(
-            f"a standard deviation is as large as the mass: {', '.join(wild)} cannot be relied on"
-        )
-    return MassErrors(masses, frequencies, tuple(warnings))
+    std = (high - low) / 2
+    warnings = [
+        f"the stated errors do not determine {NAMES[i]}{j + 1}: it may be off by as much as it is, or drawn masses "
+        "are not positive"
+        for i, j in np.argwhere(~(std < np.abs(exact)))
+    ]
+    return MassErrors(*std, tuple(warnings))
 
 
 @dataclass(frozen=True, eq=False)

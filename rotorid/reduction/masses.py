@@ -105,14 +105,14 @@ def _scale(shapes: FloatArray, normalise: Normalisation) -> FloatArray:
     largest = sizes.max(axis=-2, keepdims=True)
     if normalise == "first":
         scale = shapes[..., :1, :]
-        return np.where(np.abs(scale) < np.maximum(ZERO_AT_FIRST * largest, 1e-300), np.nan, scale)
-    if normalise == "largest":
+        scale = np.where(np.abs(scale) < ZERO_AT_FIRST * largest, 0.0, scale)
+    elif normalise == "largest":
         scale = np.take_along_axis(shapes, sizes.argmax(axis=-2, keepdims=True), axis=-2)
     elif normalise == "length":
         scale = np.linalg.norm(shapes, axis=-2, keepdims=True)
     else:
         raise ValueError(f'normalise must be "first", "largest" or "length", not {normalise!r}')
-    return np.where(largest == 0, np.nan, scale)
+    return np.where(scale == 0, np.nan, scale)
 
 
 def _checked(
@@ -324,20 +324,19 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
         raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
     lowest = max((support.speeds[0] for support in rotor.supports if support.speeds), default=0.0)
     omega = lowest if speed is None else float(speed)
-    stands = [None if s.pedestal is None else s.pedestal.xy("stiffness")[0] for s in rotor.supports]
     supports = [
         dataclasses.replace(
             support,
             stiffness=float(support.at(omega)[0][0, 0]),
             damping=0.0,
             speeds=(),
-            pedestal=None if stand is None else fem.Pedestal(0.0, stand),
+            pedestal=support.pedestal and fem.Pedestal(0.0, support.pedestal.xy("stiffness")[0]),
         )
-        for support, stand in zip(rotor.supports, stands, strict=True)
+        for support in rotor.supports
     ]
     model = dataclasses.replace(rotor.model, gyroscopic=False)
     plane = dataclasses.replace(rotor, supports=supports, model=model)
-    remarks, pedestals = [], any(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
+    remarks, pedestals = [], any(s.pedestal and s.pedestal.mass for s in rotor.supports)
     if rotor.model.gyroscopic or not rotor.symmetric or any(s.coupled for s in rotor.supports) or pedestals:
         masses = ", and the masses of the pedestals are left out" if pedestals else ""
         remarks.append(

@@ -219,10 +219,9 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     plain(axes)
     known = np.concatenate((cost.full_decrement, cost.small_decrement))
     known = known[np.isfinite(known)]
-    far = 20 * float(np.median(np.abs(known))) if known.size else 1.0  # beyond nothing is of interest
-    bottom, top = np.clip([known.min(initial=0.0), known.max(initial=0.0)], -far, far).tolist()
-    margin = max(top - bottom, 1e-9) / 10
-    low, high = bottom - margin, top + margin
+    far = 20 * float(np.median(np.abs(known), axis=0)) if known.size else 1.0  # beyond nothing is of interest
+    low, high = np.clip([known.min(initial=-1e-9), known.max(initial=1e-9)], -far, far) * 1.1
+    low -= 0.1 * high  # 0 is in sight with room below
     for name, decrement, threshold, style in (
         ("full rotor", cost.full_decrement, cost.full.threshold, FULL),
         (f"{len(cost.nodes)}-mass model", cost.small_decrement, cost.small.threshold, SMALL),

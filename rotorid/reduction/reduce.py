@@ -230,15 +230,9 @@ class Reduction(Answered):
         return together([masses, *more])
 
     def _choices(self) -> str:
-        """Such as "the first 2 measured modes, rows relative"."""
-        kind = "measured " if self.source == "measured" else ""
-        first = f"the first {kind}mode" if self.modes == 1 else f"the first {self.modes} {kind}modes"
-        others = {
-            f"shapes scaled by {self.normalise}": self.normalise != "first",
-            f"rows {self.rows}": self.rows != "equal",
-            "masses not negative": self.nonnegative,
-        }
-        return ", ".join([first, *(words for words, chosen in others.items() if chosen)])
+        """Such as "the first 2 measured modes"."""
+        kind = "measured mode" if self.source == "measured" else "mode"
+        return f"the first {kind}" if self.modes == 1 else f"the first {self.modes} {kind}s"
 
     def _judgement(self) -> str:
         """How near the modes are."""
@@ -534,6 +528,4 @@ def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, F
         raise ValueError(
             f"shapes must be (n, k) for {n} masses and {len(omega)} frequencies; got {shapes.shape}"
         )
-    if not (np.isfinite(omega).all() and np.isfinite(shapes).all()):
-        raise ValueError("frequencies and shapes must be finite numbers")
     return omega, shapes
