@@ -26,7 +26,7 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.text import counted, sentence
+from rotorid.base.text import percent, sentence
 from rotorid.reduction.small_model import SmallModel
 
 CLOSE = 0.08
@@ -108,17 +108,16 @@ class ResponseCost(Answered):
         """What the reduction costs, in words."""
         used, size = self.speeds[~self.excluded], self.sizes
         speed, sensor, plane = self.where
-        bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
         details = (
             f"In percent of the largest influence coefficient at the same speed; worst at {rpm_text(speed)}, "
             f"reading at node {label(sensor)}, unbalance at node {plane}. Left out: "
-            f"{np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
-            f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands or 'none'}, rpm)."
+            f"{np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within ±{100 * self.bands:.3g} "
+            "% of the full rotor's critical speeds."
         )
         return Answer(
             f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
-            f"{counted(len(self.nodes), 'mass', 'masses')} is within {_percent(size['largest'])} of the full "
-            f"rotor's, median {_percent(size['median'])}.",
+            f"masses is within {percent(size['largest'])} % of the full rotor's, median "
+            f"{percent(size['median'])} %.",
             warnings=self.warnings,
             tables=(fill(details, COLUMNS, subsequent_indent="  "),),
             more="where the response differs most",
@@ -199,7 +198,7 @@ def compare_response(
     cost = ResponseCost(omega, full.W, response, nodes, sensors, criticals, float(bands), excluded)
     if not (largest := cost.sizes["largest"]) <= CLOSE:
         remarks.append(
-            f"at {cost.where[0]:.6g} rad/s the small model is {_percent(largest)} off: take more masses, "
+            f"at {cost.where[0]:.6g} rad/s the small model is {percent(largest)} % off: take more masses, "
             "other nodes or more modes, or use it below this speed"
         )
     return replace(cost, warnings=tuple(remarks))
@@ -219,10 +218,6 @@ def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:
     even = np.linspace(max([top / POINTS, *(table[0] for table in tables)]), top, POINTS)
     ends = np.outer((1 - bands, 1 + bands), criticals)
     return np.union1d(even, ends[(ends > even[0]) & (ends < top)])
-
-
-def _percent(part: float) -> str:
-    return f"{100 * part:.2g} %" if part < 0.1 else f"{100 * part:.0f} %"
 
 
 def stability_threshold(
@@ -308,9 +303,9 @@ class StabilityCost(Answered):
             words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
             for each in (self.full, self.small)
         )
-        percent = "" if apart is None else f": {100 * apart:+.3g} %"
+        away = "" if apart is None else f": {100 * apart:+.3g} %"
         disagree = "" if self.full.status == self.small.status else "the models disagree: "
-        return f"{disagree}the full rotor {full}, the small model {small}{percent}"
+        return f"{disagree}the full rotor {full}, the small model {small}{away}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.regression import RCOND, Estimate, least_squares
 
 Normalisation = Literal["first", "largest", "length"]
@@ -163,7 +163,7 @@ def equivalent_masses(
         As in `design`, without leading dimensions. Computed or measured: the modes need not be those of a
         computed rotor.
     nonnegative
-        Least squares over masses ≥ 0; `at_bound` tells those at the bound 0, which have no interval. Where
+        Least squares over masses ≥ 0; those at the bound 0 have no interval. Where
         the bound holds nothing back the masses are those of the free regression.
 
     Returns
@@ -213,11 +213,6 @@ def _nonnegative(free: Estimate, B: FloatArray, D: FloatArray, weights: FloatArr
         solution_covariance=inner.solution_covariance,
         dof=inner.dof,
     )
-
-
-def at_bound(masses: Estimate) -> BoolArray:
-    """Which determined masses stand at the bound 0: the modes ask for less than nothing there, shape (n,)."""
-    return np.equal(masses.values, 0.0)
 
 
 def solve_many(B: FloatArray, D: FloatArray) -> tuple[FloatArray, FloatArray]:

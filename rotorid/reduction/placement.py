@@ -208,10 +208,9 @@ class Placement(Answered):
     def answer(self) -> Answer:
         """The compromise beside the best by frequency, by MAC and the book's rule; behind it the best ten."""
         asked = f"Of {self.considered} choices of {self.check} of {len(self.candidates)} nodes"
-        i = self.compromise
-        if i is None:
-            judgement = f"{asked} no choice gives a physical model; use other candidates or more modes."
-            return Answer(judgement, warnings=self.warnings)
+        if (i := self.compromise) is None:
+            words = " no choice gives a physical model; use other candidates or more modes."
+            return Answer(asked + words, warnings=self.warnings)
         counts = (
             f"Masses from {counted(self.modes, 'mode')}, checked on {counted(self.check, 'mode')}: ranked "
             f"{self.ranked}; with masses that are not positive {self.unphysical}; not determined "
@@ -449,12 +448,6 @@ def _compared(
 
 def _warnings(result: Placement) -> list[str]:
     warnings, top = [], result.condition[: min(_TOP, result.ranked)]
-    if lost := result.undetermined + result.at_node:
-        warnings.append(
-            f"{lost} of {result.considered} choices give no masses and are not ranked: {result.undetermined} "
-            f"are not determined by {counted(result.modes, 'mode')}, in {result.at_node} a mode has a node "
-            'at the first mass (normalise="largest" can use these)'
-        )
     if not result.ranked:
         warnings.append("no choice gives a physical model: use other candidates, more modes or fewer masses")
     elif bad := int((top > BADLY).sum()):

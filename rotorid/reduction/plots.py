@@ -21,7 +21,6 @@ from rotorid.base.plot_style import (
     look,
     new_axes,
     new_pair,
-    note,
     plain,
     plain_numbers,
     rad_s_above,
@@ -85,8 +84,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
         style: dict[str, Any] = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
         axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
         axes.plot(x, points[:, k], MARKERS[k], **style, label=f"mode {k + 1}: {words}")
-    near = np.diff(np.sort(x)).min(initial=np.inf) < 0.1 * np.ptp(along)
-    axes.secondary_xaxis("top").set_xticks(x, labels, rotation=90 * near, fontsize=TEXT)
+    axes.secondary_xaxis("top").set_xticks(x, labels, rotation=45, fontsize=TEXT)
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
     height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
     axes.set_ylim(-height, height)
@@ -129,12 +127,8 @@ def plot_methods(methods: Methods, ax: Axes | None = None) -> Axes:
 
 
 def _percent(error: float) -> str:
-    """An error in %, short; what has no bar is 0."""
-    if np.isnan(error):
-        return "none"
-    if abs(error) < SMALLEST_ERROR:
-        return "0"
-    return (f"{error:+.2g}" if abs(error) < 99.5 else f"{error:+.0f}").replace("-", "−")
+    """An error in %, short."""
+    return "none" if np.isnan(error) else f"{error:+.2g}".replace("-", "−")
 
 
 def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
@@ -154,7 +148,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
         ylabel=f"largest frequency error\nof {counted(placement.check, 'mode')}, % (log)",
     )
     left_out = placement.considered - ranked.size
-    title = f"{placement.considered} choices of {counted(placement.nodes.shape[1], 'node')}"
+    title = f"{placement.considered} choices of {counted(placement.check, 'node')}"
     title += f", {left_out} without physical model" if left_out else ""
     if not ranked.size:
         axes.set_title(title, fontsize="medium")
@@ -197,9 +191,8 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
     words = f"left out, ±{100 * running.bands:.3g} % of a critical speed"
     for panel in (above, below):
         plain(panel)
-        for k, band in enumerate(running.left_out):
-            shade: dict[str, Any] = {"color": "black", "alpha": 0.1, "linewidth": 0}
-            panel.axvspan(*(RPM * w for w in band), **shade, label=None if k else words)
+        for k, (low, high) in enumerate(running.left_out):
+            panel.axvspan(low * RPM, high * RPM, color="0.9", label=None if k else words, zorder=0)
         panel.set_xlim(speeds[0], speeds[-1])
     rad_s_above(above)
     legend_above(above, borderaxespad=ABOVE_SCALE)
@@ -230,10 +223,9 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
         axes.plot(cost.speeds * RPM, np.where(np.isneginf(decrement), low, decrement), **style, label=words)
         if threshold is not None:
             axes.plot([threshold * RPM], [0.0], "o", color=style["color"], ms=9, zorder=6)
-    axes.axhspan(low, 0.0, color=VERMILION, alpha=0.07, linewidth=0, zorder=0)
     axes.axhline(0.0, color=DARK, linewidth=0.9)
-    note(axes, "below 0: a motion grows", (0.0, 0.0), (6, 6), xycoords="axes fraction", color=DARK)
-    axes.set(xlabel="speed, rpm", ylabel="smallest logarithmic decrement", ylim=(low, high))
+    label = "smallest logarithmic decrement\n(below 0 a motion grows)"
+    axes.set(xlabel="speed, rpm", ylabel=label, ylim=(low, high))
     axes.margins(x=0.01)
     rad_s_above(axes)
     legend_above(axes, 2, borderaxespad=ABOVE_SCALE)

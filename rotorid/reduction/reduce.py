@@ -1,4 +1,8 @@
-"""Reduction of a rotor to masses at chosen nodes, beside the rotor itself."""
+"""Reduction of a rotor to masses at chosen nodes, beside the rotor itself.
+
+What errors of the inputs do: compliances, frequencies, shapes and stiffnesses of seals are drawn at random by
+their stated errors, and masses and frequencies computed anew.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +22,11 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, error_figures, percent
-from rotorid.reduction.input_errors import InputErrors, MassErrors, errors_by_draws
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,
     Separated,
-    at_bound,
+    design,
     equivalent_masses,
     like,
     mac,
@@ -31,8 +34,9 @@ from rotorid.reduction.masses import (
     natural_frequencies,
     plane_at_rest,
     separate,
+    solve_many,
 )
-from rotorid.reduction.placement import BADLY
+from rotorid.reduction.placement import ALIKE, BADLY
 from rotorid.regression.estimate import Estimate
 
 if TYPE_CHECKING:
@@ -40,11 +44,84 @@ if TYPE_CHECKING:
 
 HEAVY = 1.05
 """Masses that weigh more than this times the rotor are named."""
-ALIKE = 0.9
-"""Below this MAC two shapes are not those of one mode."""
 OFF, APART = 0.1, 0.05
 """Relative errors of a model's frequency, and of a measured one beside the rotor's, that are named."""
+DRAWS = 2000
+"""Of inputs with their errors."""
+NAMES = ("m", "omega")
 _RESIDUAL = "± is one standard deviation from the regression's residuals (model error, not measurement)"
+
+
+@dataclass(frozen=True, eq=False)
+class InputErrors:
+    """Relative standard deviations of the inputs of formula (50): 0.013 is 1.3 %. All are independent.
+
+    Attributes
+    ----------
+    compliance
+        Scalar, or of α_11, α_12 … α_1n, α_22 …, shape (n (n + 1) / 2,).
+    frequencies
+        Scalar or (k,).
+    shapes
+        Scalar or (n, k). A scalar leaves the ordinates at the first mass exact where shapes are scaled there
+        (normalise="first"): they are 1 by definition.
+    seal_stiffness
+        Scalar or (n,).
+
+    Raises
+    ------
+    ValueError
+        For errors that are negative, not finite, or 1 and more.
+    """
+
+    compliance: ArrayLike = 0.0
+    frequencies: ArrayLike = 0.0
+    shapes: ArrayLike = 0.0
+    seal_stiffness: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = np.array(getattr(self, field.name), dtype=float)
+            if not ((value >= 0) & (value < 1)).all():
+                raise ValueError(
+                    f"errors of {field.name} must be shares from 0 to below 1, such as 0.013 for 1.3 %; "
+                    f"got {value}"
+                )
+            object.__setattr__(self, field.name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class MassErrors(Answered):
+    """What stated errors of the inputs do: one standard deviation, half of what 68 % of the draws span.
+
+    Attributes
+    ----------
+    masses, frequencies
+        kg and rad/s, shape (n,) each; NaN where some of the drawn inputs give no such mode.
+    warnings
+        Masses that are not known even in sign.
+    """
+
+    masses: FloatArray
+    frequencies: FloatArray
+    warnings: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what is unknown is None."""
+        return plain(
+            {
+                "masses_std_kg": self.masses,
+                "natural_frequencies_std_rad_s": self.frequencies,
+                "warnings": self.warnings,
+            }
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """What the errors do to masses and frequencies."""
+        masses, speeds = (", ".join(map(error_figures, row)) for row in (self.masses, self.frequencies * RPM))
+        words = f"By the stated errors the masses are ± {masses} kg, the frequencies ± {speeds} rpm."
+        return Answer(words, warnings=self.warnings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,9 +285,11 @@ class Reduction(Answered):
     def answer(self) -> Answer:
         """How well the masses stand for the rotor, the masses, and both frequencies beside each other."""
         whole = " kg" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
+        kind = "measured mode" if self.source == "measured" else "mode"
+        first = f"the first {kind}" if self.modes == 1 else f"the first {self.modes} {kind}s"
         masses = Answer(
-            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from {self._choices()}, "
-            f"formula (50), together {self.masses.solution.sum():.1f}{whole}.\n"
+            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from {first}, formula (50), "
+            f"together {self.masses.solution.sum():.1f}{whole}.\n"
             f"{self._judgement()}; condition number {self.masses.condition_number:.3g}.",
             f"{text(self._of_masses())}\n\n{text(self._of_modes())}",
             self.warnings[::-1],  # of the model as it came out before those of what it is made for
@@ -228,11 +307,6 @@ class Reduction(Answered):
             words = f"The shaft apart from its supports at nodes {a} and {b}, {apart.span:.6g} m apart."
             more.append(Answer(words, tables=(text(columns),), more="shares of the supports"))
         return together([masses, *more])
-
-    def _choices(self) -> str:
-        """Such as "the first 2 measured modes"."""
-        kind = "measured mode" if self.source == "measured" else "mode"
-        return f"the first {kind}" if self.modes == 1 else f"the first {self.modes} {kind}s"
 
     def _judgement(self) -> str:
         """How near the modes are."""
@@ -308,7 +382,7 @@ def reduce(  # noqa: PLR0913
     places = mass_nodes(rotor, nodes)
     n = len(places)
     plane, remarks = plane_at_rest(rotor, speed)
-    if measured is not None and any(s.pedestal is not None and s.pedestal.mass for s in rotor.supports):
+    if measured is not None and any(s.pedestal and s.pedestal.mass for s in rotor.supports):
         raise ValueError(
             "measured modes hold the masses of the pedestals, which formula (50) cannot take apart: give the "
             "pedestals no mass in the rotor file (the equivalent masses then hold it), or use computed modes"
@@ -336,30 +410,18 @@ def reduce(  # noqa: PLR0913
     if measured is not None:
         modes_of = _modes(measured, n)
         remarks += _other_modes(*modes_of, full.frequencies, shapes, places)
-    result = _reduced(
+    remarks += ignored_inertia(rotor)
+    remarks += [warning for warning in full.warnings if warning not in ignored_inertia(full.rotor)]
+    return _reduced(
         *(places, alpha, seals, *modes_of, modes, errors),
+        rotor=rotor,
+        rotor_modes=full,
+        separated=apart,
+        warnings=tuple(remarks),
         source="rotor" if measured is None else "measured",
         normalise=normalise,
         rows=rows,
         nonnegative=nonnegative,
-    )
-    sum_kg, total = float(result.masses.solution.sum()), rotor.total_mass
-    heavy = (
-        f"the masses weigh {sum_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they stand where "
-        "it hardly moves; use other nodes"
-    )
-    return dataclasses.replace(
-        result,
-        rotor=rotor,
-        rotor_modes=full,
-        separated=apart,
-        warnings=(
-            *remarks,
-            *ignored_inertia(rotor),
-            *(warning for warning in full.warnings if warning not in ignored_inertia(full.rotor)),
-            *result.warnings,
-            *([heavy] if sum_kg > HEAVY * total else []),
-        ),
     )
 
 
@@ -418,14 +480,14 @@ def _reduced(
     shapes: FloatArray,
     modes: int,
     errors: InputErrors | None,
-    **how: Any,  # noqa: ANN401
+    **others: Any,  # noqa: ANN401
 ) -> Reduction:
-    """The regression and its checks, whatever the inputs come from."""
+    """The regression and its checks, whatever the inputs come from; other fields of the result."""
     n, most = len(places), min(len(places), len(omega))
     if not 1 <= modes <= most:
         raise ValueError(f"{n} masses can use 1 … {most} modes; got {modes}")
-    regression = {key: value for key, value in how.items() if key != "source"}
-    estimate = equivalent_masses(alpha, omega[:modes], shapes[:, :modes], seal_stiffness=seals, **regression)
+    how = {key: others[key] for key in ("normalise", "rows", "nonnegative")}
+    estimate = equivalent_masses(alpha, omega[:modes], shapes[:, :modes], seal_stiffness=seals, **how)
     if not estimate.full_rank:
         raise ValueError(
             f"the first {counted(modes, 'mode')} cannot determine the masses at nodes {list(places)}: "
@@ -445,11 +507,12 @@ def _reduced(
         shapes=model,
         rotor_frequencies=omega[:n],
         rotor_shapes=compared,
-        **how,
+        **others,
     )
-    bound = how["nonnegative"] and at_bound(estimate).any()
-    drawn = errors_by_draws(result, errors) if errors is not None and not bound else None
-    return dataclasses.replace(result, errors=drawn, warnings=tuple(_warnings(result, errors)))
+    bound = how["nonnegative"] and not estimate.solution.all()
+    drawn = _errors_by_draws(result, errors) if errors is not None and not bound else None
+    warnings = (*result.warnings, *_warnings(result, errors))
+    return dataclasses.replace(result, errors=drawn, warnings=warnings)
 
 
 def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
@@ -470,6 +533,12 @@ def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
         warnings.append(
             f"a mass is not positive, {', '.join(wrong)}: no physical model; use other nodes, more modes, or "
             "--nonnegative"
+        )
+    total = np.inf if result.rotor is None else result.rotor.total_mass
+    if (together_kg := float(masses.solution.sum())) > HEAVY * total:
+        warnings.append(
+            f"the masses weigh {together_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they "
+            "stand where it hardly moves; use other nodes"
         )
     modes = zip(result.relative_error.tolist(), result.mac.tolist(), strict=True)
     far = [
@@ -529,3 +598,58 @@ def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, F
             f"shapes must be (n, k) for {n} masses and {len(omega)} frequencies; got {shapes.shape}"
         )
     return omega, shapes
+
+
+def _recomputed(result: Reduction, changes: FloatArray) -> FloatArray:
+    """Masses and frequencies, (S, 2, n), with the inputs changed by relative `changes`, (S, P)."""
+    n, k = len(result.nodes), result.modes
+    i, j = np.triu_indices(n)
+    a, w, u, c = np.split(changes, np.cumsum([len(i), k, n * k]), axis=1)
+    factors = np.ones((len(changes), n, n))
+    factors[:, i, j] = factors[:, j, i] = 1 + a
+    alpha, springs = result.compliance * factors, result.seal_stiffness * (1 + c)
+    shapes = result.rotor_shapes[:, :k] * (1 + u.reshape(-1, n, k))
+    how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
+    B, D = design(alpha, result.rotor_frequencies[:k] * (1 + w), shapes, seal_stiffness=springs, **how)
+    masses, _ = solve_many(B, D)
+    out = np.full((len(changes), 2, n), np.nan)
+    fine = np.isfinite(masses).all(axis=1)
+    omega, _ = natural_frequencies(alpha[fine], masses[fine], seal_stiffness=springs[fine])
+    out[fine] = np.stack((masses[fine], omega), axis=1)
+    return out
+
+
+def _deviations(result: Reduction, errors: InputErrors) -> FloatArray:
+    """Relative standard deviation of every input, (P,)."""
+    n, k = len(result.nodes), result.modes
+    sizes = {
+        "compliance": (n * (n + 1) // 2,),
+        "frequencies": (k,),
+        "shapes": (n, k),
+        "seal_stiffness": (n,),
+    }
+    parts = []
+    for name, shape in sizes.items():
+        given = np.asarray(getattr(errors, name))
+        if given.shape not in ((), shape):
+            raise ValueError(f"errors of {name} must be one number or have shape {shape}; got {given.shape}")
+        full = np.array(np.broadcast_to(given, shape))
+        if name == "shapes" and given.ndim == 0 and result.normalise == "first":
+            full[0] = 0.0
+        parts.append(full.ravel())
+    return np.concatenate(parts)
+
+
+def _errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
+    """What stated errors do, by recomputed draws; NaN where a mode is lost in some of them."""
+    sigma = _deviations(result, stated)
+    changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
+    exact, *draws = _recomputed(result, np.concatenate((np.zeros((1, sigma.size)), changes)))
+    low, high = np.quantile(draws, (0.15866, 0.84134), axis=0)  # NaN where any draw is
+    std = (high - low) / 2
+    warnings = [
+        f"the stated errors do not determine {NAMES[i]}{j + 1}: it may be off by as much as it is, or drawn "
+        "masses are not positive"
+        for i, j in np.argwhere(~(std < np.abs(exact)))
+    ]
+    return MassErrors(std[0], std[1], tuple(warnings))

@@ -176,5 +176,5 @@ def test_decrements_and_thresholds_of_both_models():
     np.testing.assert_array_equal(lines[labels[1]].get_ydata(), cost.small_decrement)
     marks = [line.get_xdata()[0] for line in ax.get_lines() if list(line.get_ydata()) == [0.0]]
     assert marks == pytest.approx([200.0 * RPM, 210.0 * RPM])
-    check_hygiene(ax.figure, unitless=["smallest logarithmic decrement"])
+    check_hygiene(ax.figure, unitless=["smallest logarithmic decrement\n(below 0 a motion grows)"])
     assert ax.get_ylim()[0] < cost.full_decrement.min()
