@@ -180,7 +180,10 @@ def compare_response(
     sensors: tuple[SensorLike, ...] = nodes
     if not rotor.symmetric:
         sensors = tuple((node, angle) for angle in (0.0, 90.0) for node in nodes)
-    full, response = fem.influence(rotor, nodes, sensors, omega), small.response(omega)[:, : len(sensors)]
+    full = fem.influence(rotor, nodes, sensors, omega)
+    each = [small.deflections(omega, {node: 1.0}) for node in nodes]
+    at = np.concatenate([np.flatnonzero(small.masses) + k for k in (0, len(small.nodes))])[: len(sensors)]
+    response = np.stack(each, axis=2)[:, at]
     try:
         criticals = critical_speeds_below(rotor, omega[-1] / (1 - bands) * (1 - 1e-9))
     except ValueError as problem:

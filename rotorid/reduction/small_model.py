@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +56,8 @@ NONE = 1e-12
 """Share of the largest entry below which damping, or a stiffness, is none."""
 INFINITE = 1e13
 """Response times largest stiffness, per unit force: beyond, only rounding is left."""
+POINTS = 61
+"""Speeds over a range at which whirl is looked at."""
 _ROUNDING = 1e-5  # share of the largest entry that stands in few digits
 _MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
 
@@ -142,6 +144,11 @@ class SmallModel(Answered):
     def massive(self) -> tuple[int, ...]:
         """Nodes with a mass."""
         return tuple(node for node, mass in zip(self.nodes, self.masses, strict=True) if mass > 0)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether no support distinguishes a direction."""
+        return all(support.symmetric for support in self.supports)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -255,42 +262,92 @@ class SmallModel(Answered):
         K, on = np.abs(Q.at(omega[:1])[1][0].diagonal()), np.flatnonzero(self.masses)
         return solve(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
 
-    def response(self, speeds: ArrayLike) -> ComplexArray:
-        """Response at the masses to unbalance at the masses, as `fem.influence` defines it.
+    def critical_speeds(self, highest: float) -> FloatArray:
+        """Speeds up to the highest, rad/s, ascending, at which a mode whirls once a turn, either way."""
+        speeds, found = self._range(0.0, highest), np.empty(0)
+        for _ in range(3):  # crossings of lines through two speeds each, the last between near ones
+            gap = np.abs(self.whirl(speeds).values.imag) - speeds[:, None]
+            before, after = gap[:-1], gap[1:]
+            i, k = np.nonzero((before > 0) != (after > 0))
+            found = (speeds[:-1] + np.diff(speeds) * (before / (before - after)).T).T[i, k]
+            found = found[np.isfinite(found)]
+            speeds = np.union1d(speeds, found)
+        return np.unique(found)
+
+    def _range(self, lowest: float, highest: float) -> FloatArray:
+        """Speeds over a range, within the tables of the supports and with all of theirs, rad/s."""
+        tables = [support.speeds for support in self.supports if support.speeds]
+        low, high = max([lowest, *(t[0] for t in tables)]), min([highest, *(t[-1] for t in tables)])
+        every = np.concatenate((np.linspace(low, high, POINTS), *tables))
+        return np.unique(every[(every >= low) & (every <= high)])
+
+    def deflections(self, speeds: FloatArray, unbalance: Mapping[int, complex]) -> ComplexArray:
+        """Phasors of x, then y of the k nodes under unbalance as in `response`, m, shape (S, 2 k).
+
+        ValueError where the model runs exactly at an undamped critical speed.
+        """
+        Q, k = self.equations(), len(self.nodes)
+        D, K = Q.at(speeds)
+        w, loads = speeds[:, None, None], np.zeros((Q.size, 1), complex)
+        for node, amount in unbalance.items():
+            i = self.nodes.index(self.node(node))
+            loads[[i, k + i], 0] += np.array([1.0, -1j]) * amount
+        try:
+            X = np.linalg.solve(K - w * w * Q.M + 1j * w * D, w * w * loads)
+        except np.linalg.LinAlgError:
+            X = np.full((1, Q.size, 1), np.inf + 0j)
+        size = np.abs(loads).max() * speeds.max() ** 2
+        if not np.abs(X).max() * np.abs(K).max() <= INFINITE * size:
+            raise ValueError(
+                "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
+                "infinite; leave out this speed"
+            )
+        return np.asarray(X[:, : 2 * k, 0])
+
+    def response(self, speeds: ArrayLike, unbalance: Mapping[int, complex] | None = None) -> fem.Response:
+        """Synchronous vibration of all nodes, as `fem.unbalance_response` gives that of a rotor.
 
         Parameters
         ----------
         speeds
             rad/s, one or many; tables of supports are read there.
+        unbalance
+            m e e^{iβ} by node, kg·m, β with the rotation; by default the model's own.
 
         Returns
         -------
-        W, m per kg·m, shape (S, 2 n, n): x, then y at the n masses (`massive`) is Re(W U e^{iΩt}) for the
-        unbalance U (kg·m, complex, phase with the rotation) at the mass of the column: f_x is
-        Re(U Ω² e^{iΩt}), f_y Im of it.
+        Its `rotor` is this model.
 
         Raises
         ------
         ValueError
-            For impossible speeds, outside the table of a support, or exactly at an undamped critical speed.
+            For impossible speeds, outside the table of a support, or exactly at an undamped critical speed;
+            without unbalance, and for a model with forces that are not linear.
         """
-        omega, Q = checked_speeds(speeds), self.equations()
-        D, K = Q.at(omega)
-        in_x = np.flatnonzero(self.masses > 0)
-        in_y, n = len(self.nodes) + in_x, in_x.size
-        loads = np.zeros((len(omega), Q.size, n), dtype=complex)
-        loads[:, in_x, np.arange(n)], loads[:, in_y, np.arange(n)] = 1.0, -1j
-        w = omega[:, None, None]
-        try:
-            X = np.linalg.solve(K - w * w * Q.M + 1j * w * D, loads)
-        except np.linalg.LinAlgError:
-            X = np.full_like(loads, np.inf)
-        if not np.abs(X).max() * np.abs(K).max() < INFINITE:
+        if self.forces:
             raise ValueError(
-                "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
-                "infinite; leave out this speed"
+                "forces that are not linear act on this model: `rotorid motion` follows it, or `rotorid "
+                "bearings --output` writes it with their linear coefficients"
             )
-        return np.asarray(w * w * X[:, np.concatenate((in_x, in_y))])
+        omega, k = checked_speeds(speeds), len(self.nodes)
+        if not (mounted := dict(self.unbalance if unbalance is None else unbalance)):
+            raise ValueError("no unbalance is given: name at least one node")
+        grows = fem.windows_of(self.whirl(self._range(omega.min(), omega.max())))
+        windows = tuple(one for one in grows if any(one.first <= w <= one.last for w in omega))
+        bent = ("the bow of the model is left out: `rotorid motion` has it",) * bool(self.bow)
+        warnings = (*self.warnings, *bent, *(window.sentence() for window in windows))
+
+        def at(speeds: FloatArray) -> fem.Response:
+            X = self.deflections(speeds, mounted)
+            x, y = X[:, :k], X[:, k:]
+            F, b, nodes = (x + 1j * y) / 2, (x - 1j * y) / 2, np.array(self.nodes)
+            size = np.abs(F) + np.abs(b)
+            largest = size.max(axis=1), nodes[size.argmax(axis=1)]
+            return fem.Response(
+                *(speeds, F, mounted, cast(fem.Rotor, self), warnings, b, *largest, nodes, at, windows)
+            )
+
+        return at(omega)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; the file of the model has the rest."""
