@@ -237,7 +237,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     if options.keep_supports:
         model = keep_supports(whole, places, result.masses.solution, modal_damping=reduced.damping)
         reduced = dataclasses.replace(reduced, small=model, keeps_supports=True)
-    return _beside(reduced, machine, options, at)
+    return _beside(reduced, machine, options)
 
 
 def _places(
@@ -322,15 +322,13 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
     return result, (Path(options.compliance), Path(options.measured))
 
 
-def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
+def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions) -> ReducedRotor:
     """With other methods, response and stability as asked for."""
     from rotorid.reduction import compare_methods, compare_response, compare_stability
 
-    places = [int(node) for node in reduced.result.nodes]
-    how: dict[str, Any] = {"normalise": options.normalise, "rows": options.rows, "speed": at}
     beside: dict[str, Any] = {}
     if options.methods:
-        beside["methods"] = compare_methods(rotor, places, modes=reduced.result.modes, **how)
+        beside["methods"] = compare_methods(reduced.result)
     stable = band(options.stability, "--stability")
     if reduced.damping or options.response is not None or stable is not None:
         reduced = reduced.with_small()

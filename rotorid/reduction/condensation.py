@@ -18,7 +18,7 @@ Sources: R. J. Guyan, AIAA J. 3 (1965) 380; J. O'Callahan, Proc. 7th IMAC (1989)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,24 +26,14 @@ import numpy as np
 
 import fem
 from fem import Pencil, whole_rotor
-from fem.assembly import assemble, ignored_inertia, multiply
+from fem.assembly import assemble, multiply
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.result import Column, text
 from rotorid.base.text import counted, percent
-from rotorid.reduction.masses import (
-    Normalisation,
-    RowWeights,
-    design,
-    equivalent_masses,
-    like,
-    mac,
-    mass_nodes,
-    natural_frequencies,
-    plane_at_rest,
-)
+from rotorid.reduction.masses import like, mac
+from rotorid.reduction.reduce import Reduction
 
 MASSLESS = 1e-12
 """Of the largest eigenvalue of Guyan's mass matrix: below, some motion of the masters moves no mass."""
@@ -150,7 +140,7 @@ class Methods(Answered):
     Attributes
     ----------
     rotor
-        The rotor; its plane x at rest is reduced.
+        The plane x of the rotor at rest.
     nodes
         Masters, n of them.
     rotor_frequencies
@@ -166,19 +156,6 @@ class Methods(Answered):
     rotor_frequencies: FloatArray
     rows: tuple[Method, ...]
     warnings: tuple[str, ...]
-
-    def row(self, name: str) -> Method:
-        """The model of one method; "regression" is the regression however many modes it used.
-
-        Raises
-        ------
-        ValueError
-            For a method that was not compared.
-        """
-        for row in self.rows:
-            if row.name.split(",")[0] == name.split(",")[0]:
-                return row
-        raise ValueError(f"no method {name!r}: there are {', '.join(row.name for row in self.rows)}")
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
@@ -222,29 +199,13 @@ class Methods(Answered):
         )
 
 
-def compare_methods(
-    rotor: fem.Rotor,
-    nodes: Sequence[str | int],
-    *,
-    modes: int = 2,
-    speed: float | None = None,
-    normalise: Normalisation = "first",
-    rows: RowWeights = "equal",
-) -> Methods:
-    """Reduce a rotor to the deflections of the same nodes by Guyan's method, IRS and formula (50).
+def compare_methods(reduction: Reduction) -> Methods:
+    """Reduce a rotor to the deflections of the same nodes by Guyan's method and IRS, beside formula (50).
 
     Parameters
     ----------
-    rotor
-        On supports; its plane x at rest is reduced.
-    nodes
-        Masters: different nodes, as numbers from 1 or names of stations.
-    modes
-        How many modes the regression uses, 1 … n.
-    speed
-        Where tables of supports are read, rad/s; by default their lowest common speed.
-    normalise, rows
-        Scaling of shapes and weights of rows of the regression, as in `equivalent_masses`.
+    reduction
+        Of a rotor, by its computed modes; of its plane x at rest.
 
     Returns
     -------
@@ -254,52 +215,44 @@ def compare_methods(
     Raises
     ------
     ValueError
-        For nodes that do not exist or repeat, more masters than the rotor has modes, a rotor that is free
-        to move, a speed outside a table, or a number of modes out of range.
+        For a reduction without a rotor, or a support of negative stiffness.
 
     Examples
     --------
     >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
     >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
-    >>> model = compare_methods(shaft, [3], modes=1).row("Guyan")
+    >>> model = compare_methods(reduce(shaft, [3], modes=1)).rows[0]
     >>> model.M.round(2), model.relative_error.round(4)
     (array([[7.5]]), array([0.0075]))
     """
-    places = mass_nodes(rotor, nodes)
-    n, modes = len(places), whole(modes, "the number of modes")
-    if not 1 <= modes <= n:
-        raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
-    weights: dict[str, Any] = {"normalise": normalise, "rows": rows}
-    design(np.eye(n), np.ones(modes), np.ones((n, modes)), **weights)  # refuses wrong choices
-    plane, remarks = plane_at_rest(rotor, speed)
-    alpha = fem.compliance(plane, places)  # refuses a rotor that is free, or a mesh lost in float64
-    full = fem.critical_speeds(plane, n)
-    at_masters = full.shapes[np.array(places) - 1]
-    pencil = whole_rotor(plane, assemble(plane))
-    static, carried = static_shapes(pencil.stiffness, pencil.waves[0][np.array(places) - 1])
-    used = full.frequencies[:modes], at_masters[:, :modes]
-    models: dict[str, Callable[[], _Model]] = {
-        "Guyan": lambda: _ritz(pencil, static),
-        "IRS": lambda: _ritz(pencil, _improved(pencil, static, carried)),
-        f"regression, {counted(modes, 'mode')}": lambda: _regression(places, alpha, *used, **weights),
+    full, masses = reduction.rotor_modes, reduction.masses.solution
+    if full is None:
+        raise ValueError("methods are compared at a rotor, not at measured modes alone")
+    places = np.array(reduction.nodes, dtype=int)
+    n, at_masters = len(places), full.shapes[places - 1]
+    pencil = whole_rotor(full.rotor, assemble(full.rotor))
+    static, carried = static_shapes(pencil.stiffness, pencil.waves[0][places - 1])
+    motion = reduction.equations_of_motion
+    bad = [node for node, m in zip(reduction.nodes, masses, strict=True) if m <= 0][:1]
+    words = "".join(f"the mass at node {node} is not positive: no physical model" for node in bad)
+    try:
+        improved = _ritz(pencil, _improved(pencil, static, carried))
+    except ValueError as failure:
+        improved = None, None, None, np.full(n, np.nan), np.full((n, n), np.nan), str(failure)
+    models: dict[str, _Model] = {
+        "Guyan": _ritz(pencil, static),
+        "IRS": improved,
+        f"regression, {counted(reduction.modes, 'mode')}": (
+            *(motion.M, motion.K, None, reduction.frequencies, reduction.shapes, words),
+        ),
     }
     table = []
-    for name, model in models.items():
-        try:
-            M, K, T, frequencies, shapes, reason = model()
-        except ValueError as failure:
-            M = K = T = None
-            frequencies, shapes, reason = np.full(n, np.nan), np.full((n, n), np.nan), str(failure)
+    for name, (M, K, T, frequencies, shapes, reason) in models.items():
         agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, at_masters)), np.nan)
         scaled, error = like(shapes, at_masters), frequencies / full.frequencies - 1
         table.append(Method(name, M, K, T, frequencies, scaled, error, agreement, reason))
-    warnings = (
-        *remarks,
-        *ignored_inertia(rotor),
-        *(warning for warning in full.warnings if warning not in ignored_inertia(plane)),
-        *(f"{row.name}: {row.reason}" for row in table if row.reason),
-    )
-    return Methods(rotor, places, full.frequencies, tuple(table), warnings)
+    warnings = tuple(f"{row.name}: {row.reason}" for row in table if row.reason)
+    return Methods(full.rotor, tuple(places.tolist()), full.frequencies, tuple(table), warnings)
 
 
 _Model = tuple[FloatArray | None, FloatArray | None, FloatArray | None, FloatArray, FloatArray, str]
@@ -334,20 +287,3 @@ def _ritz(pencil: Pencil, T: FloatArray) -> _Model:
     with np.errstate(divide="ignore", invalid="ignore"):
         frequencies = np.where(mu > 1e-15 * mu[0], 1 / np.sqrt(mu), np.nan)
     return M, K, T[pencil.waves[0]], frequencies, shapes, ""
-
-
-def _regression(
-    nodes: tuple[int, ...],
-    alpha: FloatArray,
-    omega: FloatArray,
-    U: FloatArray,
-    **weights: Any,  # noqa: ANN401
-) -> _Model:
-    """Formula (50)."""
-    estimate = equivalent_masses(alpha, omega, U, **weights)
-    if not estimate.full_rank:
-        raise ValueError(f"these modes do not determine the masses: {estimate.describe_rank()}")
-    masses, K = estimate.solution, np.linalg.inv(alpha)
-    bad = [node for node, m in zip(nodes, masses, strict=True) if m <= 0][:1]
-    words = [f"the mass at node {node} is not positive: no physical model; use others" for node in bad]
-    return np.diag(masses), (K + K.T) / 2, None, *natural_frequencies(alpha, masses), "".join(words)

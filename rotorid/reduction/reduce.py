@@ -18,6 +18,7 @@ import fem
 from fem.assembly import ignored_inertia
 from rotorid.base.answer import Answer, Answered, together
 from rotorid.base.arrays import FloatArray
+from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
@@ -484,6 +485,7 @@ def _reduced(
 ) -> Reduction:
     """The regression and its checks, whatever the inputs come from; other fields of the result."""
     n, most = len(places), min(len(places), len(omega))
+    modes = whole(modes, "the number of modes")
     if not 1 <= modes <= most:
         raise ValueError(f"{n} masses can use 1 … {most} modes; got {modes}")
     how = {key: others[key] for key in ("normalise", "rows", "nonnegative")}

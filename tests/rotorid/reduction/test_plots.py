@@ -74,7 +74,7 @@ def test_shapes_of_the_model_stand_on_those_of_the_rotor():
 
 
 def test_bars_of_the_methods_hold_errors_and_mac():
-    methods = compare_methods(rotor23(), (7, 12, 18))
+    methods = compare_methods(reduce(rotor23(), (7, 12, 18)))
     ax = plot_methods(methods)
     for i, row in enumerate(methods.rows):
         errors = np.array([bar.get_height() for bar in ax.containers[i]])
