@@ -25,8 +25,8 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.text import percent, sentence
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import percent
 from rotorid.reduction.small_model import SmallModel
 
 CLOSE = 0.08
@@ -35,8 +35,6 @@ POINTS, STEPS = 400, 40
 """Speeds of a response that are compared where none are given, and steps of a range for stability."""
 APART = 0.2
 """Relative difference of whirl frequencies at the thresholds that is named."""
-UNDAMPED = 1e-8
-"""A logarithmic decrement below this is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,33 +280,14 @@ class StabilityCost(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What the reduction costs, in words."""
-        lines = {"full rotor": self.full, f"{len(self.nodes)}-mass model": self.small}
-        return Answer(
-            sentence(self._verdict()),
-            warnings=self.warnings,
-            tables=("\n".join(fill(f"{name}: {each.sentence()}", COLUMNS) for name, each in lines.items()),),
-            more="both thresholds of stability",
+        """Both stabilities, and how far apart the thresholds are."""
+        apart = "" if self.relative_difference is None else f" ({100 * self.relative_difference:+.3g} %)"
+        disagree = "" if self.full.status == self.small.status else "The models DISAGREE. "
+        words = (
+            f"{disagree}Full rotor: {self.full.sentence()}.\n{len(self.nodes)}-mass model: "
+            f"{self.small.sentence()}{apart}."
         )
-
-    def _verdict(self) -> str:
-        where, apart = f"from {range_text(self.speeds[0], self.speeds[-1])}", self.relative_difference
-        if self.full.status == self.small.status == "stable":
-            decrements = np.nan_to_num((self.full_decrement, self.small_decrement))
-            if np.abs(decrements).max() < UNDAMPED:
-                return f"no damping acts on either model {where}: no motion grows, and none decays"
-            return f"both models are stable {where}"
-        words = {
-            "stable": f"is stable {where}",
-            "unstable": f"is unstable already at {rpm_text(self.speeds[0])}",
-        }
-        full, small = (
-            words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
-            for each in (self.full, self.small)
-        )
-        away = "" if apart is None else f": {100 * apart:+.3g} %"
-        disagree = "" if self.full.status == self.small.status else "the models disagree: "
-        return f"{disagree}the full rotor {full}, the small model {small}{away}"
+        return Answer(words, warnings=self.warnings)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""

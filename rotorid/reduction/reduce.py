@@ -410,7 +410,7 @@ def reduce(  # noqa: PLR0913
     modes_of = full.frequencies, shapes
     if measured is not None:
         modes_of = _modes(measured, n)
-        remarks += _other_modes(*modes_of, full.frequencies, shapes, places)
+        remarks += _other_modes(*modes_of, full.frequencies, shapes)
     remarks += ignored_inertia(rotor)
     remarks += [warning for warning in full.warnings if warning not in ignored_inertia(full.rotor)]
     return _reduced(
@@ -513,28 +513,24 @@ def _reduced(
     )
     bound = how["nonnegative"] and not estimate.solution.all()
     drawn = _errors_by_draws(result, errors) if errors is not None and not bound else None
-    warnings = (*result.warnings, *_warnings(result, errors))
+    warnings = (*result.warnings, *_warnings(result))
     return dataclasses.replace(result, errors=drawn, warnings=warnings)
 
 
-def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
-    """Masses at their bound or not positive, modes of other shape, an ill-conditioned regression."""
+def _warnings(result: Reduction) -> list[str]:
+    """Masses that are not positive; or at their bound, too heavy, other modes, a shaky regression."""
     warnings, masses = [], result.masses
-    wrong = [
-        f"{mass:.4g} kg at node {node}"
-        for node, mass in zip(result.nodes, masses.solution, strict=True)
-        if mass <= 0
-    ]
-    if wrong and result.nonnegative:
-        more = "" if errors is None else ", and what the stated errors do was not computed"
-        warnings.append(
-            f"at the bound 0, the modes ask for less than nothing there: {', '.join(wrong)}; the standard "
-            f"deviations of the others hold this fixed{more}; leave these places out"
-        )
-    elif wrong:
-        warnings.append(
-            f"a mass is not positive, {', '.join(wrong)}: no physical model; use other nodes, more modes, or "
+    pairs = zip(result.nodes, masses.solution, strict=True)
+    wrong = ", ".join(f"{mass:.4g} kg at node {node}" for node, mass in pairs if mass <= 0)
+    if wrong and not result.nonnegative:
+        return [
+            f"a mass is not positive, {wrong}: no physical model; use other nodes, more modes, or "
             "--nonnegative"
+        ]
+    if wrong:
+        warnings.append(
+            f"at the bound 0, the modes ask for less than nothing there: {wrong}; the standard deviations of "
+            "the others hold this fixed, and those by stated errors are not computed; leave these places out"
         )
     total = np.inf if result.rotor is None else result.rotor.total_mass
     if (together_kg := float(masses.solution.sum())) > HEAVY * total:
@@ -550,8 +546,8 @@ def _warnings(result: Reduction, errors: InputErrors | None) -> list[str]:
     ]
     if far:
         warnings.append(
-            f"the model is far off: {'; '.join(far)}; do not rely on these frequencies and shapes, use other "
-            "nodes or more masses"
+            f"the model is far off: {'; '.join(far).replace('by +nan %', 'does not vibrate')}; do not rely "
+            "on these frequencies and shapes, use other nodes or more masses"
         )
     if masses.condition_number > BADLY:
         warnings.append(
@@ -567,11 +563,9 @@ def _other_modes(
     measured: FloatArray,
     rotor_omega: FloatArray,
     computed: FloatArray,
-    places: tuple[int, ...],
 ) -> list[str]:
     """What to say where the measured rotor is not that of the model: frequencies, then shapes."""
-    remarks = []
-    agreement, turn = mac(measured, computed), 1.0 - 2.0 * np.eye(len(places))
+    remarks, agreement = [], mac(measured, computed)
     for k, (f, g) in enumerate(zip(omega.tolist(), rotor_omega.tolist(), strict=False)):
         if abs(f / g - 1) > APART:
             remarks.append(
@@ -579,15 +573,11 @@ def _other_modes(
                 f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
             )
         if agreement[k, k] < ALIKE:
-            best, turned = int(agreement[k].argmax()), mac(turn * measured[:, [k]], computed[:, [k]])
-            hint = ""
-            if agreement[k, best] >= ALIKE:
-                hint = f" but of its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing?"
-            elif turned.max() >= ALIKE:
-                hint = f": is its sign at node {places[int(turned.argmax())]} right?"
+            best = int(agreement[k].argmax())
             remarks.append(
-                f"the shape of measured mode {k + 1} is not that of the rotor's (MAC "
-                f"{agreement[k, k]:.2f}){hint}"
+                f"the shape of measured mode {k + 1} is not that of the rotor's (MAC {agreement[k, k]:.2f}); "
+                f"nearest is its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing, or a "
+                "sign wrong?"
             )
     return remarks
 
@@ -602,56 +592,38 @@ def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, F
     return omega, shapes
 
 
-def _recomputed(result: Reduction, changes: FloatArray) -> FloatArray:
-    """Masses and frequencies, (S, 2, n), with the inputs changed by relative `changes`, (S, P)."""
+def _errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
+    """What stated errors do, by recomputed draws; NaN where a mode is lost in some of them."""
     n, k = len(result.nodes), result.modes
     i, j = np.triu_indices(n)
-    a, w, u, c = np.split(changes, np.cumsum([len(i), k, n * k]), axis=1)
-    factors = np.ones((len(changes), n, n))
-    factors[:, i, j] = factors[:, j, i] = 1 + a
-    alpha, springs = result.compliance * factors, result.seal_stiffness * (1 + c)
-    shapes = result.rotor_shapes[:, :k] * (1 + u.reshape(-1, n, k))
-    how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
-    B, D = design(alpha, result.rotor_frequencies[:k] * (1 + w), shapes, seal_stiffness=springs, **how)
-    masses, _ = solve_many(B, D)
-    out = np.full((len(changes), 2, n), np.nan)
-    fine = np.isfinite(masses).all(axis=1)
-    omega, _ = natural_frequencies(alpha[fine], masses[fine], seal_stiffness=springs[fine])
-    out[fine] = np.stack((masses[fine], omega), axis=1)
-    return out
-
-
-def _deviations(result: Reduction, errors: InputErrors) -> FloatArray:
-    """Relative standard deviation of every input, (P,)."""
-    n, k = len(result.nodes), result.modes
-    sizes = {
-        "compliance": (n * (n + 1) // 2,),
-        "frequencies": (k,),
-        "shapes": (n, k),
-        "seal_stiffness": (n,),
-    }
-    parts = []
+    sizes = {"compliance": (i.size,), "frequencies": (k,), "shapes": (n, k), "seal_stiffness": (n,)}
+    sigma = []
     for name, shape in sizes.items():
-        given = np.asarray(getattr(errors, name))
+        given = np.asarray(getattr(stated, name))
         if given.shape not in ((), shape):
             raise ValueError(f"errors of {name} must be one number or have shape {shape}; got {given.shape}")
         full = np.array(np.broadcast_to(given, shape))
         if name == "shapes" and given.ndim == 0 and result.normalise == "first":
             full[0] = 0.0
-        parts.append(full.ravel())
-    return np.concatenate(parts)
-
-
-def _errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
-    """What stated errors do, by recomputed draws; NaN where a mode is lost in some of them."""
-    sigma = _deviations(result, stated)
-    changes = np.random.default_rng(0).normal(size=(DRAWS, sigma.size)) * sigma
-    exact, *draws = _recomputed(result, np.concatenate((np.zeros((1, sigma.size)), changes)))
-    low, high = np.quantile(draws, (0.15866, 0.84134), axis=0)  # NaN where any draw is
-    std = (high - low) / 2
+        sigma.append(full.ravel())
+    parts, ends = np.concatenate(sigma), np.cumsum([*map(len, sigma)])
+    drawn = 1 + np.random.default_rng(0).normal(size=(DRAWS, ends[-1])) * parts
+    a, w, u, c = np.split(drawn, ends[:-1], axis=1)
+    factors = np.ones((DRAWS, n, n))
+    factors[:, i, j] = factors[:, j, i] = a
+    alpha, springs = result.compliance * factors, result.seal_stiffness * c
+    shapes = result.rotor_shapes[:, :k] * u.reshape(-1, n, k)
+    how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
+    B, D = design(alpha, result.rotor_frequencies[:k] * w, shapes, seal_stiffness=springs, **how)
+    masses, _ = solve_many(B, D)
+    omega = np.full_like(masses, np.nan)
+    if np.isfinite(masses).all():
+        omega, _ = natural_frequencies(alpha, masses, seal_stiffness=springs)
+    low, high = np.quantile((masses, omega), (0.15866, 0.84134), axis=1)  # NaN where any draw is
+    std, exact = (high - low) / 2, (result.masses.solution, result.frequencies)
     warnings = [
-        f"the stated errors do not determine {NAMES[i]}{j + 1}: it may be off by as much as it is, or drawn "
-        "masses are not positive"
-        for i, j in np.argwhere(~(std < np.abs(exact)))
+        f"the stated errors do not determine {NAMES[row]}{column + 1}: it may be off by as much as it is, or "
+        "drawn masses are not positive"
+        for row, column in np.argwhere(~(std < np.abs(exact)))
     ]
     return MassErrors(std[0], std[1], tuple(warnings))

@@ -441,10 +441,10 @@ def condense(rotor: fem.Rotor, kept: tuple[int, ...], masses: Mapping[int, float
     """The small model whose nodes are these, with masses, kg, at some of them."""
     for place, mass in masses.items():
         if not (np.isfinite(mass) and mass > 0):
+            way = "leave out this node" if mass == 0 else "use other nodes, more modes, or --nonnegative"
             raise ValueError(
                 f"the mass at node {place} is {mass:.4g} kg, not positive: a physical model needs positive "
-                "masses, use other nodes or more modes, or non-negative least squares, and leave out nodes "
-                "without mass"
+                f"masses; {way}"
             )
     linear, k = rotor.linear, len(kept)
     A = assemble(linear)

@@ -148,7 +148,8 @@ def test_cross_coupling_at_the_limit(factor, status):
     q = factor * damping * CRITICAL
     cost = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), damping, kind="seal")), 500.0)
     assert cost.full.status == cost.small.status == status
-    assert ("Both models are stable" in cost.summary()) == (status == "stable")
+    assert cost.summary().startswith(f"Full rotor: {status}")
+    assert f"\n1-mass model: {status}" in cost.summary()
 
 
 @pytest.mark.parametrize("part", [0.3, 0.5, 0.8])
@@ -250,10 +251,7 @@ def test_undamped_is_not_unstable():
     assert cost.full.status == cost.small.status == "stable"
     assert cost.small.threshold is None
     assert cost.relative_difference is None
-    assert cost.answer.judgement == (
-        "No damping acts on either model from 0 to 9549.3 rpm (0 to 1000 rad/s): no motion grows, and none "
-        "decays."
-    )
+    assert np.abs([cost.full_decrement, cost.small_decrement]).max() < 1e-8
 
 
 def test_unstable_from_the_start():
@@ -261,9 +259,7 @@ def test_unstable_from_the_start():
     cost = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), 10.0, kind="seal")), 500.0)
     assert cost.small.status == "unstable"
     assert cost.small.direction == 1
-    assert (
-        "The full rotor is unstable already at 0 rpm, the small model is unstable already" in cost.summary()
-    )
+    assert cost.summary().count(": unstable already at 0 rad/s") == 2
     away = stability_threshold(jeffcott(fem.Support(2, -2 * STIFFNESS, 10.0, kind="seal")), 500.0)
     assert (away.status, away.mode) == ("unstable", None)
 
@@ -280,8 +276,8 @@ def test_disagreement_is_said():
     calm = small_rotor(rotor, (7, 12, 18), [89.0, 196.0, 198.0], modal_damping=(0.3, 0.3, 0.3))
     second = dataclasses.replace(first, small=stability_threshold(calm, 500.0))
     assert second.small.status == "stable"
-    assert "The models disagree: the full rotor is unstable already at 0 rpm" in second.summary()
-    assert "the small model is stable from 0 to 4774.65 rpm" in second.answer.judgement
+    assert second.summary().startswith("The models DISAGREE. Full rotor: unstable already at 0 rad/s")
+    assert "3-mass model: stable from 0 to 500 rad/s" in second.answer.judgement
 
 
 def test_other_mode_is_said():

@@ -139,6 +139,8 @@ def test_both_responses_and_their_difference_over_speed():
     assert legend_of(ax) == ["full rotor", "2-mass model", "left out, ±10 % of a critical speed"]
     assert "µm per g·mm" in ax.get_ylabel()
     below = ax.figure.axes[1]
+    # nothing is drawn that neither legend nor axes name, such as a line at a limit
+    assert (len(ax.get_lines()), len(below.get_lines())) == (2, 1)
     difference = curves_of(below)[0]
     np.testing.assert_allclose(difference.get_ydata(), 3.0 * cost.speeds[1:] / 300.0, rtol=1e-9)
     np.testing.assert_allclose(difference.get_xdata(), RPM * cost.speeds[1:])

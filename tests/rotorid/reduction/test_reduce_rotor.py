@@ -1,5 +1,7 @@
 """Reductions of the rotor of [S] task 9.1 by formula (50), with full-precision inputs."""
 
+import re
+
 import numpy as np
 import pytest
 from book_task_9 import (
@@ -15,6 +17,7 @@ from rotorid.reduction import (
     natural_frequencies,
     reduce,
     reduce_measured,
+    small_model,
 )
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
@@ -229,9 +232,24 @@ def test_the_plane_at_rest_of_an_anisotropic_gyroscopic_rotor():
 def test_a_mode_of_another_shape_is_said(rotor):
     result = reduce(rotor, [7, 12, 18], 2)
     assert not any("MAC" in text for text in result.warnings)
-    clumsy = reduce(rotor, [3, 4, 5], 3)
+    clumsy = reduce(rotor, [9, 10, 19], 3)
     low = clumsy.mac < 0.9
     assert low.any()
+    assert "MAC 0.01" in " ".join(clumsy.warnings)
     assert [f"mode {k + 1} by " in " ".join(clumsy.warnings) for k in range(3)] == (
         low | (np.abs(clumsy.relative_error) > 0.1)
     ).tolist()
+
+
+def test_masses_that_are_not_positive_say_what_to_do(rotor):
+    """Modes that ask for less than nothing: one warning with the way out."""
+    wrong = reduce(rotor, [6, 7, 12], 2)
+    (warning,) = wrong.warnings
+    assert re.match(r"a mass is not positive, -25\d\d kg at node 7: .* --nonnegative$", warning)
+    bounded = reduce(rotor, [6, 7, 12], 2, nonnegative=True)
+    assert "at the bound 0" in bounded.warnings[0]
+    assert "mode 2 does not vibrate" in bounded.warnings[1]
+    assert "nan" not in bounded.summary()
+    for result, way in ((wrong, "or --nonnegative"), (bounded, "leave out this node")):
+        with pytest.raises(ValueError, match=way):
+            small_model(rotor, [6, 7, 12], result.masses.solution)
