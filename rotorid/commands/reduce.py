@@ -73,8 +73,6 @@ class ReduceOptions:
         With a table of compliance: springs to the ground that it does not hold, N/m, 12=2e6.
     errors : LIST
         Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.
-    what_if : LIST
-        What changes of inputs do, in percent: alpha12=1.3,U31=-0.3.
     speed : SPEED
         Of tables of bearings and seals, and of the small model, such as 3000rpm; default: the lowest of the
         tables.
@@ -111,7 +109,6 @@ class ReduceOptions:
     compliance: Path | str | None = None
     seals: str | Mapping[str, float] | None = None
     errors: str | Mapping[str, float] | None = None
-    what_if: str | Mapping[str, float] | None = None
     speed: str | float | None = None
     rank: bool = False
     candidates: Nodes | None = None
@@ -158,10 +155,7 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     log.info("rank = %s", solved.rank)
     log.info("degrees_of_freedom = %s", solved.dof)
     log.info("singular_values = %s", ", ".join(f"{value:.6g}" for value in solved.singular_values))
-    if options.what_if is None:
-        return reduced
-    changes = shares(options.what_if, "--what-if", "alpha12=1.3")
-    return dataclasses.replace(reduced, shift=reduced.result.what_if(changes))
+    return reduced
 
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
@@ -243,7 +237,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     if options.keep_supports:
         model = keep_supports(whole, places, result.masses.solution, modal_damping=reduced.damping)
         reduced = dataclasses.replace(reduced, small=model, keeps_supports=True)
-    return _beside(reduced, machine, options, at)
+    return _beside(reduced, machine, options)
 
 
 def _places(
@@ -328,15 +322,13 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
     return result, (Path(options.compliance), Path(options.measured))
 
 
-def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
+def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions) -> ReducedRotor:
     """With other methods, response and stability as asked for."""
     from rotorid.reduction import compare_methods, compare_response, compare_stability
 
-    places = [int(node) for node in reduced.result.nodes]
-    how: dict[str, Any] = {"normalise": options.normalise, "rows": options.rows, "speed": at}
     beside: dict[str, Any] = {}
     if options.methods:
-        beside["methods"] = compare_methods(rotor, places, modes=reduced.result.modes, **how)
+        beside["methods"] = compare_methods(reduced.result)
     stable = band(options.stability, "--stability")
     if reduced.damping or options.response is not None or stable is not None:
         reduced = reduced.with_small()
@@ -378,18 +370,13 @@ def input_errors(
         stated["frequencies"] = data.frequency_std[:modes]
     if data is not None and data.shape_std is not None:
         stated["shapes"] = data.shape_std[:, :modes]
-    for name, value in shares(given or {}, "--errors", "compliance=1.3,shapes=1").items():
+    for name, value in numbers(given or {}, "--errors", "compliance=1.3,shapes=1", 100.0).items():
         if not 0 <= value < 1:
             raise ValueError(
                 f"--errors: {name}={100 * value:g} is no standard deviation from 0 to 100 percent"
             )
         stated[one_of(name, "--errors", ERRORS)] = value
     return InputErrors(**stated) if stated else None
-
-
-def shares(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:
-    """Read "alpha12=1.3,U31=-0.3", in percent, as shares; numbers in a mapping are shares."""
-    return numbers(given, what, example, 100.0)
 
 
 def damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         Placement,
         Reduction,
         ResponseCost,
-        Shift,
         SmallModel,
         StabilityCost,
     )
@@ -41,7 +40,7 @@ class ReducedRotor(Parts):
     ----------
     result
         The masses.
-    placement, methods, response, stability, shift
+    placement, methods, response, stability
         What was asked for beside them.
     small
         The model in both planes, with supports, forces and what turns, couples and damps.
@@ -58,7 +57,6 @@ class ReducedRotor(Parts):
     methods: Methods | None = None
     response: ResponseCost | None = None
     stability: StabilityCost | None = None
-    shift: Shift | None = None
     small: SmallModel | None = None
     keeps_supports: bool = False
     damping: Sequence[float] = ()
@@ -71,7 +69,6 @@ class ReducedRotor(Parts):
         """The masses, and what was asked for beside them."""
         return {
             "": self.result,
-            "what_if": self.shift,
             "placement": self.placement,
             "methods": self.methods,
             "response": self.response,
@@ -100,10 +97,9 @@ class ReducedRotor(Parts):
 
         parts = (self.stability, self.response, self.methods, self.placement, self.result)
         part: Any = next(part for part in parts if part is not None)
-        ratios = (1, 1) if part is self.methods else (3, 2)
-        two = part is self.methods or part is self.response
+        two = part is self.response
         figure = new_figure(6.2 if two else 5.0)
-        pair = [*figure.subplots(2, sharex=True, height_ratios=ratios)] if two else figure.add_subplot()
+        pair = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
         plot(part, pair)
         return figure
 

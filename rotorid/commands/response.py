@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 from rotorid.base.json import cell
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, figures, listing
-from rotorid.commands.input_checks import file_of, rotor_source
+from rotorid.base.text import counted, error_figures, figures, listing
+from rotorid.commands.input_checks import file_of
+from rotorid.commands.moving import moving
 from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import (
     Band,
@@ -33,8 +34,11 @@ if TYPE_CHECKING:
 
     from fem import Peak, Peaks, Response, Rotor, SensorLike, Unbalance
     from rotorid.base.arrays import AnyArray, FloatArray
+    from rotorid.reduction import SmallModel
 
 STANDARD_GRAVITY = 9.80665  # m/s²
+_AROUND = (0.0, *(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3)))
+"""Relative distances from a critical speed of a small model at which its response is computed."""
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (
@@ -107,8 +111,10 @@ class Vibration:
             **errors,
             "orbits": self._orbits(),
             "largest": [
-                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
-                for name, (size, speed) in zip(self.labels, readings, strict=True)
+                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed} | std
+                for name, (size, speed), std in zip(
+                    self.labels, readings, self._std_of(readings), strict=True
+                )
             ],
             "bearing_forces": {
                 **self.response.bearing_forces().to_dict(),
@@ -163,13 +169,25 @@ class Vibration:
         """The largest reading of each sensor."""
         where = self._largest(self.finer.readings(self.sensors))
         sizes = [None if size is None else 1e6 * size for size, _ in where]
+        key = "amplitude_std_m"
+        stds = [1e6 * std[key] for std in self._std_of(where) if std]
         columns = (
             Column("sensor", self.labels),
             Column("largest reading, µm peak", sizes, figures, "largest.*.amplitude_m", 1e6),
+            *([Column("±", stds, error_figures, f"largest.*.{key}", 1e6)] if stds else []),
             Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), "largest.*.amplitude_m", 2e6),
             Column("at rpm", _rpm(where), "{:.1f}".format, "largest.*.speed_rad_s", RPM),
         )
         return Table("largest readings", columns)
+
+    def _std_of(self, largest: Sequence[tuple[float | None, float | None]]) -> list[dict[str, float]]:
+        """Deviation of the largest amplitude of each sensor by its key in the document; empty if unknown."""
+        if self.std is None:
+            return [{}] * len(largest)
+        rows = [None if speed is None else self.finer.speeds.searchsorted(speed) for _, speed in largest]
+        return [
+            {} if row is None else {"amplitude_std_m": float(self.std[row, k])} for k, row in enumerate(rows)
+        ]
 
     def forces(self) -> tuple[Table, ...]:
         """The largest force on each support."""
@@ -228,7 +246,7 @@ class Vibration:
             "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
             "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
         }
-        others = ("bode", "shape") if finer.steady.any() else ("bode",)
+        others = ("bode", "shape") if finer.steady.any() and self.drawn else ("bode",)
         return dict(draw[name] for name in (view, *others))
 
     def shape_figure(self, at: int | None) -> Figure:
@@ -279,6 +297,13 @@ class Vibration:
         if question:
             return f"{first}NOT KNOWN whether all are far enough {beside}: {question}."
         return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it is a rotor's, not a small model's."""
+        from fem import Rotor
+
+        return isinstance(self.response.rotor, Rotor)
 
     @property
     def labels(self) -> list[str]:
@@ -390,7 +415,9 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
 
 @command
 def response(
-    rotor: Rotor | Path | str, unbalance: Unbalance | Path | str, options: ResponseOptions
+    rotor: Rotor | SmallModel | Path | str,
+    unbalance: Unbalance | Path | str,
+    options: ResponseOptions,
 ) -> Outcome:
     """Vibration under unbalance: readings, orbits, bearing forces, peaks after API 684.
 
@@ -400,12 +427,13 @@ def response(
 
     Parameters
     ----------
-    rotor : ROTOR
-        Rotor table (.csv, .xlsx) or rotor file (.toml).
-    unbalance : FILE|api
+    rotor : MODEL
+        Rotor table (.csv, .xlsx), rotor file (.toml) or small model (.toml).
+    unbalance : FILE|api|own
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg. Or api: 4 W/N of API 617 (7th
         edition, 2002), 6350 g·mm·rpm/kg, at the mid span, W the load of the journals, N the highest operating
-        speed (or speed); api:2 doubles it; api@8,-16 puts it at planes, - at 180°, W of the next journal.
+        speed (or speed); api:2 doubles it; api@8,-16 puts it at planes, - at 180°, W of the next journal. Or
+        own: that in the file of a small model.
     options
         The speeds, and what differs from the defaults.
 
@@ -414,44 +442,40 @@ def response(
     ValueError
         For a rotor, an unbalance or an option that cannot be.
     """
-    import numpy as np
-
     import fem
-    from fem import as_sensor
-    from fem.parameters import band as error_band
     from rotorid.commands.operating_range import critical_peaks
     from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 
-    model, files = rotor_source(rotor)
-    operating = band(options.operating)
-    places = _places(model, options.sensors)
-    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
-    kept |= dict.fromkeys(support.node for support in model.supports)
+    source = moving(rotor)
+    model, files, operating = source.model, source.files, band(options.operating)
     speeds = rising_speeds(options.speeds)
     highest, asked, standard = operating[1] if operating else speeds[-1], {}, ""
     if isinstance(unbalance, str) and re.match("api(:|@|$)", unbalance):
+        if not isinstance(model, fem.Rotor):
+            raise ValueError(f"--unbalance {unbalance} follows from the journals of a rotor: give a table")
         asked, standard = {"unbalance": unbalance}, f"Unbalance after API 617 ({unbalance}): "
         unbalance = _api_unbalance(model, unbalance, speeds, highest)
         each = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
         standard += f"{listing(each, 'and')}, N = {rpm_text(highest)}."
+    elif unbalance == "own":
+        asked, unbalance = {"unbalance": unbalance}, getattr(model, "unbalance", {})
     elif not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
         table = file_of(unbalance, "unbalance by node or station,")
         files = (*files, table)
         unbalance = read_unbalance(table, model)
-    with phase(f"response at {counted(len(speeds), 'speed')}"):
-        coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
-    with phase("peaks"):
-        finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
-
-    def amplitudes(other: Rotor) -> FloatArray:
-        new = other is not model
-        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
-        return np.abs(again.readings(places))
-
-    std, doubts = error_band(model, "the amplitudes", amplitudes)
-    finer = dataclasses.replace(finer, warnings=(*finer.warnings, *doubts))
-    log_rotor(model, speeds=len(speeds))
+    if not unbalance:
+        raise ValueError(
+            "no unbalance is given: a table with --unbalance, or own of a small model that has it"
+        )
+    places = _places(model, options.sensors)
+    if isinstance(model, fem.Rotor):
+        coarse, finer, peaks, std = _of_rotor(model, unbalance, speeds, places, operating)
+    else:
+        if options.view == "shape":
+            raise ValueError("--view shape draws a rotor; a small model has nodes alone")
+        by_node = {model.node(node): amount for node, amount in unbalance.items()}
+        coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
     result = Vibration(
         response=dataclasses.replace(coarse, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
@@ -482,15 +506,88 @@ def response(
         ),
         pictures=result.pictures(options.view, at),
         title="Unbalance response",
-        rotor={"rotor": model, "planes": sorted(coarse.unbalance), "sensors": places, "meaning": "unbalance"},
+        rotor={
+            "rotor": model,
+            "planes": sorted(coarse.unbalance),
+            "sensors": places,
+            "meaning": "unbalance",
+        }
+        if result.drawn
+        else {},
         provenance=provenance(files, options, **asked),
     )
 
 
-def _places(rotor: Rotor, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
+_Answers = tuple["Response", "Response", "Sequence[Peaks]", "FloatArray | None"]
+"""At the speeds asked for; with speeds between them; peaks of each sensor; deviations of the amplitudes."""
+
+
+def _of_rotor(
+    model: Rotor,
+    unbalance: Unbalance,
+    speeds: Sequence[float],
+    places: Sequence[SensorLike],
+    operating: tuple[float, float] | None,
+) -> _Answers:
+    import numpy as np
+
+    import fem
+    from fem import as_sensor
+    from fem.parameters import band as error_band
+
+    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
+    kept |= dict.fromkeys(support.node for support in model.supports)
+    with phase(f"response at {counted(len(speeds), 'speed')}"):
+        coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
+    with phase("peaks"):
+        finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
+
+    def amplitudes(other: Rotor) -> FloatArray:
+        new = other is not model
+        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
+        return np.abs(again.readings(places))
+
+    std, doubts = error_band(model, "the amplitudes", amplitudes)
+    log_rotor(model, speeds=len(speeds))
+    return coarse, dataclasses.replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
+
+
+def _of_small_model(
+    model: SmallModel,
+    unbalance: Mapping[int, complex],
+    speeds: Sequence[float],
+    places: Sequence[SensorLike],
+    operating: tuple[float, float] | None,
+) -> _Answers:
+    """The same: its critical speeds say where between the speeds asked for peaks may be."""
+    import numpy as np
+
+    import fem
+
+    coarse = model.response(speeds, unbalance)
+    near = np.multiply.outer(model.critical_speeds(speeds[-1]), 1 + np.array(_AROUND))
+    added = near[(near > speeds[0]) & (near < speeds[-1])]
+    finer, peaks = coarse, []
+    if np.count_nonzero(speeds) > 2:
+        finer = model.response(np.union1d(speeds, added), unbalance)
+        peaks = [fem.response_peaks(finer, place, operating=operating) for place in places]
+        every = [peak for each in peaks for peak in each.peaks]
+        added = np.append(added, [peak.speed for peak in every])
+        # beside undamped peaks the amplitude has no limit and no meaning
+        undamped = np.array([peak.speed for peak in every if peak.undamped])
+        near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
+        finer = model.response(np.union1d(speeds, added[~near]), unbalance)
+    return coarse, finer, peaks, None
+
+
+def _places(rotor: Rotor | SmallModel, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
     """Where to read the vibration."""
     if given is not None:
         return sensors(given)
+    from fem import Rotor
+
+    if not isinstance(rotor, Rotor):
+        return rotor.nodes
     held = dict.fromkeys(support.node for support in rotor.supports)
     return [*rotor.stations] or [*held] or [*range(1, rotor.n_nodes + 1)]
 

@@ -13,6 +13,10 @@ from rotorid.commands.outcome import USUAL, Found, command, provenance
 from rotorid.commands.quantities import Nodes, nodes
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from balancing import Unbalance
+    from fem import Rotor
     from rotorid.base.registry import Method
     from rotorid.tables import Job
 
@@ -45,8 +49,55 @@ class UnbalanceOptions:
     to: ClassVar[Sequence[str]] = USUAL
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UnbalanceOfRun(Found):
+    """The unbalance, and the rotor that it stands in."""
+
+    rotor: Rotor
+
+    def figure(self) -> Figure:
+        """The unbalances over the rotor."""
+        return unbalance_figure(self.found, self.rotor)
+
+
+def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:
+    """The vectors of all stations with their regions, and below them the rotor with the stations.
+
+    Parameters
+    ----------
+    unbalance
+        At stations that are named as nodes or stations of the rotor.
+    rotor
+        The rotor.
+    """
+    from matplotlib.patches import ConnectionPatch
+
+    from balancing.plots import draw_unbalance
+    from fem import draw_rotor
+    from rotorid.base.plot_style import DARK, legend_below, new_figure
+
+    tall = min(7.0 / len(unbalance.stations), 3.0)
+    figure = new_figure(tall + 4.0)
+    above, below = figure.subplots(2, height_ratios=(tall + 1.0, 2.6))
+    draw_unbalance(unbalance, above)
+    draw_rotor(rotor, below)
+    if legend := below.get_legend():
+        legend.remove()
+        legend_below(figure, (below,), 3)
+    above.xaxis.tick_top()
+    above.xaxis.set_label_position("top")
+    bottom, top = above.get_ylim()[0], below.get_ylim()[1]
+    for place, name in zip(above.get_xticks(), unbalance.stations, strict=True):
+        at = rotor.positions[rotor.node(name) - 1]
+        line = ConnectionPatch((place, bottom), (at, top), "data", "data", axesA=above, axesB=below)
+        line.set(color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
+        figure.add_artist(line)
+        below.vlines(at, below.get_ylim()[0] / 2, top, color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
+    return figure
+
+
 @command
-def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
+def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceOfRun:
     """Unbalance along a rotor model, from the readings of one run, without trial weights.
 
     The model counts as exact: ± are those of the readings.
@@ -79,4 +130,4 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
         raise ValueError(f"--stations {options.stations!r}: every station may stand only once")
     influence = computed(read, 0.0, places)
     result = unbalance_of_run(influence, read.trials, method=options.method, ridge=options.ridge)
-    return Found(found=result, provenance=provenance(read.files, options))
+    return UnbalanceOfRun(found=result, rotor=read.rotor, provenance=provenance(read.files, options))

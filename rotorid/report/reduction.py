@@ -44,7 +44,6 @@ def reduce_report(
     parts = [
         _masses(document, result),
         *_uncertain(document),
-        *_what_if(document),
         *_if("methods", document, methods_part, results["methods"]),
         *_if("response", document, response_part, results["response"]),
         *_if("stability", document, stability_part, results["stability"]),
@@ -140,20 +139,6 @@ def _uncertain(document: Document) -> list[Part]:
     ]
     table = Grid("Uncertainty", below(*columns), "±: one standard deviation, of redrawn inputs.")
     return [Part("What errors of the inputs do", tables=(table,))]
-
-
-def _what_if(document: Document) -> list[Part]:
-    if "what_if" not in document:
-        return []
-    masses, frequencies = (
-        (
-            words("quantity", _names(document)[kind]),
-            document.column("change", f"what_if.{key}.*", 4, sign=True),
-        )
-        for kind, key in (("masses", "masses_kg"), ("natural_frequencies", "frequencies_rad_s"))
-    )
-    table = Grid("Change, kg and rad/s", below(masses, frequencies))
-    return [Part("What the asked change of inputs does", tables=(table,))]
 
 
 def _names(document: Document) -> dict[str, list[str]]:

@@ -44,7 +44,7 @@ def rotor_page(
     tables, pictures
         Those of the answer and the further ones; what draws each picture, by its caption.
     rotor
-        What `rotor_sheet` takes.
+        What `rotor_sheet` takes; empty for a model that cannot be drawn.
     """
     first, others = tables
     drawings = tuple(_drawing(draw, caption) for caption, draw in pictures.items())
@@ -56,7 +56,7 @@ def rotor_page(
         provenance=provenance,
         sentences=sentences,
         about=[("Rotor file", str(entry["file"])) for entry in provenance["inputs"][:1]],
-        rotor=rotor_sheet(**rotor),
+        rotor=rotor_sheet(**rotor) if rotor else None,
         parts=[
             Part("Result", (), tuple(first), drawings),
             *(Part("" if k else "Behind it", (), _narrow(table)) for k, table in enumerate(others)),

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from fem import SensorLike, Support
+    from rotorid.reduction import SmallModel
 
 
 @dataclass(frozen=True)
@@ -83,12 +84,17 @@ def place(rotor: Rotor, node: int) -> str:
     return f"{node} ({', '.join(names)})" if names else str(node)
 
 
-def unbalance_table(rotor: Rotor, unbalance: Mapping[int, complex]) -> Table:
+def unbalance_table(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
-    mounted = sorted(unbalance.items())
+    mounted, along = sorted(unbalance.items()), list[Column]()
+    names = [str(node) for node, _ in mounted]
+    if isinstance(rotor, Rotor):
+        names = [place(rotor, node) for node, _ in mounted]
+        positions = [rotor.positions[node - 1] for node, _ in mounted]
+        along = [Column("position, m", positions, "{:.6g}".format)]
     columns = (
-        Column("node", [place(rotor, node) for node, _ in mounted]),
-        Column("position, m", [rotor.positions[node - 1] for node, _ in mounted], "{:.6g}".format),
+        Column("node", names),
+        *along,
         Column("unbalance, g·mm", [1e6 * abs(u) for _, u in mounted], "{:.6g}".format),
         Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in mounted], "{:.6g}".format),
     )

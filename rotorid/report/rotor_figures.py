@@ -79,13 +79,11 @@ def reduction_picture(result: Reduction, words: str) -> Drawing:
 
 def methods_picture(methods: Methods) -> Drawing:
     """What methods of reduction lose, as hatched bars."""
-
-    def draw(figure: Figure) -> None:
-        from rotorid.reduction.plots import plot_methods
-
-        plot_methods(methods, list(figure.subplots(2, sharex=True)))
-
-    return sketch(5.2, draw, "What each method loses: errors of the frequencies, and 1 − MAC of the shapes.")
+    return sketch(
+        4.0,
+        lambda figure: plot(methods, figure.add_subplot()),
+        "What each method loses: errors of frequencies.",
+    )
 
 
 def running_picture(response: ResponseCost) -> Drawing:

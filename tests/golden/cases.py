@@ -227,7 +227,7 @@ MODEL_COMMANDS = f"""
 reduce-book                 reduce {ROTOR23} --nodes 7,12,18 --modes 2 --plot reduction.png
 reduce-rank                 reduce {ROTOR23} --rank --plot map.png
 reduce-everything           reduce {ROTOR23} --nodes 7,12,18 --methods --response auto --plot response.png
-reduce-errors               reduce {ROTOR23} --nodes 7,12,18 --errors compliance=1,shapes=1 --what-if alpha12=1.3
+reduce-errors               reduce {ROTOR23} --nodes 7,12,18 --errors compliance=1,shapes=1
 reduce-compressor           reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --stability 1000:14000rpm --model small.toml --state-space small.mat
 reduce-compressor-json      reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --speed 6000rpm --both-planes --model m.toml --state-space small.json
 reduce-compressor-response  reduce {COMPRESSOR} --nodes "impeller 1,impeller 3,impeller 5" --modes 2 --response 2000:14000:2000rpm

@@ -30,7 +30,7 @@ COMMANDS = {
     "critical table": "critical rotor23.csv -n 5",
     "response": COMPRESSOR + " --sensors probe_DE:45,probe_NDE:45",
     "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --rank --response auto "
-    "--stability 0:9000rpm --errors compliance=1,shapes=1 --what-if alpha12=1.3",
+    "--stability 0:9000rpm --errors compliance=1,shapes=1",
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",
     "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv --sigma auto",

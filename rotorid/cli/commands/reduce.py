@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     panels={
         "Input": "nodes modes speed measured compliance seals",
         "Method": "rank place masses candidates methods",
-        "Errors": "errors what_if",
+        "Errors": "errors",
         "Small model": "response stability model state_space damping force both_planes keep_supports",
         "Expert": "normalise rows nonnegative supports_apart",
     },

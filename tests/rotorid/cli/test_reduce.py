@@ -86,7 +86,6 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=x"), "compliance=x is no NAME=NUMBER"),
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=1,compliance=2"), "stands twice"),
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=-1"), "from 0 to 100 percent"),
-        ((ROTOR, "--nodes", "7,12", "--what-if", "alpha99=1"), "there is no input 'alpha99'"),
         ((ROTOR, "--nodes", "7,12", "--damping", "1"), "--damping does nothing without --model"),
         (
             (ROTOR, "--nodes", "7,12,18", "--damping", "1,x", "--model", "m.toml"),

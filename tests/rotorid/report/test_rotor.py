@@ -148,7 +148,6 @@ def test_the_reduction_shows_masses_modes_and_comparisons():
     for key in ("masses_kg", "natural_frequencies_rad_s", "rotor_frequencies_rad_s", "relative_error", "mac"):
         assert {f"{key}.{k}" for k in range(3)} <= sheet.keys
     assert {f"compliance_m_per_N.{i}.{j}" for i in range(3) for j in range(3)} <= sheet.keys
-    assert {f"what_if.masses_kg.{k}" for k in range(3)} <= sheet.keys
     assert {f"uncertainty.masses_std_kg.{k}" for k in range(3)} <= sheet.keys
     assert {f"methods.methods.{m}.mac.2" for m in range(len(document["methods"]["methods"]))} <= sheet.keys
     assert len(document["placement"]["choices"]) == 20

@@ -141,12 +141,11 @@ def same(one, other):
         (lambda o: influence(ROTOR, InfluenceOptions(o, [2], [100.0])), "7,12", np.array([7, 12])),
         (
             lambda o: reduce(ROTOR, ReduceOptions(nodes=[7, 12, 18], **o)),
-            {"modes": 2, "damping": "1,2", "errors": "compliance=2", "what_if": "alpha12=1"},
+            {"modes": 2, "damping": "1,2", "errors": "compliance=2"},
             {
                 "modes": np.int64(2),
                 "damping": np.array([0.01, 0.02]),
                 "errors": ["compliance=2"],
-                "what_if": {"alpha12": "1"},
             },
         ),
         (lambda o: split("35g@120", SplitOptions(holes=12, taken=o)), "3:10g", {3: 0.01}),
