@@ -120,6 +120,8 @@ class Balance(Parts):
             cause.append(sentence(self.check.verdict))
         if pieces is not None:
             first.append(f"Taken to be mounted, by --split: {pieces.in_holes()}; else state check_weights.")
+        elif not (self.job.check_mounted or self.job.check_of_weights):
+            first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
         asked = [part.answer for part in (self.check, self.subsets) if part]
         tables = [_behind(part.answer) for part in (self.mounted, self.result) if part]
         every = together([left.answer, *limits, *asked, *tables])

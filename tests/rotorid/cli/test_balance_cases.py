@@ -26,7 +26,8 @@ def test_a_run_that_is_better_than_what_is_promised_stays(cli):
 
 def test_amplitudes_and_phases_in_each_others_columns_are_not_mounted(cli):
     said = first(cli("balance", JOBS / "exchanged/job.toml"))
-    assert said.startswith("Do not mount these weights")
+    assert said.startswith("Do not mount these weights: the weight in plane 'P1' is 13.83 g ± 37 g (95 %)")
+    assert "act alike" not in said  # the condition number is 2
 
 
 def test_the_region_of_planes_that_act_nearly_alike_holds_the_truth(cli):
@@ -154,7 +155,10 @@ def test_weights_that_were_mounted_although_there_are_holes_are_stated(cli, tmp_
     assert np.abs(asked["weights"] - exact).max() < 1e-9
     assert np.abs(asked["pieces"] - exact).max() > 0.5
     said = first(cli("balance", tmp_path / "weights.toml", "--split"))
-    assert "Taken to be mounted, by --split" not in said
+    assert "Taken to be mounted" not in said  # it is stated
+    (tmp_path / "bare.toml").write_text(job.split("[planes")[0])  # no holes
+    said = first(cli("balance", tmp_path / "bare.toml"))
+    assert "Taken to be mounted: the weights that were proposed; else state check_weights." in said
     cli("balance", tmp_path / "weights.toml", "--output", tmp_path / "job.xlsx")
     again = cli("balance", tmp_path / "job.xlsx", "--json").json
     assert np.abs(vectors(again["check"]["mounted"][0]["weights"]) - exact).max() < 1e-9
