@@ -346,8 +346,7 @@ class Linearised:
         values, vectors = self.eigen
         direction = vectors[:, np.abs(values - multiplier).argmin()]
         states = (self.states[..., : direction.size] @ direction)[:, places]
-        N = len(states) - 1
-        phase = float(np.angle(np.vdot(states[0], states[-1])))
+        N, phase = len(states) - 1, np.angle(np.vdot(states[0], states[-1]))
         parts = np.fft.fft(states[:-1] * np.exp(-1j * phase * np.arange(N) / N)[:, None], axis=0)
         k = np.fft.fftfreq(N, 1 / N)[np.linalg.norm(parts, axis=1).argmax()]
         return float(abs(phase + 2 * np.pi * k) / self.orbit.period)
