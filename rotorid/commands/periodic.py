@@ -136,7 +136,7 @@ class PeriodicMotions(Delivered):
                 ],
                 "tried": motion.tried,
                 "warnings": motion.warnings,
-                "reduction": reduction(motion.problem.system),
+                "reduction": reduction(motion.system),
             }
         )
 
@@ -151,7 +151,7 @@ class PeriodicMotions(Delivered):
             f"{motion.tried}",
             tuple(motion.warnings),
             (
-                *reduction_notes(motion.problem.system),
+                *reduction_notes(motion.system),
                 *(
                     f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
                     f"{self.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.motion.collocation import Orbit, repeating
+from rotorid.motion.collocation import LEAST_STEPS, POINTS, Orbit, Periodic
 from rotorid.motion.equilibrium import at_rest
 from rotorid.motion.run import LEAST_A_TURN, TOLERANCE, MotionRun, run
 from rotorid.motion.system import MotionSystem
@@ -139,6 +140,38 @@ def settled(
     if not system.forced and sizes[-1:] < [0.95 * size for size in sizes[_BLOCKS // 2 :][:1]]:
         return q, v, ""
     return q, v, f"motion in time comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
+
+
+def repeating(
+    system: MotionSystem, speed: float, period: float, q: FloatArray, v: FloatArray
+) -> Orbit | None:
+    """The periodic motion near that in time from a state at the angle 0; None where there is none.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speed, period
+        rad/s and s.
+    q, v
+        All unknowns and their velocities, (n,) each.
+    """
+    turns = round(period * speed / (2 * np.pi)) if system.forced else 0
+    period = 2 * np.pi * turns / speed if turns else period
+    steps, first = LEAST_STEPS * max(turns, 1), q
+    velocities = np.empty((steps * POINTS.size, q.size))
+    times = (np.arange(steps)[:, None] + POINTS).ravel() * (period / steps)
+    for k, (begin, end) in enumerate(itertools.pairwise([0.0, *times])):
+        part = run(system, (speed, speed), end - begin, (q, v), rate=1 / (end - begin), angle=speed * begin)
+        q, v = part.q, part.v
+        velocities[k] = v
+    guess = Orbit(speed, period, turns, first, velocities.reshape(steps, POINTS.size, -1))
+    try:
+        at = Periodic(system, speed, speed).newton(guess, guess.at_speed)
+    except np.linalg.LinAlgError:
+        return None
+    away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
+    return at.solution if away.max() < 0.3 else None
 
 
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
