@@ -237,11 +237,11 @@ def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
     def motions(speeds: FloatArray) -> list[tuple[Orbit, ComplexArray]]:
         """Motions, and their eigenvalues, those that grow most first."""
         every = []
-        for speed, rest, response in zip(*steady_linear(system, speeds), strict=True):
+        for speed, rest, response in steady_linear(system, speeds):
             values = eigenvalues_at_rest(system, rest, speed)[0]
             values = values[np.argsort(-values.real, kind="stable")]
             period = 2 * np.pi / speed
-            orbit = turning(float(speed), period, 1, rest, response)
+            orbit = turning(speed, period, 1, rest, response)
             every.append((replace(orbit, multipliers=np.exp(period * values)), values))
         return every
 

@@ -165,9 +165,8 @@ def _speeds(motion: PeriodicMotion) -> Iterator[float]:
 def _ends(motion: PeriodicMotion, speed: float) -> Iterator[Orbit | str]:
     """Motions near the linear rotor's and that motion in time comes to; or, in words, why there is none."""
     system = motion.system
-    _, rests, responses = steady_linear(system, [speed])
     still = np.zeros(system.size)
-    rest, response = next(zip(rests, responses, strict=True), (still, still.astype(complex)))
+    _, rest, response = next(iter(steady_linear(system, [speed])), (speed, still, still.astype(complex)))
     starts = [(rest, still)]
     if not system.forced:
         starts = [(rest + 0.5 * whirl_at_rest(system, rest, speed)[1].real, still)]

@@ -103,7 +103,8 @@ def bode_figure(motion: MotionRun) -> Figure:
         raise ValueError("at a constant speed there is no curve over speed: --run-up has one")
     figure = new_figure(5.2)
     above, below = figure.subplots(2, sharex=True, height_ratios=[3, 2])
-    speeds, _, response = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), 1000))
+    steady = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), 1000))
+    speeds, _, response = (np.array(each) for each in zip(*steady, strict=True))
     response = response[:, [motion.system.index(node)[0] for node in motion.nodes]]
     run = synchronous_part(motion)
     for k, i in enumerate(_shown(motion)):

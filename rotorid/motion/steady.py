@@ -31,7 +31,7 @@ together leave 0.002 there at most, chaotic rubs 0.006 to 0.1."""
 
 def steady_linear(
     system: MotionSystem, speeds: Sequence[float] | FloatArray
-) -> tuple[FloatArray, FloatArray, ComplexArray]:
+) -> list[tuple[float, FloatArray, ComplexArray]]:
     """Steady response to unbalance and bow of the rotor made linear about its equilibrium at each speed.
 
     Parameters
@@ -43,10 +43,10 @@ def steady_linear(
 
     Returns
     -------
-    The speeds at which there is an equilibrium, shape (s,), the equilibria, (s, n), and the response, (s, n):
-    the motion is Re(response e^{iφ}) about the equilibrium.
+    Each speed at which there is an equilibrium, that, shape (n,), and the response, (n,): the motion is
+    Re(response e^{iφ}) about the equilibrium.
     """
-    known, rests, responses = [], [], []
+    motions = []
     for speed in speeds:
         try:
             rest = at_rest(system, speed)
@@ -54,11 +54,9 @@ def steady_linear(
             continue
         C, K = system.about(rest, speed)
         load = speed**2 * system.unbalance + system.bow
-        known.append(speed)
-        rests.append(rest)
-        responses.append(np.linalg.solve(K + 1j * speed * C - speed**2 * system.M, load))
-    n = system.size
-    return np.array(known), np.array(rests).reshape(-1, n), np.array(responses, complex).reshape(-1, n)
+        response = np.linalg.solve(K + 1j * speed * C - speed**2 * system.M, load)
+        motions.append((float(speed), rest, response.astype(complex)))
+    return motions
 
 
 def begin(
@@ -91,7 +89,7 @@ def begin(
     """
     q, v, warnings = at_rest(system, speed), np.zeros(system.size), tuple[str, ...]()
     if how == "steady" and speed and system.forced:
-        response = steady_linear(system, [speed])[2][0]
+        ((_, _, response),) = steady_linear(system, [speed])
         if (np.abs(system.at_forces(q + response.real)) <= 0.9 * system.walls).all():
             q, v = q + response.real, (1j * speed * response).real
         if system.forces:
@@ -246,7 +244,7 @@ class SteadyEnd:
     mean: ComplexArray
     amplitude: FloatArray
     change: float
-    trend: Literal["", "grows", "decays", "drifts"]
+    trend: str
     at_rest: bool
     frequency: float
     speed: float
@@ -295,7 +293,7 @@ def steady_end(motion: MotionRun) -> SteadyEnd | None:
     spread = np.ptp(values, axis=0)
     which = int(spread.argmax())
     ways = np.unique(np.sign(np.diff(values[:, which])))
-    trend: Literal["", "grows", "decays", "drifts"] = ""
+    trend = ""
     if len(ways) == 1:
         trend = "drifts" if which >= strength.shape[1] else "grows" if ways[0] > 0 else "decays"
     around = z[:, most] - mean[most]
