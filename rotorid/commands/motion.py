@@ -178,8 +178,8 @@ class Motion(Delivered):
         """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
         import numpy as np
 
-        from rotorid.motion.collocation import repeating
         from rotorid.motion.run import run
+        from rotorid.motion.steady import repeating
 
         motion, end = self.motion, self.end
         if end is None or end.at_rest or not end.periodic or not end.speed:

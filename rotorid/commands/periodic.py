@@ -44,7 +44,7 @@ class PeriodicOptions:
         Range of speeds, 1000:9000rpm; or one, 600:600 or 600.
     sensors : LIST
         Nodes or stations with angles from x in degrees, 2:45,22:45; default: where forces that are not linear
-        act, in x.
+        act, or else at the supports, in x.
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     unbalance : FILE
@@ -136,7 +136,7 @@ class PeriodicMotions(Delivered):
                 ],
                 "tried": motion.tried,
                 "warnings": motion.warnings,
-                "reduction": reduction(motion.problem.system),
+                "reduction": reduction(motion.system),
             }
         )
 
@@ -151,7 +151,7 @@ class PeriodicMotions(Delivered):
             f"{motion.tried}",
             tuple(motion.warnings),
             (
-                *reduction_notes(motion.problem.system),
+                *reduction_notes(motion.system),
                 *(
                     f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
                     f"{self.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
@@ -304,8 +304,8 @@ def _sensors(
     what: Moving, system: MotionSystem, given: str | Sequence[Sensor] | None
 ) -> tuple[tuple[str, ...], list[tuple[int, float]]]:
     """Names of the sensors, their nodes and angles, degrees."""
-    nodes = dict.fromkeys(force.node for force in system.forces) or dict.fromkeys(system.nodes)
-    places = [*nodes] if given is None else sensors(given)
+    nodes = [each.node for each in system.forces or what.model.supports if each.node in system.nodes]
+    places = list(dict.fromkeys(nodes or system.nodes)) if given is None else sensors(given)
     both = [place if isinstance(place, tuple) else (place, 0.0) for place in places]
     labels = tuple(f"{name}" if angle == 0 else f"{name}:{angle:g}" for name, angle in both)
     return labels, [(what.node(name), angle) for name, angle in both]

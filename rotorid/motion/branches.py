@@ -111,7 +111,7 @@ class Branch:
 def follow(problem: Periodic, guess: Orbit, row: FloatArray) -> Branch:
     """Follow a branch from a guess, whose row · unknowns stays, until it leaves the range of speeds.
 
-    It leaves in the direction in which that grows; LinAlgError if there is no solution at the start.
+    It begins in the direction in which that grows; LinAlgError if there is no solution at the start.
     """
     at = problem.solve(guess, row)
     orbits, length, ended = [at.solution], _LONGEST / 4, ""
@@ -237,12 +237,11 @@ def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
     def motions(speeds: FloatArray) -> list[tuple[Orbit, ComplexArray]]:
         """Motions, and their eigenvalues, those that grow most first."""
         every = []
-        for speed, rest, response in zip(*steady_linear(system, speeds), strict=True):
+        for speed, rest, response in steady_linear(system, speeds):
             values = eigenvalues_at_rest(system, rest, speed)[0]
-            values = values[np.isfinite(values)]
             values = values[np.argsort(-values.real, kind="stable")]
             period = 2 * np.pi / speed
-            orbit = turning(float(speed), period, 1, rest, response)
+            orbit = turning(speed, period, 1, rest, response)
             every.append((replace(orbit, multipliers=np.exp(period * values)), values))
         return every
 
@@ -269,9 +268,8 @@ def straight(system: MotionSystem, low: float, high: float) -> Branch | None:
     for (a, _), (b, _) in itertools.pairwise(every):
         if (a.outside == 0) != (b.outside == 0):
             ((there, values),) = motions(np.array([_root(test, a.speed, b.speed)]))
-            frequency = abs(values[0].imag)
-            kind = BRANCH if frequency < 1e-6 * there.speed else TORUS if system.forced else HOPF
-            frequency = np.nan if kind == BRANCH else frequency
+            frequency = abs(values[0].imag) or np.nan
+            kind = BRANCH if np.isnan(frequency) else TORUS if system.forced else HOPF
             orbits.append(replace(there, bifurcation=kind, frequency=frequency))
         orbits.append(b)
     ended = "end of the range of speeds" if orbits[-1].speed == high else "stopped: it rests no more"
@@ -301,16 +299,13 @@ def jumps(branches: Sequence[Branch], directions: FloatArray) -> list[tuple[floa
 
     That is the stable motion at the same speed whose amplitudes are nearest.
     """
-    jumps = []
-    along = [amplitudes(branch.points, directions) for branch in branches]
-    for branch in branches:
-        for k, fold in enumerate(branch.orbits):
-            if fold.bifurcation != FOLD or not any(one.stable for one in branch.orbits[k - 1 : k + 2]):
-                continue
-            (size,) = amplitudes([fold], directions)
-            there = zip(branches, along, strict=True)
-            others = [one for b, values in there for one, stable in b.at(fold.speed, values) if stable]
-            far = [one for one in others if np.abs(one - size).max() > 0.02 * size.max()]
-            if far:
-                jumps.append((fold.speed, size, min(far, key=lambda one: np.abs(one - size).max())))
+    jumps, along = [], [(branch, amplitudes(branch.points, directions)) for branch in branches]
+    for orbits in (branch.orbits for branch in branches):
+        for k, fold in enumerate(orbits):
+            if fold.bifurcation == FOLD and any(one.stable for one in orbits[k - 1 : k + 2]):
+                (size,) = amplitudes([fold], directions)
+                others = [one for b, values in along for one, stable in b.at(fold.speed, values) if stable]
+                far = [one for one in others if np.abs(one - size).max() > _SAME * size.max()]
+                if far:
+                    jumps.append((fold.speed, size, min(far, key=lambda one: np.abs(one - size).max())))
     return jumps

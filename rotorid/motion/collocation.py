@@ -22,7 +22,6 @@ Keller, J. P. Kernévez, Int. J. Bifurcation Chaos 1 (1991) 745.
 
 from __future__ import annotations
 
-import itertools
 import time
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,7 +31,7 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.compiled import compiled
 from rotorid.motion.rosenbrock import Equations, evaluate
-from rotorid.motion.run import equations_of, run
+from rotorid.motion.run import equations_of
 from rotorid.motion.system import MotionSystem
 
 _S, LEAST_STEPS, MOST_STEPS = 4, 32, 512
@@ -165,7 +164,7 @@ def turning(speed: float, period: float, turns: int, rest: FloatArray, response:
     return Orbit(speed, period, turns, rest + response.real, velocities)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Periodic:
     """What a periodic motion is sought of.
 
@@ -346,8 +345,7 @@ class Linearised:
         values, vectors = self.eigen
         direction = vectors[:, np.abs(values - multiplier).argmin()]
         states = (self.states[..., : direction.size] @ direction)[:, places]
-        N = len(states) - 1
-        phase = float(np.angle(np.vdot(states[0], states[-1])))
+        N, phase = len(states) - 1, np.angle(np.vdot(states[0], states[-1]))
         parts = np.fft.fft(states[:-1] * np.exp(-1j * phase * np.arange(N) / N)[:, None], axis=0)
         k = np.fft.fftfreq(N, 1 / N)[np.linalg.norm(parts, axis=1).argmax()]
         return float(abs(phase + 2 * np.pi * k) / self.orbit.period)
@@ -372,35 +370,3 @@ def _along(
         states[i, 0], states[i, 1] = Q[i], V[i]
         evaluate(equations, (angles[i], speed, 0.0), 0.0, states[i])
     return states
-
-
-def repeating(
-    system: MotionSystem, speed: float, period: float, q: FloatArray, v: FloatArray
-) -> Orbit | None:
-    """The periodic motion near that in time from a state at the angle 0; None where there is none.
-
-    Parameters
-    ----------
-    system
-        What moves.
-    speed, period
-        rad/s and s.
-    q, v
-        All unknowns and their velocities, (n,) each.
-    """
-    turns = round(period * speed / (2 * np.pi)) if system.forced else 0
-    period = 2 * np.pi * turns / speed if turns else period
-    steps, first = LEAST_STEPS * max(turns, 1), q
-    velocities = np.empty((steps * _S, q.size))
-    times = (np.arange(steps)[:, None] + POINTS).ravel() * (period / steps)
-    for k, (begin, end) in enumerate(itertools.pairwise([0.0, *times])):
-        part = run(system, (speed, speed), end - begin, (q, v), rate=1 / (end - begin), angle=speed * begin)
-        q, v = part.q, part.v
-        velocities[k] = v
-    guess = Orbit(speed, period, turns, first, velocities.reshape(steps, _S, -1))
-    try:
-        at = Periodic(system, speed, speed).newton(guess, guess.at_speed)
-    except np.linalg.LinAlgError:
-        return None
-    away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
-    return at.solution if away.max() < 0.3 else None

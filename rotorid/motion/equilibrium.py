@@ -136,7 +136,7 @@ def at_rest(system: MotionSystem, speed: float) -> FloatArray:
 def eigenvalues_at_rest(
     system: MotionSystem, q: FloatArray, speed: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Eigenvalues, rad/s, (2n,), infinite without mass, and shapes, (n, 2n), of motion about rest in q."""
+    """Finite eigenvalues, rad/s, (m,), and shapes, (n, m), of motion about rest in q."""
     from scipy.linalg import eig
 
     C, K = system.about(q, speed)
@@ -147,7 +147,8 @@ def eigenvalues_at_rest(
     else:
         right = np.block([[eye, zero], [zero, system.M]])
         values, vectors = eig(np.block([[zero, eye], [-K, -C]]), right)
-    return values.astype(complex), vectors[: q.size].astype(complex)
+    finite = np.isfinite(values)  # not so without mass
+    return values[finite].astype(complex), vectors[: q.size, finite].astype(complex)
 
 
 def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
@@ -156,9 +157,8 @@ def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[fl
     Its size is what is free: see `room`; without walls it deflects as much as at rest.
     """
     values, shapes = eigenvalues_at_rest(system, q, speed)
-    finite = np.isfinite(values)
-    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
-    k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
+    whirls = values.imag > 0
+    k = int(np.where(whirls | ~whirls.any(), values.real, -np.inf).argmax())
     shape = shapes[:, k] * np.exp(-0.5j * np.angle(np.sum(shapes[:, k] ** 2)))
     size = room(system, q, shape)
     if size == np.inf:

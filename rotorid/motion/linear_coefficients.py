@@ -95,8 +95,8 @@ def threshold(
     for share, steps in _AROUND:
         if stable.threshold is None:
             break
-        around = np.clip(stable.threshold * np.array([1 - share, 1 + share]), lowest, highest).tolist()
-        near = _search(linear_rotor(rotor, equilibria(system, around)), *around, steps)
+        a, b = np.clip(stable.threshold * np.array([1 - share, 1 + share]), lowest, highest).tolist()
+        near = _search(linear_rotor(rotor, equilibria(system, (a, b))), a, b, steps)
         if near.threshold is not None:
             stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
     ends = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(known)))[0][:1]

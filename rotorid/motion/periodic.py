@@ -28,13 +28,11 @@ _BETWEEN = 10
 
 
 @dataclass(eq=False)
-class PeriodicMotion:
+class PeriodicMotion(Periodic):
     """Branches of periodic motion, and what could not be found.
 
     Attributes
     ----------
-    problem
-        What they are sought of.
     branches
         The first is synchronous, or, without unbalance and bow, at rest.
     warnings
@@ -43,7 +41,6 @@ class PeriodicMotion:
         Where motions were sought, in sentences.
     """
 
-    problem: Periodic
     branches: list[Branch] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     tried: str = ""
@@ -85,8 +82,7 @@ def periodic_motion(
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
-    problem = Periodic(system, low, high, time.monotonic() + max_seconds)
-    motion = PeriodicMotion(problem)
+    motion = PeriodicMotion(system, low, high, time.monotonic() + max_seconds)
     linear = all(isinstance(force, InternalDamping) for force in system.forces)
     if linear or not system.forced:
         motion.branches.extend(filter(None, [straight(system, low, high)]))
@@ -96,12 +92,12 @@ def periodic_motion(
         if limit_cycle:
             _cycles(motion)
         _search(motion, limit_cycle)
-    if problem.late and not motion.branches:
+    if motion.late and not motion.branches:
         raise ValueError(f"no periodic motion was found in {max_seconds:.6g} s: raise --max-seconds")
     if not motion.branches:
         equilibrium(system, low)  # its message is the better one
         raise ValueError(f"no periodic motion was found to begin with, {listing(motion.warnings, 'and')}")
-    if problem.late:
+    if motion.late:
         motion.warnings.insert(0, f"the search was stopped after {max_seconds:.6g} s (--max-seconds)")
     if not system.forced:
         motion.warnings.insert(0, "there is no unbalance and no bow: what is synchronous is rest")
@@ -125,14 +121,14 @@ def _doubts(branch: Branch, response: bool) -> Iterator[str]:
 
 def _cycles(motion: PeriodicMotion) -> None:
     """Limit cycles that begin at the Hopf points of rest."""
-    problem, n = motion.problem, motion.problem.system.size
+    n = motion.system.size
     for hopf in [b for branch in motion.branches for b in branch.bifurcations if b.bifurcation == HOPF]:
-        whirl, shape = whirl_at_rest(problem.system, hopf.start, hopf.speed)
+        whirl, shape = whirl_at_rest(motion.system, hopf.start, hopf.speed)
         guess = turning(hopf.speed, 2 * np.pi / whirl, 0, hopf.start, 0.01 * shape)
         row = np.append(shape.real, np.zeros(n + 2))
         try:
-            if not motion.has(problem.solve(guess, row).orbit):
-                motion.branches.append(follow(problem, guess, row))
+            if not motion.has(motion.solve(guess, row).orbit):
+                motion.branches.append(follow(motion, guess, row))
         except np.linalg.LinAlgError:
             continue
 
@@ -143,13 +139,13 @@ def _search(motion: PeriodicMotion, limit_cycle: bool) -> None:
     for speed in _speeds(motion):
         for end in _ends(motion, speed):
             words = _kept(motion, end, limit_cycle) if isinstance(end, Orbit) else end
-            if words and not motion.problem.late:
+            if words and not motion.late:
                 remarks.setdefault(words, {})[speed] = None
-        if motion.problem.late:
+        if motion.late:
             break
         done.append(speed)
     motion.warnings += [f"{words}, at {_listed(at)}" for words, at in remarks.items()]
-    start = "from rest and from large whirls" if motion.problem.system.forced else "with a large whirl"
+    start = "from rest and from large whirls" if motion.system.forced else "with a large whirl"
     motion.tried = f"Motion in time was begun {start} at {_listed(done)}. Other motions were not sought."
 
 
@@ -159,7 +155,7 @@ def _listed(speeds: Iterable[float]) -> str:
 
 def _speeds(motion: PeriodicMotion) -> Iterator[float]:
     """Both ends, and when these are done the middle and those between bifurcations."""
-    low, high = motion.problem.low, motion.problem.high
+    low, high = motion.low, motion.high
     yield from dict.fromkeys((low, high))
     bifurcations = (orbit.speed for branch in motion.branches for orbit in branch.bifurcations)
     edges = sorted({low, high, *bifurcations})
@@ -168,10 +164,9 @@ def _speeds(motion: PeriodicMotion) -> Iterator[float]:
 
 def _ends(motion: PeriodicMotion, speed: float) -> Iterator[Orbit | str]:
     """Motions near the linear rotor's and that motion in time comes to; or, in words, why there is none."""
-    problem, system = motion.problem, motion.problem.system
-    _, rests, responses = steady_linear(system, [speed])
+    system = motion.system
     still = np.zeros(system.size)
-    rest, response = next(zip(rests, responses, strict=True), (still, still.astype(complex)))
+    _, rest, response = next(iter(steady_linear(system, [speed])), (speed, still, still.astype(complex)))
     starts = [(rest, still)]
     if not system.forced:
         starts = [(rest + 0.5 * whirl_at_rest(system, rest, speed)[1].real, still)]
@@ -181,15 +176,15 @@ def _ends(motion: PeriodicMotion, speed: float) -> Iterator[Orbit | str]:
         size = 0.9 * np.sqrt(2) * room(system, rest, shape)
         large = (size if np.isfinite(size) else 5.0) * shape
         starts += [(rest + whirl.real, -speed * whirl.imag) for whirl in (large, -1j * large)]
-    if system.forced and speed in (problem.low, problem.high):
+    if system.forced and speed in (motion.low, motion.high):
         guess = turning(speed, 2 * np.pi / speed, 1, rest, response)
         try:
-            yield problem.solve(guess, guess.at_speed).orbit
+            yield motion.solve(guess, guess.at_speed).orbit
         except np.linalg.LinAlgError as met:
             yield f"no periodic motion is found from rest: {met}"
     for q, v in starts:
-        if not problem.late:
-            yield settled(system, speed, q, v, until=problem.until)[2]
+        if not motion.late:
+            yield settled(system, speed, q, v, until=motion.until)[2]
 
 
 def _kept(motion: PeriodicMotion, end: Orbit, limit_cycle: bool) -> str:
@@ -200,11 +195,10 @@ def _kept(motion: PeriodicMotion, end: Orbit, limit_cycle: bool) -> str:
         return f"motion in time comes again after {end.turns} revolutions only"
     if not end.turns and not limit_cycle:
         return "motion in time comes to a whirl with a period of its own (--limit-cycle)"
-    problem = motion.problem
-    ways = [sign for sign, last in ((1.0, problem.high), (-1.0, problem.low)) if end.speed != last]
+    ways = [sign for sign, last in ((1.0, motion.high), (-1.0, motion.low)) if end.speed != last]
     for sign in ways or [1.0]:
         try:
-            motion.branches.append(follow(problem, end, sign * end.at_speed))
+            motion.branches.append(follow(motion, end, sign * end.at_speed))
         except np.linalg.LinAlgError as met:
             return f"a periodic motion is not followed: {met}"
         if motion.branches[-1].ended == "closed":

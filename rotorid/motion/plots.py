@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.plot_style import (
-    BOX,
     COLORS,
     DARK,
     MARKERS,
@@ -104,7 +103,8 @@ def bode_figure(motion: MotionRun) -> Figure:
         raise ValueError("at a constant speed there is no curve over speed: --run-up has one")
     figure = new_figure(5.2)
     above, below = figure.subplots(2, sharex=True, height_ratios=[3, 2])
-    speeds, _, response = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), 1000))
+    steady = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), 1000))
+    speeds, _, response = (np.array(each) for each in zip(*steady, strict=True))
     response = response[:, [motion.system.index(node)[0] for node in motion.nodes]]
     run = synchronous_part(motion)
     for k, i in enumerate(_shown(motion)):
@@ -157,10 +157,9 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
-    for end, z in ((0, Z[0, 0]), (-1, Z[-1, 0])):
-        inwards = end == 0 and abs(z) < 0.6  # where neither wall nor the other speed is
-        shift, side = (7.0, "left") if inwards else (-7.0, "right")
-        note(ax, rpm_text(resting[end].speed), (z.real, z.imag), (shift, 0.0), ha=side, va="center")
+    for end, shift, side in ((0, 7.0, "left"), (-1, -7.0, "right")):
+        at = (Z[end, 0].real, Z[end, 0].imag)
+        note(ax, rpm_text(resting[end].speed), at, (shift, 0.0), ha=side, va="center")
     load = resting[-1].load.sum()
     where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
     ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
@@ -204,9 +203,6 @@ def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label:
     for speed, before, after in jumps(branches, directions):
         tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after, before))
         ax.annotate("", tip, tail, arrowprops={"arrowstyle": "->", "color": DARK, "shrinkA": 4})
-        where: dict[str, Any] = {"rotation": 90, "va": "center", "ha": "right", "bbox": BOX, "color": DARK}
-        word = "jump up" if after[0] > before[0] else "jump down"
-        note(ax, word, (tip[0], (tip[1] + tail[1]) / 2), (-3, 0), **where)
     ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {label}, µm")
     ax.set_ylim(bottom=0.0)
     plain(ax)

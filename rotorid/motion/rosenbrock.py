@@ -134,34 +134,6 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
 
 
 @compiled
-def invert(matrix: FloatArray) -> bool:
-    """Replace a matrix by its inverse, by Gauss and Jordan with row pivots; False where it has none."""
-    n = len(matrix)
-    pivots = np.empty(n, np.intp)
-    for k in range(n):
-        p = k
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[p, k]):
-                p = i
-        pivots[k], pivot = p, matrix[p, k]
-        if not abs(pivot) > 0.0:
-            return False
-        for j in range(n):
-            matrix[p, j], matrix[k, j] = matrix[k, j], matrix[p, j] / pivot
-        matrix[k, k] = 1.0 / pivot
-        for i in range(n):
-            factor = matrix[i, k]
-            if i != k:
-                matrix[i, k] = 0.0
-                for j in range(n):
-                    matrix[i, j] -= factor * matrix[k, j]
-    for k in range(n - 1, -1, -1):
-        for i in range(n):
-            matrix[i, k], matrix[i, pivots[k]] = matrix[i, pivots[k]], matrix[i, k]
-    return True
-
-
-@compiled
 def attempt(
     equations: Equations,
     turning: Turning,
@@ -171,15 +143,13 @@ def attempt(
     now: FloatArray,
     stages: FloatArray,
 ) -> bool:
-    """Try a step h: write the p and w of all stages, and the new q and v; False where that is impossible.
+    """Try a step h: write the p and w of all stages, and what is at its end; False where that is impossible.
 
     `state` is that of `evaluate` at t, `now` that at the end of the step; `stages` (p, w), shape (2, 8, n).
     """
     n, M = state.shape[1], equations[3]
     J_q, (p, w), (slip, pull, right) = state[5 : 5 + n], stages, np.empty((3, n))
-    inverse = M / (GAMMA * h) - state[5 + n :] - GAMMA * h * J_q
-    if not invert(inverse):
-        return False
+    inverse = np.linalg.inv(M / (GAMMA * h) - state[5 + n :] - GAMMA * h * J_q)
     for stage in range(8):
         for i in range(n):
             now[0, i], now[1, i], now[2, i], slip[i], pull[i] = (
@@ -208,7 +178,7 @@ def attempt(
             p[stage, i] = GAMMA * h * (slip[i] + w[stage, i])
     now[:2] += stages[:, 7]
     evaluate(equations, turning, t + h, now)
-    return bool(np.isfinite(now[2]).all())
+    return bool(np.isfinite(now).all())
 
 
 @compiled

@@ -165,7 +165,7 @@ def run(
     times = np.linspace(0.0, time, count + 1)
     deflections = np.empty((count + 1, *places.shape))
     q, v = (np.array(part, dtype=float) for part in start)
-    v = consistent(system, q, v, (angle, first, (last - first) / time))
+    _consistent(system, q, v, (angle, first, (last - first) / time))
     deflections[0] = q[places]
     others = np.array([float(name[0] not in "xy") for name in system.coordinates])
     origin = q.copy()
@@ -194,36 +194,30 @@ def run(
     return MotionRun(system, names, times[:done], (first, last), z, q, v, angle, steps, tolerance, stopped)
 
 
-def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> FloatArray:
-    """Velocities with which the forces on what has no mass are in equilibrium, shape (n,).
+def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> None:
+    """Change velocities so that the forces on what has no mass are in equilibrium.
 
     Raises
     ------
     ValueError
         For motion without mass that nothing damps.
     """
-    unit = np.sqrt(np.where(system.M.diagonal() > 0, system.M.diagonal(), 1.0))
-    size, shape = np.linalg.eigh(system.M / np.outer(unit, unit))
-    free = shape[:, size <= _MASSLESS] / unit[:, None]
-    if not free.size:
-        return v
-    n, equations = system.size, equations_of(system, turning[1], turning[1])
-    state = np.zeros((5 + 2 * n, n))
-    for _ in range(20):
+    n, free = system.size, np.flatnonzero(~system.M.any(axis=1))
+    state, equations = np.zeros((5 + 2 * n, n)), equations_of(system, turning[1], turning[1])
+    for _ in range(20 if free.size else 0):
         state[0], state[1] = q, v
         evaluate(equations, turning, 0.0, state)
-        J = free.T @ state[5 + n :] @ free
+        J = state[5 + n :][np.ix_(free, free)]
         if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
-            where = system.coordinates[int(np.abs(free).max(axis=1).argmax())]
+            where = system.coordinates[free[np.abs(J).sum(axis=1).argmin()]]
             raise ValueError(
                 f"{where} has neither mass nor damping, so that its velocity is not determined: give it a "
                 "mass, or a bearing with damping"
             )
-        change = free @ np.linalg.solve(J, free.T @ state[2])
-        v = v - change
+        change = np.linalg.solve(J, state[2, free])
+        v[free] -= change
         if np.abs(change).max() <= 1e-13 * np.abs(v).max():
             break
-    return v
 
 
 def _pieces(

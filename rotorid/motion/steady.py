@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.motion.collocation import Orbit, repeating
+from rotorid.motion.collocation import LEAST_STEPS, POINTS, Orbit, Periodic
 from rotorid.motion.equilibrium import at_rest
 from rotorid.motion.run import LEAST_A_TURN, TOLERANCE, MotionRun, run
 from rotorid.motion.system import MotionSystem
@@ -30,7 +31,7 @@ together leave 0.002 there at most, chaotic rubs 0.006 to 0.1."""
 
 def steady_linear(
     system: MotionSystem, speeds: Sequence[float] | FloatArray
-) -> tuple[FloatArray, FloatArray, ComplexArray]:
+) -> list[tuple[float, FloatArray, ComplexArray]]:
     """Steady response to unbalance and bow of the rotor made linear about its equilibrium at each speed.
 
     Parameters
@@ -42,10 +43,10 @@ def steady_linear(
 
     Returns
     -------
-    The speeds at which there is an equilibrium, shape (s,), the equilibria, (s, n), and the response, (s, n):
-    the motion is Re(response e^{iφ}) about the equilibrium.
+    Each speed at which there is an equilibrium, that, shape (n,), and the response, (n,): the motion is
+    Re(response e^{iφ}) about the equilibrium.
     """
-    known, rests, responses = [], [], []
+    motions = []
     for speed in speeds:
         try:
             rest = at_rest(system, speed)
@@ -53,11 +54,9 @@ def steady_linear(
             continue
         C, K = system.about(rest, speed)
         load = speed**2 * system.unbalance + system.bow
-        known.append(speed)
-        rests.append(rest)
-        responses.append(np.linalg.solve(K + 1j * speed * C - speed**2 * system.M, load))
-    n = system.size
-    return np.array(known), np.array(rests).reshape(-1, n), np.array(responses, complex).reshape(-1, n)
+        response = np.linalg.solve(K + 1j * speed * C - speed**2 * system.M, load)
+        motions.append((float(speed), rest, response.astype(complex)))
+    return motions
 
 
 def begin(
@@ -90,7 +89,7 @@ def begin(
     """
     q, v, warnings = at_rest(system, speed), np.zeros(system.size), tuple[str, ...]()
     if how == "steady" and speed and system.forced:
-        response = steady_linear(system, [speed])[2][0]
+        ((_, _, response),) = steady_linear(system, [speed])
         if (np.abs(system.at_forces(q + response.real)) <= 0.9 * system.walls).all():
             q, v = q + response.real, (1j * speed * response).real
         if system.forces:
@@ -139,6 +138,38 @@ def settled(
     if not system.forced and sizes[-1:] < [0.95 * size for size in sizes[_BLOCKS // 2 :][:1]]:
         return q, v, ""
     return q, v, f"motion in time comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
+
+
+def repeating(
+    system: MotionSystem, speed: float, period: float, q: FloatArray, v: FloatArray
+) -> Orbit | None:
+    """The periodic motion near that in time from a state at the angle 0; None where there is none.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speed, period
+        rad/s and s.
+    q, v
+        All unknowns and their velocities, (n,) each.
+    """
+    turns = round(period * speed / (2 * np.pi)) if system.forced else 0
+    period = 2 * np.pi * turns / speed if turns else period
+    steps, first = LEAST_STEPS * max(turns, 1), q
+    velocities = np.empty((steps * POINTS.size, q.size))
+    times = (np.arange(steps)[:, None] + POINTS).ravel() * (period / steps)
+    for k, (begin, end) in enumerate(itertools.pairwise([0.0, *times])):
+        part = run(system, (speed, speed), end - begin, (q, v), rate=1 / (end - begin), angle=speed * begin)
+        q, v = part.q, part.v
+        velocities[k] = v
+    guess = Orbit(speed, period, turns, first, velocities.reshape(steps, POINTS.size, -1))
+    try:
+        at = Periodic(system, speed, speed).newton(guess, guess.at_speed)
+    except np.linalg.LinAlgError:
+        return None
+    away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
+    return at.solution if away.max() < 0.3 else None
 
 
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
@@ -213,7 +244,7 @@ class SteadyEnd:
     mean: ComplexArray
     amplitude: FloatArray
     change: float
-    trend: Literal["", "grows", "decays", "drifts"]
+    trend: str
     at_rest: bool
     frequency: float
     speed: float
@@ -262,7 +293,7 @@ def steady_end(motion: MotionRun) -> SteadyEnd | None:
     spread = np.ptp(values, axis=0)
     which = int(spread.argmax())
     ways = np.unique(np.sign(np.diff(values[:, which])))
-    trend: Literal["", "grows", "decays", "drifts"] = ""
+    trend = ""
     if len(ways) == 1:
         trend = "drifts" if which >= strength.shape[1] else "grows" if ways[0] > 0 else "decays"
     around = z[:, most] - mean[most]
