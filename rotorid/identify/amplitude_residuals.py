@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorid.identify.amplitudes import Experiments
+from rotorid.identify.amplitudes import Experiments, real_matrices
 from rotorid.identify.operator_model import (
     HarmonicModel,
     mode_slopes,
@@ -29,6 +29,8 @@ SMALL = 1e-3
 """An amplitude counts as at least this share of its signal's median when errors are relative to it."""
 TRUSTED = 3.0
 """A predicted amplitude farther than this factor from the measured one does not set the weight."""
+ROUNDING = 1e-9
+"""Share of an amplitude below which its imaginary part is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,34 +43,27 @@ class Comparison:
         Model and data.
     measured
         Outputs (n, e), NaN where not measured.
-    inputs
-        (n, inputs).
     forced, free
         Indices of the forced experiments that can be predicted, and of the free vibrations.
+    rows
+        Which parts of the readings count, (forced, e, 2): those along and across each amplitude, but for
+        parts that no parameter moves, the imaginary ones of a model without damping; they say nothing of
+        errors.
     whiten
         Inverse root of each reading's covariance, (n, e, 2, 2).
-    experiment
-        Index of the experiment of each residual.
-    left_out, warnings
+    left_out
         In words.
     """
 
     model: HarmonicModel
     experiments: Experiments
     measured: ComplexArray
-    inputs: ComplexArray
     forced: IntArray
     free: IntArray
+    rows: BoolArray
     whiten: FloatArray
-    experiment: IntArray
     left_out: tuple[str, ...]
-    warnings: tuple[str, ...]
     _last: dict[bytes, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
-
-    @property
-    def depends_on_prediction(self) -> bool:
-        """Whether the errors grow with the amplitude, so that the prediction should set them."""
-        return any(name not in self.experiments.covariances for name in self.model.outputs)
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """(Predicted − measured) over the errors; NaN where the model has no answer (resonance, no mode)."""
@@ -82,19 +77,15 @@ class Comparison:
         """The same with errors at the amplitudes predicted by θ, where these are near the measured ones."""
         predicted, _ = self.predict(theta)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.abs(predicted) / np.abs(self.measured)
-        near = (ratio < TRUSTED) & (ratio > 1 / TRUSTED)
-        whiten, _ = whitening(self.experiments, self.model.outputs, np.where(near, predicted, self.measured))
-        return replace(self, whiten=whiten, _last={})
+            far = np.abs(np.log(np.abs(predicted) / np.abs(self.measured)))
+        size = np.where(far < np.log(TRUSTED), predicted, self.measured)
+        return replace(self, whiten=whitening(self.experiments, self.model.outputs, size), _last={})
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Amplitudes (n, e) and natural frequencies (n,), NaN where there are none."""
-        Z, frequencies = (
-            np.full(self.measured.shape, np.nan, dtype=complex),
-            np.full(len(self.measured), np.nan),
-        )
-        if len(self.forced):
-            Z[self.forced] = self._forced(theta, False)[0]
+        n, e = self.measured.shape
+        Z, frequencies = np.full((n, e), np.nan, dtype=complex), np.full(n, np.nan)
+        Z[self.forced] = self._forced(theta, slopes=False)[0]
         for i, _, _, mode in self._modes(theta):
             if mode is not None:
                 shape = self.measured[i].real
@@ -115,38 +106,36 @@ class Comparison:
         if len(self.free):  # a mode that the model does not have is left whole
             away = natural[self.free] / self.experiments.frequencies[self.free] - 1
             shares.append(float(np.mean(np.nan_to_num(away, nan=1.0) ** 2)))
-        return float(np.sqrt(np.mean(shares))) if shares else float("nan")
+        return float(np.sqrt(np.mean(shares))) if shares else np.nan
 
     def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         key = theta.tobytes()
         if key not in self._last:
             self._last.clear()
-            n = len(theta)
             try:
                 with np.errstate(all="ignore"):
-                    parts = [*self._forced_rows(theta), *self._free_rows(theta)]
-                self._last[key] = np.concatenate([r for r, _ in parts]), np.concatenate([J for _, J in parts])
+                    parts = [self._forced_rows(theta), *self._free_rows(theta)]
             except np.linalg.LinAlgError:
-                rows = len(self.experiment)
-                self._last[key] = np.full(rows, np.nan), np.full((rows, n), np.nan)
+                count = np.count_nonzero(self.rows) + np.count_nonzero(~np.isnan(self.measured[self.free]))
+                parts = [(np.full(count, np.nan), np.full((count, len(theta)), np.nan))]
+            r, J = zip(*parts, strict=True)
+            self._last[key] = np.concatenate(r), np.concatenate(J)
         return self._last[key]
 
     def _row(self, chosen: IntArray) -> dict[str, FloatArray]:
         return {name: values[chosen] for name, values in self.experiments.varying.items()}
 
-    def _forced(self, theta: FloatArray, slopes: bool) -> tuple[ComplexArray, ComplexArray]:
-        w, loads = self.experiments.frequencies[self.forced], self.inputs[self.forced]
-        return self.model.forced(theta, w, loads, slopes, self._row(self.forced))
+    def _forced(self, theta: FloatArray, *, slopes: bool) -> tuple[ComplexArray, ComplexArray]:
+        inputs = self.experiments.table(self.model.inputs)[self.forced]
+        w = self.experiments.frequencies[self.forced]
+        return self.model.forced(theta, w, inputs, slopes, self._row(self.forced))
 
-    def _forced_rows(self, theta: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-        if len(self.forced):
-            Z, dZ = self._forced(theta, True)
-            seen = ~np.isnan(self.measured[self.forced])
-            root = self.whiten[self.forced][seen]
-            gap, slope = (Z - self.measured[self.forced])[seen], dZ[seen]
-            r = np.einsum("kij,kj->ki", root, np.stack((gap.real, gap.imag), -1))
-            J = root @ np.stack((slope.real, slope.imag), 1)
-            yield r.reshape(-1), J.reshape(-1, len(theta))
+    def _forced_rows(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        Z, dZ = self._forced(theta, slopes=True)
+        gap, root = (Z - self.measured[self.forced])[..., None], self.whiten[self.forced]
+        both = root @ np.stack((gap.real, gap.imag), -2)
+        J = root @ np.stack((dZ.real, dZ.imag), -2)
+        return both[self.rows][:, 0], J[self.rows]
 
     def _modes(
         self, theta: FloatArray
@@ -168,7 +157,7 @@ class Comparison:
                 raise np.linalg.LinAlgError("the model has no such mode")
             v = mode[1] / mode[1][reference]
             dz, dv = mode_slopes(A, dA, mode[0], v, reference)
-            root, over = np.sqrt(mode[0]), self.whiten[i, :, 0, 0]
+            over = self.whiten[i, :, 0, 0]
             # without an error of its own the frequency has the relative one of the reference amplitude
             share, white = over[reference] * abs(shape[reference]) / omega, np.diag(over[others])
             if self.experiments.frequency_std is not None:
@@ -177,6 +166,7 @@ class Comparison:
                 common = shape[others] / (shape[reference] * over[reference])
                 whole = np.diag(over[others] ** -2) + np.outer(common, common)
                 white = np.linalg.inv(np.linalg.cholesky(whole))
+            root = np.sqrt(mode[0])
             r = np.concatenate(([(root - omega) * share], white @ (v * shape[reference] - shape)[others]))
             yield r, np.vstack((dz / (2 * root) * share, shape[reference] * white @ dv[others]))
 
@@ -192,45 +182,48 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     """
     model.check_square()
     measured, inputs = experiments.table(model.outputs), experiments.table(model.inputs)
-    given: BoolArray = np.asarray(~np.isnan(measured))
+    given = np.asarray(~np.isnan(measured))
     factors = model.multipliers(experiments.frequencies, experiments.varying)
     known = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1) | experiments.free
     usable = known & given.any(axis=1)
-    forced, free = (np.flatnonzero(usable & kind) for kind in (~experiments.free, experiments.free))
     hidden = ~given.any(axis=0)
     left_out = [f"{model.outputs[j]} is measured nowhere" for j in np.flatnonzero(hidden)]
+    what = "input or varying quantity" if model.varying else "input"
     for i, name in enumerate(experiments.names):
         lost = [o for o, g in zip(model.outputs, given[i] | hidden, strict=True) if not g]
         if not known[i]:
-            what = "input or varying quantity" if model.varying else "input"
             left_out.append(f"experiment {name}: left out, for not every {what} is known")
-        elif not usable[i]:
-            left_out.append(f"experiment {name}: left out, for no amplitude is measured")
-        elif lost:
-            left_out.append(f"experiment {name}: {', '.join(lost)} not measured")
+        elif lost or not usable[i]:
+            left_out.append(f"experiment {name}: {', '.join(lost) or 'everything'} not measured")
     if not usable.any():
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
-    whiten, warnings = whitening(experiments, model.outputs, measured)
-    readings = given.sum(axis=1)
-    experiment = np.concatenate((np.repeat(forced, 2 * readings[forced]), np.repeat(free, readings[free])))
-    return Comparison(
-        model, experiments, measured, inputs, forced, free, whiten, experiment, tuple(left_out), warnings
-    )
+    forced, free = (np.flatnonzero(usable & kind) for kind in (~experiments.free, experiments.free))
+    rows = np.repeat(given[forced][:, :, None], 2, axis=2)
+    if not (model.power % 2).any():
+        real = (inputs[forced].imag == 0).all(axis=1)[:, None]
+        rows[..., 1] &= ~(real & (np.abs(measured.imag) <= ROUNDING * np.abs(measured))[forced])
+    whiten = whitening(experiments, model.outputs, measured)
+    return Comparison(model, experiments, measured, forced, free, rows, whiten, tuple(left_out))
 
 
-def whitening(
-    experiments: Experiments, outputs: tuple[str, ...], amplitudes: ComplexArray
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across; and warnings."""
-    whiten, warnings = np.zeros((len(experiments), len(outputs), 2, 2)), []
+def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: ComplexArray) -> FloatArray:
+    """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across."""
+    whiten = np.zeros((len(experiments), len(outputs), 2, 2))
     for j, name in enumerate(outputs):
-        z = np.where(np.isnan(amplitudes[:, j]), 1.0, amplitudes[:, j])
-        size = np.abs(z)
-        floor = SMALL * float(np.median(size)) or 1.0
-        z = np.where(size < floor, floor, z)
-        u = z / np.abs(z)
-        turn = np.stack((np.stack((u.real, u.imag), -1), np.stack((-u.imag, u.real), -1)), -2)
-        turned = turn @ _covariance(experiments, name, z) @ np.swapaxes(turn, -1, -2)
+        size = np.abs(amplitudes[~np.isnan(amplitudes[:, j]), j])
+        floor = SMALL * float(np.median(size)) if size.any() else 1.0
+        z = np.where(np.abs(amplitudes[:, j]) >= floor, amplitudes[:, j], floor)
+        covariance = (np.abs(z) ** 2)[:, None, None] * np.eye(2)
+        if name in experiments.covariances:
+            covariance = experiments.covariances[name]
+        elif experiments.errors is not None:
+            covariance = experiments.errors.covariance(z)
+        elif experiments.covariances:
+            raise ValueError(
+                f"errors are known for some outputs but not for {name}: state them with [errors]"
+            )
+        turn = real_matrices(z.conj() / np.abs(z))
+        turned = turn @ covariance @ np.swapaxes(turn, -1, -2)
         trace = np.trace(turned, axis1=-2, axis2=-1)
         if (trace <= 0).any():
             raise ValueError(
@@ -238,21 +231,6 @@ def whitening(
             )
         low, high = np.moveaxis(np.linalg.eigvalsh(turned), -1, 0)
         thin = np.sqrt(np.clip(low, 0, None) / high) < THIN
-        if (thin & ~experiments.free).any():
-            warnings.append(
-                f"the stated errors of {name} make one direction of it exact: it counts with a "
-                f"{THIN:.0%} share of the other's error"
-            )
         turned = turned + (thin * THIN**2 * trace)[:, None, None] * np.eye(2)
         whiten[:, j] = np.linalg.inv(np.linalg.cholesky(turned)) @ turn
-    return whiten, tuple(warnings)
-
-
-def _covariance(experiments: Experiments, name: str, z: ComplexArray) -> FloatArray:
-    if name in experiments.covariances:
-        return np.asarray(experiments.covariances[name], dtype=np.float64)
-    if experiments.errors is not None:
-        return experiments.errors.covariance(z)
-    if experiments.covariances:
-        raise ValueError(f"errors are known for some outputs but not for {name}: state them with [errors]")
-    return np.asarray((np.abs(z) ** 2)[:, None, None] * np.eye(2))
+    return whiten

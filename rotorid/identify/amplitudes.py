@@ -49,23 +49,24 @@ class AmplitudeErrors:
         The error along the amplitude is √((relative·|Z|)² + floor²), across it √((phase·|Z|)² + floor²).
         Where `real` (free vibration) there is no imaginary part and its variance is zero.
         """
-        *variances, turn = self._axes(amplitudes)
-        e = np.stack((np.stack((turn.real, -turn.imag), -1), np.stack((turn.imag, turn.real), -1)), -2)
-        covariance = np.einsum("nij,nj,nkj->nik", e, np.stack(variances, -1), e)
-        covariance[np.broadcast_to(real, turn.shape)] *= np.diag([1.0, 0.0])
+        z = np.asarray(amplitudes, dtype=complex)
+        turn = real_matrices(np.exp(1j * np.angle(z)))
+        variances = np.multiply.outer(np.abs(z) ** 2, (self.relative**2, self.phase**2)) + self.floor**2
+        covariance = turn * variances[:, None] @ np.swapaxes(turn, 1, 2)
+        covariance[np.broadcast_to(real, z.shape)] *= np.diag([1.0, 0.0])
         return np.asarray(covariance)
 
     def drawn(self, amplitudes: ComplexArray, rng: np.random.Generator) -> ComplexArray:
         """Readings (n,) of amplitudes (n,): normal errors along and across each, of that covariance."""
-        *variances, turn = self._axes(amplitudes)
-        along, across = rng.standard_normal((2, len(turn))) * np.sqrt(variances)
-        return np.asarray(amplitudes + turn * (along + 1j * across))
+        size = np.abs(amplitudes)
+        along, across = np.hypot(np.outer((self.relative, self.phase), size), self.floor)
+        along, across = rng.standard_normal((2, len(size))) * (along, across)
+        return np.asarray(amplitudes + np.exp(1j * np.angle(amplitudes)) * (along + 1j * across))
 
-    def _axes(self, amplitudes: ComplexArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
-        """Variances along and across each amplitude, and its direction, (n,) each."""
-        z = np.asarray(amplitudes, dtype=complex)
-        along, across = ((share * np.abs(z)) ** 2 + self.floor**2 for share in (self.relative, self.phase))
-        return along, across, np.exp(1j * np.angle(z))
+
+def real_matrices(z: ComplexArray) -> FloatArray:
+    """How complex factors (…) act on real and imaginary parts, (…, 2, 2)."""
+    return np.stack((np.stack((z.real, -z.imag), -1), np.stack((z.imag, z.real), -1)), -2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,20 +114,17 @@ class Experiments:
         n, w = len(self.names), np.asarray(self.frequencies)
         if not n:
             raise ValueError("there are no experiments")
-        if w.shape != (n,) or np.shape(self.free) != (n,):
-            raise ValueError(f"{n} experiments need {n} frequencies and marks of free vibration")
-        if not np.isfinite(w).all() or (w < 0).any():
-            raise ValueError(f"frequencies must be finite and not negative; got {w.tolist()}")
+        if w.shape != (n,) or np.shape(self.free) != (n,) or not np.isfinite(w).all() or (w < 0).any():
+            raise ValueError(
+                f"{n} experiments need {n} marks of free vibration, and frequencies must be finite and not "
+                f"negative; got {w.tolist()}"
+            )
         for name, values in self.signals.items():
-            if np.shape(values) != (n,):
-                raise ValueError(f"{n} experiments need {n} amplitudes {name}; got shape {np.shape(values)}")
-            if np.isinf(values).any():
-                raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured)")
+            if np.shape(values) != (n,) or np.isinf(values).any():
+                raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured), {n} of them")
         for name, covariance in self.covariances.items():
-            if np.shape(covariance) != (n, 2, 2):
-                raise ValueError(f"the covariance of {name} must have shape ({n}, 2, 2)")
-            if name not in self.signals:
-                raise ValueError(f"a covariance is given for {name}, but no amplitudes")
+            if name not in self.signals or np.shape(covariance) != (n, 2, 2):
+                raise ValueError(f"the covariance of {name}, a signal, must have shape ({n}, 2, 2)")
 
     def __len__(self) -> int:
         return len(self.names)
@@ -147,16 +145,13 @@ class Experiments:
     def take(self, index: ArrayLike) -> Experiments:
         """Some of the experiments, by index or by a mask (n,)."""
         chosen = np.arange(len(self))[np.asarray(index)]
-        tables = ("signals", "covariances", "varying", "rounding")
-        parts: Any = {key: {name: x[chosen] for name, x in getattr(self, key).items()} for key in tables}
-        return replace(
-            self,
-            names=tuple(self.names[i] for i in chosen),
-            frequencies=self.frequencies[chosen],
-            frequency_std=None if self.frequency_std is None else self.frequency_std[chosen],
-            free=self.free[chosen],
-            **parts,
-        )
+        parts: dict[str, Any] = {"names": tuple(self.names[i] for i in chosen)}
+        for key in ("frequencies", "free", "frequency_std"):
+            values = getattr(self, key)
+            parts[key] = None if values is None else values[chosen]
+        for key in ("signals", "covariances", "varying", "rounding"):
+            parts[key] = {name: values[chosen] for name, values in getattr(self, key).items()}
+        return replace(self, **parts)
 
     def table(self, names: Sequence[str]) -> ComplexArray:
         """Amplitudes of some signals, (n, signals), NaN where not measured."""
@@ -221,16 +216,13 @@ def experiments(
         if z.shape not in ((), w.shape):
             raise ValueError(f"{len(w)} experiments need {len(w)} amplitudes {name}; got shape {z.shape}")
         table[name] = np.broadcast_to(z, w.shape).copy()
-    if free is None:
-        marks = np.full(w.shape, not model.has_constant_terms)
-        for name, z in table.items():
-            if name in model.signals:
-                marks &= np.isnan(z) | ((z == 0) if name in model.inputs else (z.imag == 0))
-    else:
-        marks = np.broadcast_to(np.asarray(free, dtype=bool), w.shape).copy()
+    marks = np.full(w.shape, not model.has_constant_terms) if free is None else np.resize(free, w.shape)
+    for name in set(table) & set(model.signals) if free is None else ():
+        z = table[name]
+        marks &= np.isnan(z) | ((z == 0) if name in model.inputs else (z.imag == 0))
     for name in model.inputs:
         if name in table or marks.any():
             table[name] = np.where(marks, 0, table.get(name, np.full(w.shape, np.nan)))
     rows = {name: np.asarray(table.pop(name).real) for name in model.varying if name in table}
-    labels = tuple(names) if names is not None else tuple(str(i + 1) for i in range(len(w)))
-    return Experiments(labels, w, table, marks, errors, dict(covariances or {}), rows)
+    labels = tuple(names or map(str, range(1, len(w) + 1)))
+    return Experiments(labels, w, table, marks.astype(bool), errors, dict(covariances or {}), rows)

@@ -83,6 +83,11 @@ class HarmonicModel:
         return np.array([[float(f.exact.get(m, 0)) for m in (ONE, *self.monomials)] for f in self.features])
 
     @cached_property
+    def of_unknowns(self) -> FloatArray:
+        """Of the features in the combinations, the unknowns of regression, (features, u)."""
+        return self.coefficients[:, 1:][:, self.combinations.pivots] / self.combinations.scales
+
+    @cached_property
     def exponents(self) -> FloatArray:
         """Exponents of the parameters, (1 + monomials, parameters); row 0 is the constant 1."""
         powers = [dict(m) for m in (ONE, *self.monomials)]
@@ -156,14 +161,6 @@ class HarmonicModel:
         terms = self.multipliers(frequencies, varying) * self.polynomials(values)[0]
         return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
 
-    def sizes(
-        self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray]
-    ) -> FloatArray:
-        """Sums of the sizes of the terms of each coefficient, shape as of `matrices`."""
-        products = np.abs(products_of_powers(self.exponents, values)[0])
-        terms = np.abs(self.multipliers(frequencies, varying)) * (np.abs(self.coefficients) @ products)
-        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
-
     def predict(
         self,
         values: FloatArray,
@@ -182,7 +179,7 @@ class HarmonicModel:
         table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
         for j, name in enumerate(self.inputs):
             table[:, j] = inputs[name]
-        amplitudes, _ = self.forced(values, frequencies, table, False, varying)
+        amplitudes = self.forced(values, frequencies, table, False, varying)[0]
         return dict(zip(self.outputs, amplitudes.T, strict=True))
 
     def forced(
@@ -216,16 +213,15 @@ class HarmonicModel:
         n, e = len(frequencies), len(self.outputs)
         multipliers = self.multipliers(frequencies, varying)
         P, dP = self.polynomials(values)
-        whole = (multipliers * P @ self._place).reshape(n, e, -1)
+        whole = (multipliers * P @ self._place).reshape(n, e, 1 + len(self.signals))
         given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
         A = whole[:, :, :e]
         Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
         if not slopes:
             return Z, np.zeros((n, e, 0), dtype=complex)
         load = multipliers * np.concatenate((Z, given), axis=1)[:, self.column]
-        rows = [np.flatnonzero(self.equation == i) for i in range(e)]
-        G = -np.stack([load[:, f] @ dP[f] for f in rows], axis=1)
-        return Z, np.asarray(np.linalg.solve(A, G))
+        G = [load[:, self.equation == i] @ dP[self.equation == i] for i in range(e)]
+        return Z, np.asarray(np.linalg.solve(A, -np.stack(G, axis=1)))
 
     def dynamic_stiffness(
         self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None
@@ -264,13 +260,11 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
     """Products Π θ^e (m,) of exponents (m, n), and their derivatives (m, n) by θ."""
     theta = np.asarray(values, dtype=float)
     products = np.prod(theta**exponents, axis=1)
-    if theta.all():
-        return products, products[:, None] * exponents / theta
-    slopes = np.zeros_like(exponents)
-    for j in range(len(theta)):
-        used = np.flatnonzero(exponents[:, j])
-        lower = exponents[used] - np.eye(len(theta))[j]
-        slopes[used, j] = exponents[used, j] * np.prod(theta**lower, axis=1)
+    slopes = products[:, None] * exponents / np.where(theta == 0, 1.0, theta)
+    for j in np.flatnonzero(theta == 0):
+        power = exponents[:, j]
+        lower = np.where((power != 0)[:, None], exponents - np.eye(len(theta))[j], 0.0)
+        slopes[:, j] = power * np.prod(theta**lower, axis=1)
     return products, slopes
 
 
@@ -295,13 +289,11 @@ def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
     first, last = float(np.abs(A[0]).max()), float(np.abs(A[-1]).max())
     unit = (first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
-    scaled = A * unit ** np.arange(degree + 1)[:, None, None]
     L, R = np.eye(degree * e, k=e), np.eye(degree * e)
-    L[-e:] = -np.hstack([*scaled[:-1]])
-    R[-e:, -e:] = scaled[-1]
-    (alpha, beta), y = eig(L, R, homogeneous_eigvals=True)
+    L[-e:] = -np.hstack([part * unit**k for k, part in enumerate(A[:-1])])
+    R[-e:, -e:] = A[-1] * unit**degree
     with np.errstate(divide="ignore", invalid="ignore"):
-        z = alpha / beta
+        z, y = eig(L, R)
     good = np.flatnonzero(np.isfinite(z) & (np.abs(z.imag) <= 1e-8 * np.abs(z)) & (z.real > 1e-12))
     good = good[np.argsort(z[good].real)]
     v = y[:e, good]
@@ -316,9 +308,8 @@ def nearest_mode(
     if not len(z):
         return None
     seen = ~np.isnan(shape)
-    u, w = shape[seen], v[seen]
-    size = (w * w).sum(axis=0) * float(u @ u)
-    mac = np.divide((u @ w) ** 2, size, out=np.zeros_like(z), where=size > 0)
+    size = np.linalg.norm(v[seen], axis=0) * np.linalg.norm(shape[seen])
+    mac = np.divide(shape[seen] @ v[seen], size, out=np.zeros_like(z), where=size > 0) ** 2
     away = np.abs(np.log(np.sqrt(z) / frequency))
     best = int(np.argmin(np.where(mac >= mac.max() - MAC_SLACK, away, np.inf)))
     return float(z[best]), np.asarray(v[:, best])
@@ -338,8 +329,7 @@ def mode_slopes(
     bordered[:e, :e] = np.tensordot(z**k, A, axes=1)
     bordered[:e, e] = slope @ v * z  # unknown: relative change of z, of the size of the others
     bordered[e, reference] = 1.0
-    rows = np.abs(bordered).max(axis=1, keepdims=True)
-    rows[rows == 0] = 1.0
+    rows = np.fmax(np.abs(bordered).max(axis=1, keepdims=True), 1e-300)
     solved = np.linalg.solve(bordered / rows, np.vstack((force, np.zeros(force.shape[1]))) / rows)
     return solved[e] * z, solved[:e]
 

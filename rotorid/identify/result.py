@@ -110,8 +110,8 @@ class Identification(Answered, Uncertain):
         equation. NaN where left out.
         """
         if not self.predicted and self.linear:
-            rows = self.linear.rows
-            left = np.where(rows.used, rows.Y - rows.K @ self.linear.solution, np.nan)
+            left = np.full(self.linear.used.shape, np.nan)
+            left[self.linear.used] = self.linear.estimate.residuals
             return {
                 f"equation {e // 2 + 1}": left[:, e] + 1j * left[:, e + 1] for e in range(0, left.shape[1], 2)
             }

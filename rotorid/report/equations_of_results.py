@@ -51,7 +51,7 @@ def _(found: Identification) -> Equations:
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)
     ]
-    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.rows.used)]
+    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.used)]
     notes = [
         f"{model.combinations.words[i]} = 1: the others are relative to it" for i in fit.fixed.nonzero()[0]
     ]

@@ -29,9 +29,10 @@ def exact(equation, known, estimate, frequencies, errors=None, digits=None, **op
 def test_the_order_of_solutions_does_not_hang_on_rounding(last_digit, monkeypatch):
     """T0 of both solutions is the same but for rounding: the larger T1 comes first."""
     names = ("T0", "T1", "T2")
-    exponents = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]])
-    matrix = np.array([[1.0, 0, 0, 0], [0, 1, 1, 0], [0, 0, 0, 1]])
-    system = System(names, exponents, matrix, np.array([1.0, 1.3, 0.4]), None, 0 * matrix)
+    exponents = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]])
+    matrix = np.array([[0.0, 1, 0, 0, 0], [0, 0, 1, 1, 0], [0, 0, 0, 0, 1]])
+    below = np.tile(np.eye(5)[0], (3, 1))
+    system = System(names, exponents, matrix, np.array([1.0, 1.3, 0.4]), None, below)
     starts = [np.array([1.0 + last_digit, 0.5, 0.8]), np.array([1.0, 0.8, 0.5])]
     monkeypatch.setattr("rotorid.identify.recovery._candidates", lambda *_: (starts, True))
     monkeypatch.setattr("rotorid.identify.recovery._refined", lambda _system, start, *_: start)
@@ -125,9 +126,10 @@ def test_what_stands_alone_is_known_even_without_a_real_solution():
 
 
 def system(names, monomials, values, covariance=None):
-    exponents = np.array(monomials, dtype=float)
-    one = np.eye(len(monomials))
-    return System(tuple(names), exponents, one, np.array(values, dtype=float), covariance, 0 * one)
+    exponents = np.array([0 * np.array(monomials[0]), *monomials], dtype=float)
+    one = np.eye(len(exponents))
+    below = np.tile(one[0], (len(monomials), 1))
+    return System(tuple(names), exponents, one[1:], np.array(values, dtype=float), covariance, below)
 
 
 def test_ratios_are_found_although_their_parts_are_open():
@@ -153,7 +155,14 @@ def test_units_of_a_combination_change_nothing(unit):
     plain, scale = recover(inputs), np.array([unit, 1.0, 1.0])
     stated = covariance * np.outer(scale, scale)
     other = recover(
-        System(inputs.names, inputs.exponents, np.diag(scale), values * scale, stated, inputs.below)
+        System(
+            inputs.names,
+            inputs.exponents,
+            scale[:, None] * inputs.matrix,
+            values * scale,
+            stated,
+            inputs.below,
+        )
     )
     np.testing.assert_allclose(other.values, plain.values, rtol=1e-9)
     np.testing.assert_allclose(other.gain * scale, plain.gain, rtol=1e-6, atol=1e-9)
@@ -175,11 +184,11 @@ def test_gain_is_the_derivative_of_the_recovery():
 
 def test_a_system_that_cannot_be_reduced_is_searched_and_says_so():
     # x² + y², x² + x·y + y³: no unknown is linear
-    exponents = np.array([[2, 0], [0, 2], [1, 1], [0, 3]], dtype=float)
-    matrix = np.array([[1.0, 1, 0, 0], [1.0, 0, 1, 1]])
+    exponents = np.array([[0, 0], [2, 0], [0, 2], [1, 1], [0, 3]], dtype=float)
+    matrix, below = np.array([[0.0, 1, 1, 0, 0], [0, 1.0, 0, 1, 1]]), np.tile(np.eye(5)[0], (2, 1))
     truth = np.array([1.5, 0.5])
     values = matrix @ np.prod(truth**exponents, axis=1)
-    found = recover(System(("x", "y"), exponents, matrix, values, None, 0 * matrix))
+    found = recover(System(("x", "y"), exponents, matrix, values, None, below))
     assert any(np.allclose(s, truth, rtol=1e-9) for s in found.solutions)
     for s in found.solutions:
         np.testing.assert_allclose(matrix @ np.prod(s**exponents, axis=1), values, rtol=1e-9)

@@ -90,14 +90,11 @@ def test_an_equation_that_follows_from_others_is_refused(more):
 
 
 @pytest.mark.full
-def test_noise_and_a_wrong_model_are_told_apart_by_the_order_of_the_residuals():
+def test_noise_is_not_taken_for_a_wrong_sign():
     noisy = [readings(seed, 2, AmplitudeErrors(0.2, 0.2), stated=False) for seed in range(8)]
     words = [" ".join(identify(m, d).warnings) for m, d in noisy]
     assert sum("unless they are as noisy as that" in text for text in words) >= 6, words
     assert not any("no passive" in text for text in words), words
-    one = harmonic_model(ONE, estimate=["m", "b", "k"])
-    said = spoken(8, 2, lambda m, d: (one, d), False)
-    assert sum("not at random over the frequency" in text for text in said) >= 3, said
 
 
 @pytest.mark.parametrize("stated", [False, True])
