@@ -13,25 +13,22 @@ import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.identify.answers import Answers
-from rotorid.identify.modes_readings import Readings, Whitened
+from rotorid.identify.modes_readings import Readings, projected
 from rotorid.identify.modes_result import FittedModes
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
-TRUSTED = 3.0
-"""Farther than this factor from a reading the fit does not set its error."""
-CLEARLY = 3.0
-"""By so much more likely (logarithm, of as many readings as are spare) errors must be of one size."""
+TRUSTED, CLEARLY = 3.0, 3.0
+"""Farther than this factor from a reading the fit does not set its error; by so much more likely (logarithm,
+of as many readings as are spare) errors must be of one size."""
 ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
+Bands = Sequence[tuple[float, float]]
 
 
 def fit_modes(
-    readings: Readings,
-    answers: Answers,
-    bands: Sequence[tuple[float, float]] | None = None,
-    around: Sequence[tuple[float, float]] | None = None,
+    readings: Readings, answers: Answers, bands: Bands | None = None, around: Bands | None = None
 ) -> FittedModes:
     """Fit modes to amplitudes around resonances.
 
@@ -52,12 +49,12 @@ def fit_modes(
     ValueError
         Where there is no peak, bands overlap, and where readings are fewer than unknowns.
     """
-    read = ~np.isnan(readings.vectors).all(axis=1)
+    w, read = readings.speeds, ~np.isnan(readings.vectors).all(axis=1)
     if bands is not None:
-        read &= np.any([(readings.speeds >= low) & (readings.speeds <= high) for low, high in bands], axis=0)
+        read &= np.any([(w >= low) & (w <= high) for low, high in bands], axis=0)
     if not read.any():
         raise ValueError("there are no readings in --bands")
-    order = np.flatnonzero(read)[np.argsort(readings.speeds[read], kind="stable")]
+    order = np.flatnonzero(read)[np.argsort(w[read], kind="stable")]
     readings, answers = readings.take(order), answers.take(order)
     omega, Z = readings.speeds, readings.vectors
     H = (Z.T / answers.excitation).T
@@ -83,23 +80,25 @@ def fit_modes(
 
 
 def _search(
-    readings: Readings,
-    answers: Answers,
-    q: FloatArray,
-    ends: Sequence[tuple[float, float]],
-    *,
-    stated: bool = True,
-) -> tuple[float, NonlinearEstimate, Whitened]:
-    """Likelihood (its logarithm but for a constant), fit, and the readings over their errors."""
+    readings: Readings, answers: Answers, q: FloatArray, ends: Bands, *, stated: bool = True
+) -> tuple[float, NonlinearEstimate, FloatArray]:
+    """Likelihood (its logarithm but for a constant), fit, and inverse roots of the readings' covariances."""
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(ends) + 1)]
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
     limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
     amplitudes = Z = readings.vectors
     for turn in range(ROUNDS):
-        whitened = Whitened(answers, Z, readings.inverse_roots(amplitudes))
+        root, last = readings.inverse_roots(amplitudes), dict[bytes, tuple[FloatArray, ...]]()
+
+        def at(q: FloatArray, root: FloatArray = root, last: dict = last) -> tuple[FloatArray, ...]:  # type: ignore[type-arg]
+            if q.tobytes() not in last:
+                last.clear()
+                last[q.tobytes()] = projected(answers.basis(q), Z, root)
+            return last[q.tobytes()]
+
         fit = nonlinear_least_squares(
-            whitened.rest,
-            whitened.slopes,
+            lambda q, at=at: at(q)[0],
+            lambda q, at=at: at(q)[1],
             q,
             names=names,
             sigma_stated=stated,
@@ -107,13 +106,14 @@ def _search(
             near=turn > 0,
         )
         q = fit.estimate.solution
-        model = whitened.model(q)
-        ratio = np.abs(model) / np.abs(Z)
-        amplitudes = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
+        model = answers.basis(q)[0] @ at(q)[2].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            near = np.abs(np.log(np.abs(model) / np.abs(Z))) < np.log(TRUSTED)
+        amplitudes = np.where(near, model, Z)
     r = fit.estimate.residuals
-    size = np.abs(np.linalg.det(whitened.root[~np.isnan(Z)]))
+    size = np.abs(np.linalg.det(root[~np.isnan(Z)]))
     likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))
-    return float(likely * fit.estimate.dof / 2), fit, whitened
+    return float(likely * fit.estimate.dof / 2), fit, root
 
 
 def peak_bands(

@@ -9,14 +9,13 @@ are −Qᵀ K' c, c = T⁻¹ Qᵀ x above (variable projection, Kaufman 1975). S
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from balancing import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.unit_words import SPEEDS
-from rotorid.identify.answers import Answers
+from rotorid.identify.amplitudes import real_matrices
 
 THIN, SMALL = 0.01, 1e-3
 """No direction of a reading is more exact than this share of the other; an amplitude counts as this share of
@@ -86,90 +85,48 @@ class Readings:
             variances, axes = np.linalg.eigh(np.nan_to_num(self.covariances, nan=1.0))
             variances = np.maximum(variances, THIN**2 * variances[..., 1:])
             return np.asarray(np.swapaxes(axes, -1, -2) / np.sqrt(variances)[..., None])
-        along, across = self.shares or (1.0, 1.0)
-        least = THIN * max(along, across)
-        z = np.where(np.isnan(amplitudes), 1.0, amplitudes)
-        z = np.where(z == 0, np.finfo(float).tiny, z)
-        floor = SMALL * np.nanmedian(np.abs(amplitudes), axis=0)
-        size, u = np.maximum(np.abs(z), floor), z / np.abs(z)
-        turn = np.stack((np.stack((u.real, u.imag), -1), np.stack((-u.imag, u.real), -1)), -2)
-        errors = np.multiply.outer(size, (max(along, least), max(across, least)))
-        return np.asarray(turn / errors[..., None])
+        shares = np.array(self.shares or (1.0, 1.0))
+        size = np.fmax(np.abs(amplitudes), SMALL * np.nanmedian(np.abs(amplitudes), axis=0))
+        errors = np.multiply.outer(size, np.maximum(shares, THIN * shares.max()))
+        return real_matrices(np.exp(-1j * np.angle(np.nan_to_num(amplitudes)))) / errors[..., None]
 
 
-class Projected(NamedTuple):
-    """What R, a and b do not explain (m,), its slopes by ω_r and ζ_r (m, 2k), R, a and b (C, k + 2), and
-    their covariances, (C, k + 2, 2, k + 2, 2).
+def projected(
+    basis: tuple[ComplexArray, ComplexArray], vectors: ComplexArray, root: FloatArray
+) -> tuple[FloatArray, FloatArray, ComplexArray, FloatArray]:
+    """What modes explain of vectors (N, C), by the inverse roots of their covariances (N, C, 2, 2).
+
+    Parameters
+    ----------
+    basis
+        Answers (N, k + 2), and their slopes by ω_r and ζ_r (N, 2k).
+    vectors, root
+        The readings, NaN where there is none.
+
+    Returns
+    -------
+    What R, a and b do not explain (m,), its slopes by ω_r and ζ_r (m, 2k), R, a and b (C, k + 2), and their
+    covariances, (C, k + 2, 2, k + 2, 2).
     """
+    from scipy.linalg import lapack
 
-    rest: FloatArray
-    slopes: FloatArray
-    linear: ComplexArray
-    spread: FloatArray
+    columns, slopes = basis
+    design = np.stack((columns, 1j * columns), axis=-1).reshape(len(columns), -1)
+    size, parts = design.shape[1], []
+    for x, over in zip(vectors.T, np.swapaxes(root, 0, 1), strict=True):
+        seen = ~np.isnan(x)
 
+        def real(z: ComplexArray, seen: FloatArray = seen, over: FloatArray = over) -> FloatArray:
+            whitened = over[seen] @ np.stack((z[seen].real, z[seen].imag), axis=1)
+            return np.asarray(whitened.reshape(-1, z.shape[1]))
 
-@dataclass(frozen=True, eq=False)
-class Whitened:
-    """Vectors (N, C), what they are made of, and inverse roots of their covariances (N, C, 2, 2)."""
-
-    answers: Answers
-    vectors: ComplexArray
-    root: FloatArray
-    _last: dict[bytes, Projected] = field(default_factory=dict)
-
-    def at(self, q: FloatArray) -> Projected:
-        """What modes of these ω_r and ζ_r explain."""
-        key = q.tobytes()
-        if key not in self._last:
-            columns, slopes = self.answers.basis(q)
-            design = np.stack((columns, 1j * columns), axis=-1).reshape(len(columns), -1)
-            each = zip(*(self._sensor(c, design, slopes) for c in range(self.root.shape[1])), strict=True)
-            rest, by_q, linear, spread = each
-            self._last.clear()
-            self._last[key] = Projected(
-                np.concatenate(rest),
-                np.concatenate(by_q),
-                np.array(linear, dtype=np.complex128),
-                np.array(spread),
-            )
-        return self._last[key]
-
-    def _sensor(self, c: int, columns: ComplexArray, slopes: ComplexArray) -> Projected:
-        """The same of one sensor."""
-        from scipy.linalg import lapack
-
-        seen = ~np.isnan(self.vectors[:, c])
-
-        def real(z: ComplexArray) -> FloatArray:
-            parts = self.root[seen, c] @ np.stack((z[seen].real, z[seen].imag), axis=1)
-            return np.asarray(parts.reshape(-1, z.shape[1]))
-
-        def turned(x: FloatArray) -> FloatArray:
-            return np.asarray(lapack.dormqr("L", "T", triangle, tau, x, max(1, 64 * x.shape[1]))[0])
-
-        size = columns.shape[1]
-        triangle, tau, *_ = lapack.dgeqrf(real(columns))
-        y, inverse = turned(real(self.vectors[:, [c]]))[:, 0], np.linalg.inv(np.triu(triangle[:size]))
-        linear = np.asarray((inverse @ y[:size]).reshape(-1, 2) @ (1, 1j), dtype=np.complex128)
-        by_q = -turned(real(slopes * np.tile(linear[:-2], 2)))[size:]
-        return Projected(y[size:], by_q, linear, (inverse @ inverse.T).reshape(size // 2, 2, -1, 2))
-
-    def rest(self, q: FloatArray) -> FloatArray:
-        """What they leave."""
-        return self.at(q).rest
-
-    def slopes(self, q: FloatArray) -> FloatArray:
-        """Its derivatives."""
-        return self.at(q).slopes
-
-    def model(self, q: FloatArray, answers: Answers | None = None) -> ComplexArray:
-        """The vectors (N, C) that explain these best; with other answers those of the same modes there."""
-        return np.asarray((answers or self.answers).basis(q)[0] @ self.at(q).linear.T)
-
-    def without(self, omega: float, least: int) -> Whitened:
-        """All but those next to a frequency; all, where a sensor would have fewer than `least`."""
-        gap = np.abs(self.answers.omega - omega)
-        rest = np.flatnonzero(self.answers.omega != self.answers.omega[gap.argmin()])
-        if min(np.count_nonzero(~np.isnan(self.vectors[rest]), axis=0)) < least:
-            return self
-        return Whitened(self.answers.take(rest), self.vectors[rest], self.root[rest])
+        triangle, tau, *_ = lapack.dgeqrf(real(design))
+        y = lapack.dormqr("L", "T", triangle, tau, real(x[:, None]), 64)[0][:, 0]
+        inverse = np.linalg.inv(np.triu(triangle[:size]))
+        linear = (inverse @ y[:size]).reshape(-1, 2) @ (1, 1j)
+        turned = real(slopes * np.tile(linear[:-2], 2))
+        turned = lapack.dormqr("L", "T", triangle, tau, turned, 64 * turned.shape[1])[0]
+        spread = (inverse @ inverse.T).reshape(size // 2, 2, -1, 2)
+        parts.append((y[size:], -turned[size:], linear, spread))
+    rest, by_q, linear, spread = zip(*parts, strict=True)
+    return np.concatenate(rest), np.concatenate(by_q), np.array(linear), np.array(spread)

@@ -10,7 +10,6 @@ import numpy as np
 from fem.plots import draw_polar, right_angles
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import (
-    BOX,
     COLORS,
     DARK,
     MARKERS,
@@ -18,13 +17,11 @@ from rotorid.base.plot_style import (
     legend_below,
     look,
     new_figure,
-    note,
     on_figure,
     plain,
     rad_s_above,
 )
 from rotorid.base.rpm import RPM
-from rotorid.base.text import counted
 from rotorid.base.unit_words import SPEEDS, Shown
 
 if TYPE_CHECKING:
@@ -34,11 +31,10 @@ if TYPE_CHECKING:
     from rotorid.identify.modes_readings import Readings
     from rotorid.identify.modes_result import FittedModes
 
-MODES, CURVES = 4, len(COLORS)
-"""Most modes and curves of a picture."""
-MOST = f"at most {CURVES} curves"
-POINTS, HIDDEN = 1000, 3.0
-"""Of a fitted curve; standard deviations below which a vector has no phase to draw."""
+MODES, CURVES, POINTS = 4, len(COLORS), 1000
+"""Most modes and curves of a picture; points of a fitted curve."""
+HIDDEN = 3.0
+"""Standard deviations below which a vector has no phase to draw."""
 FIT: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1))}
 
 
@@ -50,13 +46,12 @@ def figure_modes(modes: FittedModes) -> Figure:
     axes = figure.subplots(k, 2, squeeze=False, width_ratios=(2, 3))
     for mode, ((circle, peak), (low, high)) in enumerate(zip(axes, modes.ends, strict=False)):
         rows, grid = (data.speeds >= low) & (data.speeds <= high), np.linspace(low, high, POINTS)
-        curves = size * modes.curve(grid)
-        for p, name in enumerate(data.sensors[:CURVES]):
-            read, fit, style = size * data.vectors[rows, p], curves[:, p], look(p)
+        for p, (name, fit) in enumerate(zip(data.sensors[:CURVES], size * modes.curve(grid).T, strict=False)):
+            read = size * data.vectors[rows, p]
             mark = {"ls": "", "marker": MARKERS[p], "mfc": "none", "color": COLORS[p], "ms": 5}
-            circle.plot(fit.real, fit.imag, **style)
+            circle.plot(fit.real, fit.imag, **look(p))
             circle.plot(read.real, read.imag, label=name, **mark)
-            peak.plot(scale * grid, np.abs(fit), **style)
+            peak.plot(scale * grid, np.abs(fit), **look(p))
             peak.plot(scale * data.speeds[rows], np.abs(read), **mark)
         at = "" if modes.undetermined else f": {data.words(modes.values[0, mode])}"
         circle.set_title(f"mode {mode + 1}{at}", loc="left", fontsize=TEXT)
@@ -66,45 +61,44 @@ def figure_modes(modes: FittedModes) -> Figure:
         for ax in (circle, peak):
             ax.locator_params("x", nbins=4)
             plain(ax)
-    drawn = f"{k} of {counted(len(modes.ends), 'mode')}, at most {CURVES} points"
+    drawn = f"{k} of {len(modes.ends)} modes, at most {CURVES} points"
     legend_below(figure, axes[:1, 0], 5, title=f"hollow: readings; lines: fit ({drawn})")
     return figure
 
 
 def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes | None) -> Figure:
-    """Amplitude and phase over speed less the slow roll (C,); as read, thin; the fit of the first sweep."""
+    """Amplitude and phase over speed less the slow roll (C,), and the fit of the first sweep."""
     figure, labels = new_figure(6.6), sweeps[0].labels
-    scale, sign = labels.vibration_scale, labels.phase_sign
-    above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+    sign = labels.phase_sign
+    above, below = axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     for k, (sweep, c, name, omega, read) in enumerate(_curves(sweeps)):
-        rpm, vectors = RPM * omega, read - roll[c]
-        above.plot(rpm, scale * np.abs(read), color=COLORS[k], linewidth=0.6)
-        above.plot(rpm, scale * np.abs(vectors), linewidth=1.6, label=name, **look(k))
+        vectors = read - roll[c]
         seen = np.abs(vectors) > HIDDEN * np.nanmedian(sweep.noise[:, c])
         phase = sign * np.degrees(np.unwrap(np.angle(vectors[seen])))
         phase -= 360 * np.floor(np.median(phase) / 360) if seen.any() else 0.0
-        below.plot(rpm[seen], phase, linewidth=1.6, **look(k))
+        above.plot(RPM * omega, labels.vibration_scale * np.abs(vectors), lw=1.6, label=name, **look(k))
+        below.plot(RPM * omega[seen], phase, lw=1.6, **look(k))
         if fit is not None and sweep is sweeps[0]:
             model = fit.curve(omega)[:, c] - roll[c]
-            above.plot(rpm, scale * np.abs(model), label=f"fit, run {sweep.run}", **FIT)
             turn = np.degrees(np.angle(model * vectors.conj()))[seen]
-            below.plot(rpm[seen], phase + sign * turn, **FIT)
-    for omega in [] if fit is None else RPM * fit.values[0]:
-        for ax in (above, below):
-            ax.axvline(omega, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
-        place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "rotation": 90, "va": "top"}
-        note(above, f"{omega:.0f} rpm", (omega, 0.98), (-2, 0), bbox=BOX, ha="right", **place)
-    above.set(ylabel=f"amplitude, {_unit(sweeps[0])}")
-    above.set_ylim(0.0, above.get_ylim()[1] * (1.0 if fit is None else 1.25))  # room for the words
+            label = f"fit, run {sweep.run}"
+            above.plot(RPM * omega, labels.vibration_scale * np.abs(model), label=label, **FIT)
+            below.plot(RPM * omega[seen], phase + sign * turn, **FIT)
+    above.set(ylabel=f"amplitude, {_unit(sweeps[0])}", ylim=(0.0, None))
     below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees")
     below.yaxis.set_major_locator(right_angles(below))
     if labels.phase == "lag":
         below.invert_yaxis()  # through a critical speed the curve falls, as everywhere
-    for ax in (above, below):
+    critical = [] if fit is None else RPM * fit.values[0]
+    for ax in axes:
+        for speed in critical:
+            ax.axvline(speed, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
         plain(ax)
         ax.margins(x=0.01)
     rad_s_above(above)
-    legend_below(figure, (above,), 3, title=f"thin: as read; else less the slow roll; {MOST}")
+    words = ", ".join(f"{speed:.0f}" for speed in critical)
+    title = f"less the slow roll; at most {CURVES} curves" + (f"; critical: {words} rpm" if words else "")
+    legend_below(figure, (above,), 3, title=title)
     return figure
 
 
@@ -113,12 +107,12 @@ def polar_plot(sweeps: Sequence[Readings], roll: ComplexArray) -> Figure:
     every, nothing = np.unique(np.concatenate([s.speeds for s in sweeps])), complex(np.nan, np.nan)
     labels, curves = sweeps[0].labels, _curves(sweeps)
     paths = [np.interp(every, omega, read - roll[c], nothing, nothing) for _, c, _, omega, read in curves]
-    unit = Shown(_unit(sweeps[0]), labels.vibration_scale)
+    unit, marks = Shown(_unit(sweeps[0]), labels.vibration_scale), max(3, 16 // len(curves))
 
     def draw(ax: Axes) -> None:
-        lag, marks = labels.phase == "lag", max(3, 16 // len(curves))
-        draw_polar(every, np.transpose(paths), [c[2] for c in curves], ax, marks=marks, unit=unit, lag=lag)
-        ax.set_title(f"{ax.get_title()}\nless the slow roll; {MOST}", fontsize=TEXT)
+        names, lag = [name for _, _, name, *_ in curves], labels.phase == "lag"
+        draw_polar(every, np.transpose(paths), names, ax, marks=marks, unit=unit, lag=lag)
+        ax.set_title(f"{ax.get_title()}\nless the slow roll; at most {CURVES} curves", fontsize=TEXT)
 
     return on_figure(draw, height=7.4, projection="polar")
 

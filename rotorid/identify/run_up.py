@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.identify.answers import Answers, SteadyAnswers, swept_answers
-from rotorid.identify.modes import fit_modes, peak_bands
+from rotorid.identify.modes import Bands, fit_modes, peak_bands
 from rotorid.identify.modes_readings import Readings
 from rotorid.identify.modes_result import RARE, FittedModes
 
@@ -20,23 +19,15 @@ SAME = 1e-9
 SLOWEST, NEIGHBOURS = 3, 7
 """So many vectors of the slowest are the run-out, where peaks are looked for; so many around a speed lie on
 a parabola, but for what modes explain."""
-Bands = Sequence[tuple[float, float]]
 
 
-class SweepModes(NamedTuple):
-    """Modes of a sweep with its acceleration, if it is known; and as if every speed had been held, beside."""
-
-    fit: FittedModes
-    steady: FittedModes | None
-
-
-def fit_sweep(sweep: Readings, *, steady: bool = False, bands: Bands | None = None) -> SweepModes:
+def fit_sweep(sweep: Readings, *, steady: bool = False, bands: Bands | None = None) -> FittedModes:
     """Fit modes to the vectors of a sweep.
 
     Parameters
     ----------
     sweep
-        Its times tell the acceleration.
+        Its times tell the acceleration; then the modes as if every speed had been held stand beside.
     steady
         The acceleration does not matter, or nobody knows it.
     bands
@@ -49,10 +40,9 @@ def fit_sweep(sweep: Readings, *, steady: bool = False, bands: Bands | None = No
     """
     held = SteadyAnswers(sweep.speeds, (sweep.speeds**2).astype(np.complex128))
     if steady or sweep.time is None:
-        return SweepModes(_fit(sweep, held, bands), None)
+        return _fit(sweep, held, bands)
     fit = _fit(sweep, swept_answers(sweep.time, sweep.speeds), bands)
-    beside = fit_modes(sweep, held, bands, fit.ends)
-    return SweepModes(fit, beside)
+    return replace(fit, steady=fit_modes(sweep, held, bands, fit.ends))
 
 
 def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
@@ -72,11 +62,8 @@ def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
 
 def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
     """What no speed changes: run-out, and modes far below. Vectors (C,) and covariances of their parts."""
-
-    def columns(q: FloatArray) -> ComplexArray:
-        return np.asarray(np.eye(q.size // 2 + 2)[-1:] * q[0] ** 2, dtype=complex)
-
-    vectors, covariances = fit.predicted(columns)
+    k = len(fit.ends)
+    vectors, covariances = fit.predicted(lambda q: np.eye(k + 2, dtype=complex)[-1:] * q[0] ** 2)
     return vectors[0], covariances[0]
 
 
@@ -89,7 +76,8 @@ def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArra
         For a sensor without a vector there.
     """
     slow = sweep.take(np.flatnonzero(sweep.speeds <= speed))
-    count = (~np.isnan(slow.vectors)).sum(axis=0)
+    read = ~np.isnan(slow.vectors)
+    count = read.sum(axis=0)
     if not count.all():
         raise ValueError(
             f"--slow-roll: sensor {sweep.sensors[int(count.argmin())]!r} has no vector at or below "
@@ -102,8 +90,7 @@ def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArra
         parts = np.stack((off.real, off.imag), axis=-1)
         free = np.where(count > 1, 1 - 1 / count, np.nan)[:, None, None]
         variances = parts[..., None] * parts[..., None, :] / free
-    read = ~np.isnan(slow.vectors)[..., None, None]
-    return mean, np.where(read, variances, 0.0).sum(axis=0) / count[:, None, None] ** 2
+    return mean, np.where(read[..., None, None], variances, 0.0).sum(axis=0) / count[:, None, None] ** 2
 
 
 def vectors_when_passing(
@@ -121,18 +108,15 @@ def vectors_when_passing(
     """
     low, high = float(sweep.speeds.min()), float(sweep.speeds.max())
     if len(beyond := speeds[(speeds < low * (1 - SAME)) | (speeds > high * (1 + SAME))]):
-        ends, other = (sweep.labels.speed_words(each) for each in (low, high)), beyond[0]
-        raise ValueError(
-            f"--speeds: run {sweep.run!r} goes from {' to '.join(ends)}, not to "
-            f"{sweep.labels.speed_words(other)}"
-        )
+        first, last, other = (sweep.labels.speed_words(float(each)) for each in (low, high, beyond[0]))
+        raise ValueError(f"--speeds: run {sweep.run!r} goes from {first} to {last}, not to {other}")
     if modes is not None and modes.explains:
         answers = modes.answers.at(speeds)
         return modes.predicted(lambda q: answers.basis(q)[0])
-    every = np.concatenate((speeds, sweep.speeds))
-    known = modes.curve(every) if modes else np.zeros((len(every), len(sweep.sensors)), dtype=complex)
-    rest, M = sweep.vectors - known[len(speeds) :], len(speeds)
-    vectors, covariances = known[:M].copy(), np.zeros((*known[:M].shape, 2, 2))
+    vectors = np.zeros((len(speeds), len(sweep.sensors)), dtype=complex)
+    rest, covariances = sweep.vectors, np.zeros((*vectors.shape, 2, 2))
+    if modes is not None:
+        vectors, rest = modes.curve(speeds), rest - modes.curve(sweep.speeds)
     for m, c in np.ndindex(vectors.shape):
         seen = np.flatnonzero(~np.isnan(rest[:, c]))
         rows = seen[np.argsort(np.abs(sweep.speeds[seen] - speeds[m]), kind="stable")[:NEIGHBOURS]]

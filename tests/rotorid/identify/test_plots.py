@@ -86,13 +86,6 @@ def test_amplitudes_stand_over_frequency_in_the_units_of_the_table(two_units):
     np.testing.assert_allclose(ends - phases[:, 1:], np.tile([-6.0, 6.0], (4, 1)))
 
 
-def test_deviations_are_percent_of_the_model(two_units):
-    ((gaps, ends), _) = points(named(figure_identification(two_units), "measured")[0])
-    measured, fitted = (np.abs(one["X"]) for one in (two_units.experiments.signals, two_units.predicted))
-    np.testing.assert_allclose(gaps[:, 1], 100 * (measured / fitted - 1), atol=1e-9)
-    np.testing.assert_allclose(ends[:, 1] - gaps[:, 1], 10 * measured / fitted, rtol=1e-9)
-
-
 def test_intervals_of_unlike_parameters_are_percent_of_their_own_values():
     result = result_of("section_1_7")
     axes = next(
