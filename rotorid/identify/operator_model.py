@@ -268,6 +268,19 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
     return products, slopes
 
 
+def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """All z (k − 1)·e with Σ A_k z^k singular, and vectors of the companion form (.., z's), of A (k, e, e)."""
+    from scipy.linalg import eig
+
+    degree, e = len(A) - 1, A.shape[1]
+    # companion form L y = z R y with y = (v, z v, …)
+    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
+    if degree:
+        L[-e:], R[-e:, -e:] = -np.hstack([*A[:-1]]), A[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return eig(L, R) if degree else (np.zeros(0), np.zeros((e, 0)))
+
+
 def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Positive real z = ω² with Σ A_k z^k singular, and shapes.
 
@@ -281,24 +294,14 @@ def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     z (modes,), ascending, and shapes (e, modes), each of unit length. Complex, negative and infinite
     z are left out: they belong to no free vibration.
     """
-    from scipy.linalg import eig
-
-    degree, e = len(A) - 1, A.shape[1]
-    if degree < 1:
-        return np.zeros(0), np.zeros((e, 0))
-    # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
-    first, last = float(np.abs(A[0]).max()), float(np.abs(A[-1]).max())
-    unit = (first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
-    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
-    L[-e:] = -np.hstack([part * unit**k for k, part in enumerate(A[:-1])])
-    R[-e:, -e:] = A[-1] * unit**degree
-    with np.errstate(divide="ignore", invalid="ignore"):
-        z, y = eig(L, R)
-    good = np.flatnonzero(np.isfinite(z) & (np.abs(z.imag) <= 1e-8 * np.abs(z)) & (z.real > 1e-12))
-    good = good[np.argsort(z[good].real)]
-    v = y[:e, good]
+    z, y = eigenvalues(A)
+    size = np.abs(z, where=np.isfinite(z), out=np.full(len(z), np.inf))
+    good = np.isfinite(size) & (np.abs(z.imag) <= 1e-8 * size)
+    good &= z.real > 1e-12 * size[good].max(initial=0.0)
+    order = np.flatnonzero(good)[np.argsort(z[good].real)]
+    v = y[: A.shape[1], order]
     v = (v / v[np.abs(v).argmax(axis=0), np.arange(v.shape[1])]).real
-    return z[good].real * unit, v / np.linalg.norm(v, axis=0)
+    return z[order].real, v / np.linalg.norm(v, axis=0)
 
 
 def nearest_mode(
