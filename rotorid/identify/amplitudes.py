@@ -111,20 +111,17 @@ class Experiments:
     rounding: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        n, w = len(self.names), np.asarray(self.frequencies)
+        n = len(self.names)
         if not n:
             raise ValueError("there are no experiments")
-        if w.shape != (n,) or np.shape(self.free) != (n,) or not np.isfinite(w).all() or (w < 0).any():
-            raise ValueError(
-                f"{n} experiments need {n} marks of free vibration, and frequencies must be finite and not "
-                f"negative; got {w.tolist()}"
-            )
-        for name, values in self.signals.items():
-            if np.shape(values) != (n,) or np.isinf(values).any():
-                raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured), {n} of them")
-        for name, covariance in self.covariances.items():
-            if name not in self.signals or np.shape(covariance) != (n, 2, 2):
-                raise ValueError(f"the covariance of {name}, a signal, must have shape ({n}, 2, 2)")
+        tables = {"frequencies": self.frequencies, "marks of free vibration": self.free}
+        tables |= {f"amplitudes {name}": values for name, values in self.signals.items()}
+        tables |= {f"covariances of {name}": values for name, values in self.covariances.items()}
+        for what, values in tables.items():
+            if np.shape(values) != ((n, 2, 2) if what.startswith("cov") else (n,)) or np.isinf(values).any():
+                raise ValueError(f"the {what} must be finite (amplitudes NaN: not measured), {n} of them")
+        if not (np.asarray(self.frequencies) >= 0).all():
+            raise ValueError(f"frequencies must be finite and not negative; got {self.frequencies.tolist()}")
 
     def __len__(self) -> int:
         return len(self.names)
@@ -155,9 +152,10 @@ class Experiments:
 
     def table(self, names: Sequence[str]) -> ComplexArray:
         """Amplitudes of some signals, (n, signals), NaN where not measured."""
-        nothing = np.full(len(self), np.nan, dtype=complex)
-        columns = [self.signals.get(name, nothing) for name in names]
-        return np.array(columns, dtype=complex).reshape(-1, len(self)).T
+        whole = np.full((len(self), len(names)), np.nan, dtype=complex)
+        for j, name in enumerate(names):
+            whole[:, j] = self.signals.get(name, np.nan)
+        return whole
 
     def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
         """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""
@@ -170,7 +168,7 @@ class Experiments:
             for i, j in enumerate(same)
             if i != j
         )
-        return (self.take(list(first.values())) if words else self), words
+        return self.take(sorted({*same})), words
 
 
 def experiments(
@@ -208,21 +206,14 @@ def experiments(
         For shapes that do not fit and frequencies that are not finite.
     """
     w = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    if w.ndim != 1:
-        raise ValueError(f"frequencies must have one dimension; got shape {w.shape}")
-    table: dict[str, ComplexArray] = {}
-    for name, values in signals.items():
-        z = np.asarray(values, dtype=complex)
-        if z.shape not in ((), w.shape):
-            raise ValueError(f"{len(w)} experiments need {len(w)} amplitudes {name}; got shape {z.shape}")
-        table[name] = np.broadcast_to(z, w.shape).copy()
-    marks = np.full(w.shape, not model.has_constant_terms) if free is None else np.resize(free, w.shape)
+    table = {name: np.array(np.broadcast_to(z, w.shape), dtype=complex) for name, z in signals.items()}
+    marks = np.full(w.shape, not model.has_constant_terms if free is None else free)
     for name in set(table) & set(model.signals) if free is None else ():
         z = table[name]
         marks &= np.isnan(z) | ((z == 0) if name in model.inputs else (z.imag == 0))
     for name in model.inputs:
         if name in table or marks.any():
-            table[name] = np.where(marks, 0, table.get(name, np.full(w.shape, np.nan)))
+            table[name] = np.where(marks, 0, table.get(name, np.nan))
     rows = {name: np.asarray(table.pop(name).real) for name in model.varying if name in table}
     labels = tuple(names or map(str, range(1, len(w) + 1)))
-    return Experiments(labels, w, table, marks.astype(bool), errors, dict(covariances or {}), rows)
+    return Experiments(labels, w, table, marks, errors, dict(covariances or {}), rows)

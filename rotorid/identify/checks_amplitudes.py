@@ -68,7 +68,7 @@ def unexplained(
 
 def negative(
     model: HarmonicModel, highest: float, values: FloatArray, high: FloatArray, bounds: Bounds
-) -> tuple[str, ...]:
+) -> list[str]:
     """Masses, dampers and springs that are negative beyond the upper end of their interval (n,).
 
     Unless bounds say that it may be so; `highest` is the highest frequency of the data, rad/s.
@@ -80,7 +80,7 @@ def negative(
     allowed = {name for name, (low, _) in bounds.items() if low is None or low < 0}
     named = [n for n in kinds if high[at[n]] < 0 and forces[n] > least and n not in allowed]
     if not named:
-        return ()
+        return []
     wrong, known = {kinds[n] for n in named}, [n for n in kinds if np.isfinite(values[at[n]])]
     why = "a sign, a unit or the model may be wrong"
     if len(named) == len(known) and len(wrong) > 1:
@@ -90,7 +90,7 @@ def negative(
     listed = ", ".join(f"{name} = {values[at[name]]:.6g}" for name in named)
     what = " or ".join(dict.fromkeys(KINDS[kinds[n]] for n in named))
     verb = "is" if len(named) == 1 else "are"
-    return (f"{listed} {verb} negative, which no passive {what} is: {why}",)
+    return [f"{listed} {verb} negative, which no passive {what} is: {why}"]
 
 
 def passive_elements(model: HarmonicModel) -> dict[str, int]:

@@ -112,10 +112,6 @@ def _check(
         raise ValueError(
             "[prior], --ridge and --loss belong to models that have as many outputs as equations"
         )
-    for name in experiments.signals:
-        if name in model.known or name in model.parameters:
-            what = "known in" if name in model.known else "a parameter of"
-            raise ValueError(f"{name} is {what} the model and also measured; remove one of the two")
     words = NAME.findall(" ".join(model.equations))
     for name in model.signals:
         alike = [w for w in words if w != name and w.casefold() == name.casefold()]
@@ -143,36 +139,22 @@ def _identified(
     if predicts:
         compare(model, data)  # which refuses readings that cannot be compared
         fits: list[OutputError] = []
-        for begin in _starts(model, data, linear, start, ridge=how["ridge"]):
+        given = np.array([start.get(name, np.nan) for name in model.parameters])
+        whole = bool(np.isfinite(given).all())
+        ends = linear.recovery.solutions[:MOST_STARTS] if linear and not (whole and how["ridge"]) else ()
+        begins = [given] * whole + [end if whole else np.where(np.isnan(given), end, given) for end in ends]
+        for begin in begins or starting_values(model, data, start):
             try:
                 fits.append(output_error(model, data, begin, **how))
             except ValueError as error:  # one of several starts may have no answer
                 problem = error
         good = any(fit.converged and fit.estimate.full_rank for fit, *_ in fits)
         if fits and (good or linear is None or linear.recovery.solutions):
-            return _by_output_error(fits, linear, how["bounds"], whole={*start} == {*model.parameters})
+            return _finished(_by_output_error(fits, linear, whole=whole), how["bounds"])
         if linear is None or not (fits or linear.recovery.solutions) or how["prior"] or how["ridge"]:
             raise problem
     assert linear is not None
-    return _by_regression(data, linear, how["bounds"])
-
-
-def _starts(
-    model: HarmonicModel,
-    data: Experiments,
-    linear: LinearFit | None,
-    start: Mapping[str, float],
-    *,
-    ridge: float,
-) -> list[FloatArray]:
-    """Where to begin: at the given values if these are all, and at the linear solutions."""
-    given = np.array([start.get(name, np.nan) for name in model.parameters])
-    whole = [given] if np.isfinite(given).all() else []
-    if whole and ridge:  # which pulls towards it
-        return whole
-    ends = linear.recovery.solutions[:MOST_STARTS] if linear else ()
-    begins = [*whole, *(end if whole else np.where(np.isnan(given), end, given) for end in ends)]
-    return begins or starting_values(model, data, start)
+    return _finished(_by_regression(data, linear), how["bounds"])
 
 
 def output_error(
@@ -217,11 +199,18 @@ def output_error(
     return replace(fit, estimate=estimate, message=message), comparison, did
 
 
-def _by_output_error(
-    fits: Sequence[OutputError], linear: LinearFit | None, bounds: Bounds, *, whole: bool
-) -> Identification:
+def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, whole: bool) -> Identification:
     """The best of the fits, or all that are as good; `whole`: the first began at values that were given."""
-    chosen = _best(fits, whole=whole)
+    lowest = min(fit.costs[-1] for fit, *_ in fits)
+    slack = 1e-6 * lowest + 1e-16 * len(fits[0][0].estimate.residuals)
+    equal = [one for one in fits if one[0].costs[-1] <= lowest + slack]
+    equal = [one for one in equal if one[0].converged] or equal
+    chosen = equal[:1]
+    for one in equal if not (whole and equal[0] is fits[0]) else ():
+        here = one[0].estimate.solution
+        near = any(np.allclose(here, other[0].estimate.solution, rtol=SAME, atol=0) for other in chosen)
+        if one[0].estimate.full_rank and not near:
+            chosen.append(one)
     fit, comparison, prior = chosen[0]
     model, data, converged = comparison.model, comparison.experiments, fit.converged
     estimate, theta, points = fit.estimate, fit.estimate.solution, [one.values for one, *_ in chosen]
@@ -246,10 +235,8 @@ def _by_output_error(
     def refit(others: Experiments) -> Sequence[FloatArray]:
         return linear_fit(model, others).recovery.solutions
 
-    warnings = [*_odd(model, data), *(w for w in fit.end_warnings if w != estimate.describe_rank())]
-    warnings += _searched(linear)
+    warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
     warnings += unexplained(comparison, theta, estimate, refit) if converged else ()
-    warnings += _negative(model, data, values, covariance, estimate, bounds) if converged else ()
     return Identification(
         model=model,
         experiments=data,
@@ -265,29 +252,14 @@ def _by_output_error(
         predicted=dict(zip(model.outputs, comparison.predict(theta)[0].T, strict=True)),
         left_out=comparison.left_out,
         converged=converged,
-        warnings=(*warnings, *(prior.warnings if prior else ())),
+        warnings=tuple(warnings),
         notes=(fit.message,),
         normal_matrix=normal_matrix(model.parameters, comparison.jacobian(theta)),
         prior=prior,
     )
 
 
-def _best(fits: Sequence[OutputError], *, whole: bool) -> list[OutputError]:
-    """Fits with the lowest cost, one for each set of parameters; that from a start which gives all alone."""
-    lowest = min(fit.costs[-1] for fit, *_ in fits)
-    slack = 1e-6 * lowest + 1e-16 * len(fits[0][0].estimate.residuals)
-    equal = [one for one in fits if one[0].costs[-1] <= lowest + slack]
-    equal = [one for one in equal if one[0].converged] or equal
-    kept = equal[:1]
-    for one in equal if not (whole and equal[0] is fits[0]) else ():
-        here = one[0].estimate.solution
-        near = any(np.allclose(here, other[0].estimate.solution, rtol=SAME, atol=0) for other in kept)
-        if one[0].estimate.full_rank and not near:
-            kept.append(one)
-    return kept
-
-
-def _by_regression(data: Experiments, linear: LinearFit, bounds: Bounds) -> Identification:
+def _by_regression(data: Experiments, linear: LinearFit) -> Identification:
     """The answer of linear regression alone."""
     model, recovery, estimate, system = linear.model, linear.recovery, linear.estimate, linear.system
     values, covariance, spread = linear.values, system.covariance, np.full(len(system.values), np.nan)
@@ -298,7 +270,6 @@ def _by_regression(data: Experiments, linear: LinearFit, bounds: Bounds) -> Iden
         covariance[lost[:, None] | lost] = np.nan
     notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
     more = "" if estimate.full_rank else what_more_can_tell(model, data, estimate.rank)
-    warnings = [*_odd(model, data), *_searched(linear)]
     combinations = zip(linear.words, system.values.tolist(), spread.tolist(), strict=True)
     return Identification(
         model=model,
@@ -321,7 +292,7 @@ def _by_regression(data: Experiments, linear: LinearFit, bounds: Bounds) -> Iden
         predicted={},
         left_out=linear.left_out,
         converged=True,
-        warnings=(*warnings, *_negative(model, data, values, covariance, estimate, bounds)),
+        warnings=(),
         notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
         normal_matrix=normal_matrix(estimate.names, linear.K),
     )
@@ -359,28 +330,20 @@ def _by_digits(found: Identification, how: Mapping[str, Any]) -> Identification:
     )
 
 
-def _odd(model: HarmonicModel, data: Experiments) -> list[str]:
-    words = "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
-    return [words] if data.free.any() and (model.power % 2 == 1).any() else []
-
-
-def _searched(linear: LinearFit | None) -> list[str]:
-    words = "the parameters were found by a search; there may be more solutions than shown"
-    return [words] if linear and not linear.recovery.complete else []
-
-
-def _negative(
-    model: HarmonicModel,
-    data: Experiments,
-    values: FloatArray,
-    covariance: FloatArray | None,
-    estimate: Estimate,
-    bounds: Bounds,
-) -> tuple[str, ...]:
-    factor = estimate.coverage_factor
-    std = np.zeros(len(values)) if covariance is None or factor is None else np.sqrt(np.diag(covariance))
-    high = values + np.nan_to_num((factor or 0.0) * std)
-    return negative(model, float(data.frequencies.max()), values, high, bounds)
+def _finished(found: Identification, bounds: Bounds) -> Identification:
+    """With what any answer says: terms left out, that it was searched for, signs."""
+    model, data, words = found.model, found.experiments, []
+    if data.free.any() and (model.power % 2 == 1).any():
+        words.append(
+            "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
+        )
+    if found.linear and not found.linear.recovery.complete:
+        words.append("the parameters were found by a search; there may be more solutions than shown")
+    words += found.warnings
+    if found.converged:
+        high = found.values if found.ci95 is None else np.fmax(found.values, found.ci95[:, 1])
+        words += negative(model, float(data.frequencies.max()), found.values, high, bounds)
+    return replace(found, warnings=(*words, *(found.prior.warnings if found.prior else ())))
 
 
 def _named(model: HarmonicModel, theta: FloatArray) -> dict[str, float]:
@@ -402,13 +365,10 @@ def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[FoundCo
     rows, relative = np.linalg.qr((estimate.row_space * scale).T)[0], slopes * scale
     beside = np.linalg.norm(relative - relative @ rows @ rows.T, axis=1)
     known = beside <= WITHIN * np.linalg.norm(relative, axis=1)
-    variances = np.full(len(values), np.nan)
-    if spread is not None:
-        variances = np.einsum("qi,ij,qj->q", slopes, spread, slopes).clip(0)
+    variances = np.zeros(len(values)) if spread is None else np.einsum("qi,ij,qj->q", slopes, spread, slopes)
+    each = zip(linear.words, values.tolist(), np.sqrt(variances.clip(0)).tolist(), known, strict=True)
     return tuple(
-        FoundCombination(
-            words, float(values[i]), None if np.isnan(variances[i]) else float(variances[i] ** 0.5)
-        )
-        for i, words in enumerate(linear.words)
-        if known[i] and words not in linear.model.parameters
+        FoundCombination(words, value, None if spread is None or np.isnan(std) else std)
+        for words, value, std, seen in each
+        if seen and words not in linear.model.parameters
     )

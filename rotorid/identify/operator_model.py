@@ -28,6 +28,7 @@ from rotorid.identify.combinations import (
     monomials_of,
 )
 
+POWERS_OF_I = np.array([1, 1j, -1, -1j])
 MAC_SLACK = 0.02
 """Modes whose MAC is this near to the best count as equally like; the nearest frequency decides."""
 
@@ -123,7 +124,7 @@ class HarmonicModel:
         if (k < 0).any() and (w == 0).any():
             raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
         # exact powers of i, so that a real row has no imaginary dust
-        factors = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
+        factors = w[:, None] ** k * POWERS_OF_I[k % 4]
         for j, feature in enumerate(self.features):
             for name, exponent in feature.varying:
                 if name not in rows:
@@ -131,13 +132,12 @@ class HarmonicModel:
                         f"{name} stands as a factor in the equations and is neither known nor estimated: "
                         f"the measurements must have its value in every row (a column {name})"
                     )
-                value = np.asarray(rows[name], dtype=float)
-                if exponent < 0 and (value == 0).any():
+                if exponent < 0 and (rows[name] == 0).any():
                     raise ValueError(
                         f"an equation divides by {name}, which is 0 in a row of the measurements"
                     )
-                factors[:, j] *= value ** float(exponent)
-        return np.asarray(factors, dtype=complex)
+                factors[:, j] *= rows[name] ** float(exponent)
+        return np.asarray(factors)
 
     def polynomials(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values (f,) and derivatives (f, n) of the features' coefficients at parameters (n,)."""
@@ -232,18 +232,16 @@ class HarmonicModel:
         quantities (1,) have the values of one row.
         """
         P, dP = self.polynomials(values)
-        row = np.real(self.multipliers(np.ones(1), varying)[0] / np.array([1, 1j, -1, -1j])[self.power % 4])
-        P, dP = P * row, dP * row[:, None]
+        row = np.real(self.multipliers(np.ones(1), varying)[0] / POWERS_OF_I[self.power % 4])
         e = len(self.outputs)
-        use = (self.column < e) & (self.power % 2 == 0)
+        use = np.flatnonzero((self.column < e) & (self.power % 2 == 0))
         # multiplied by p^−lowest: a compliance form written with 1/p² would have no polynomial
-        k = (self.power - min(self.power[use], default=0)) // 2
-        sign = np.where(k % 2 == 0, 1.0, -1.0)
-        degree = max(k[use], default=0) + 1
-        A, dA = np.zeros((degree, e, e)), np.zeros((degree, e, e, len(values)))
-        at = (k[use], self.equation[use], self.column[use])
-        np.add.at(A, at, sign[use] * P[use])
-        np.add.at(dA, at, sign[use, None] * dP[use])
+        k = (self.power[use] - min(self.power[use], default=0)) // 2
+        shape = max(k, default=0) + 1, e, e
+        A, dA = np.zeros(shape), np.zeros((*shape, len(values)))
+        at, sign = (k, self.equation[use], self.column[use]), (-1.0) ** k * row[use]
+        np.add.at(A, at, sign * P[use])
+        np.add.at(dA, at, sign[:, None] * dP[use])
         return A, dA
 
     def check_square(self) -> None:
@@ -262,9 +260,9 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
     products = np.prod(theta**exponents, axis=1)
     slopes = products[:, None] * exponents / np.where(theta == 0, 1.0, theta)
     for j in np.flatnonzero(theta == 0):
-        power = exponents[:, j]
-        lower = np.where((power != 0)[:, None], exponents - np.eye(len(theta))[j], 0.0)
-        slopes[:, j] = power * np.prod(theta**lower, axis=1)
+        used = np.flatnonzero(exponents[:, j])
+        lower = exponents[used] - np.eye(len(theta))[j]
+        slopes[used, j] = exponents[used, j] * np.prod(theta**lower, axis=1)
     return products, slopes
 
 
@@ -326,14 +324,13 @@ def mode_slopes(
     A and dA as of `dynamic_stiffness`, z and the shape v (e,) of a mode.
     """
     k, e = np.arange(len(A)), len(v)
-    slope = np.tensordot(k[1:] * z ** k[:-1], A[1:], axes=1)
-    force = -np.einsum("k,keon,o->en", z**k, dA, v)
-    bordered = np.zeros((e + 1, e + 1))
+    bordered, right = np.zeros((e + 1, e + 1)), np.zeros((e + 1, dA.shape[-1]))
     bordered[:e, :e] = np.tensordot(z**k, A, axes=1)
-    bordered[:e, e] = slope @ v * z  # unknown: relative change of z, of the size of the others
-    bordered[e, reference] = 1.0
-    rows = np.fmax(np.abs(bordered).max(axis=1, keepdims=True), 1e-300)
-    solved = np.linalg.solve(bordered / rows, np.vstack((force, np.zeros(force.shape[1]))) / rows)
+    bordered[:e, e] = np.tensordot(k * z**k, A, axes=1) @ v  # unknown: relative change of z, of others' size
+    right[:e] = -np.einsum("k,keon,o->en", z**k, dA, v)
+    size = np.abs(bordered).max()
+    bordered[e, reference] = size
+    solved = np.linalg.solve(bordered / size, right / size)
     return solved[e] * z, solved[:e]
 
 

@@ -119,7 +119,6 @@ def test_without_any_complete_row_there_is_a_message():
     [
         ({"X": [1j]}, "the input F of the model is not among the measurements"),
         ({"F": [1.0]}, "the signal X of the model is not among"),
-        ({"F": [1.0], "X": [1j], "m": [2.0]}, "m is known in the model and also measured"),
         ({"F": [1.0], "X": [np.inf]}, "the amplitudes X must be finite"),
     ],
 )
