@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.amplitude_residuals import Comparison, compare
 from rotorid.identify.amplitudes import Experiments
+from rotorid.identify.linear_start import linear_fit
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
@@ -22,48 +24,40 @@ EXPLAINS = 0.2
 """Another reading of the data is named where it leaves less than this share of what is left without it."""
 KINDS = ("spring", "damper", "mass")
 UNITS = {"Hz": 2 * np.pi, "rpm": np.pi / 30}
-Refit = Callable[[Experiments], Sequence[FloatArray]]
-"""Solutions of the linear estimate from other experiments."""
 
 
-def unexplained(
-    comparison: Comparison, theta: FloatArray, estimate: Estimate, refit: Refit
-) -> tuple[str, ...]:
+def unexplained(comparison: Comparison, theta: FloatArray, estimate: Estimate) -> list[str]:
     """What the model leaves, if it is much, and units or phases that would explain it.
 
     Stated errors: residuals that these explain with a probability below 0.1 %. Otherwise more than a share
     of the readings.
     """
-    words, left = [], comparison.left(theta)
+    left = comparison.left(theta)
     if why := estimate.misfit():
-        words.append(
-            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies "
-            "elsewhere (try another start)"
-        )
+        words = [
+            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies elsewhere "
+            "(try another start)"
+        ]
     elif not estimate.errors_stated and left > LARGE:
-        words.append(
+        words = [
             f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the "
             "model, a reading or a unit is wrong"
-        )
+        ]
     else:
-        return ()
+        return []
     model, data = comparison.model, replace(comparison.experiments, errors=None, covariances={}, rounding={})
     turned = {name: np.conj(z) for name, z in data.signals.items()}
-    others = {"": data, "phases of the other sign": replace(data, signals=turned)}
+    others = {"phases of the other sign": replace(data, signals=turned)}
     for unit, factor in UNITS.items():
         others[f"frequencies in {unit}, not rad/s,"] = replace(data, frequencies=data.frequencies * factor)
-        others[f"frequencies in rad/s, not {unit},"] = replace(data, frequencies=data.frequencies / factor)
-    rest = {}
     for what, other in others.items():
-        with suppress(ValueError, np.linalg.LinAlgError):
-            rest[what] = min((compare(model, other).left(end) for end in refit(other)[:1]), default=np.nan)
-    left = np.fmin(left, rest.pop("", np.nan))  # the same estimate with and without the change
-    words += [
-        f"with {what} the model leaves {100 * share:.2g} % of the readings, not {100 * left:.0f} %"
-        for what, share in rest.items()
-        if share < min(EXPLAINS * left, LARGE)
-    ]
-    return tuple(words)
+        with suppress(ValueError, IndexError, np.linalg.LinAlgError):
+            share = compare(model, other).left(linear_fit(model, other).recovery.solutions[0])
+            if share < min(EXPLAINS * left, LARGE):
+                words.append(
+                    f"with {what} the model leaves {100 * share:.2g} % of the readings, not {100 * left:.0f} %"
+                )
+    return words
 
 
 def negative(
@@ -120,24 +114,19 @@ def what_more_can_tell(model: HarmonicModel, experiments: Experiments, now: int)
 
     The rank of the derivatives of predicted amplitudes (or modes) at many frequencies, at general values.
     """
-    rng = np.random.default_rng(3)
-    n, most = len(model.parameters), 0
+    rng, n, most = np.random.default_rng(3), len(model.parameters), 0
     many = experiments.take(np.tile(np.arange(len(experiments)), 1 + 16 * n // len(experiments)))
-    plan = replace(
-        many,
-        frequencies=10 ** rng.uniform(-2, 2, len(many)),
-        signals={name: z * rng.uniform(0.5, 1.5, len(z)) for name, z in many.signals.items()},
-        varying={name: v * rng.uniform(0.5, 1.5, len(v)) for name, v in many.varying.items()},
-        errors=None,
-        covariances={},
-        rounding={},
-        frequency_std=None,
-    )
+
+    def moved(table: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: values * rng.uniform(0.5, 1.5, len(values)) for name, values in table.items()}
+
+    w, signals, varying = 10 ** rng.uniform(-2, 2, len(many)), moved(many.signals), moved(many.varying)
+    plan = Experiments(many.names, w, signals, many.free, varying=varying)
     with suppress(ValueError, np.linalg.LinAlgError):
         theta = rng.uniform(0.6, 1.7, n)
         J = compare(model, plan).jacobian(theta) * theta
-        size = np.linalg.norm(J, axis=1, keepdims=True)
-        J = (J / np.where(size > 0, size, 1.0))[np.isfinite(J).all(axis=1)]
+        J = J[np.isfinite(J).all(axis=1)]
+        J /= np.fmax(np.linalg.norm(J, axis=1, keepdims=True), 1e-300)
         most = least_squares(J, np.zeros(len(J)), rcond=1e-9).rank
     if 0 < most <= now:
         return "no experiment of this kind tells more: make a parameter known, or excite or measure elsewhere"

@@ -232,11 +232,8 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
     if covariance is not None:
         covariance = np.where(apart[:, None] | apart, np.nan, covariance)
 
-    def refit(others: Experiments) -> Sequence[FloatArray]:
-        return linear_fit(model, others).recovery.solutions
-
     warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
-    warnings += unexplained(comparison, theta, estimate, refit) if converged else ()
+    warnings += unexplained(comparison, theta, estimate) if converged else []
     return Identification(
         model=model,
         experiments=data,
