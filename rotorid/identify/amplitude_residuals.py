@@ -8,7 +8,6 @@ error, or else with that of this amplitude.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -46,9 +45,8 @@ class Comparison:
     forced, free
         Indices of the forced experiments that can be predicted, and of the free vibrations.
     rows
-        Which parts of the readings count, (forced, e, 2): those along and across each amplitude, but for
-        parts that no parameter moves, the imaginary ones of a model without damping; they say nothing of
-        errors.
+        Which parts of the readings count, along and across each amplitude, (n, e, 2). Parts that no
+        parameter moves, the imaginary ones of a model without damping, do not: they say nothing of errors.
     whiten
         Inverse root of each reading's covariance, (n, e, 2, 2).
     left_out
@@ -83,15 +81,7 @@ class Comparison:
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Amplitudes (n, e) and natural frequencies (n,), NaN where there are none."""
-        n, e = self.measured.shape
-        Z, frequencies = np.full((n, e), np.nan, dtype=complex), np.full(n, np.nan)
-        Z[self.forced] = self._forced(theta, slopes=False)[0]
-        for i, _, _, mode in self._modes(theta):
-            if mode is not None:
-                shape = self.measured[i].real
-                reference = reference_amplitude(shape)
-                frequencies[i] = np.sqrt(mode[0])
-                Z[i] = mode[1] / mode[1][reference] * shape[reference]
+        Z, frequencies = self._answers(theta)[::2]
         return Z, frequencies
 
     def left(self, theta: FloatArray) -> float:
@@ -108,67 +98,61 @@ class Comparison:
             shares.append(float(np.mean(np.nan_to_num(away, nan=1.0) ** 2)))
         return float(np.sqrt(np.mean(shares))) if shares else np.nan
 
-    def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        key = theta.tobytes()
-        if key not in self._last:
-            self._last.clear()
-            try:
-                with np.errstate(all="ignore"):
-                    parts = [self._forced_rows(theta), *self._free_rows(theta)]
-            except np.linalg.LinAlgError:
-                count = np.count_nonzero(self.rows) + np.count_nonzero(~np.isnan(self.measured[self.free]))
-                parts = [(np.full(count, np.nan), np.full((count, len(theta)), np.nan))]
-            r, J = zip(*parts, strict=True)
-            self._last[key] = np.concatenate(r), np.concatenate(J)
-        return self._last[key]
-
-    def _row(self, chosen: IntArray) -> dict[str, FloatArray]:
-        return {name: values[chosen] for name, values in self.experiments.varying.items()}
-
-    def _forced(self, theta: FloatArray, *, slopes: bool) -> tuple[ComplexArray, ComplexArray]:
-        inputs = self.experiments.table(self.model.inputs)[self.forced]
-        w = self.experiments.frequencies[self.forced]
-        return self.model.forced(theta, w, inputs, slopes, self._row(self.forced))
-
-    def _forced_rows(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        Z, dZ = self._forced(theta, slopes=True)
-        gap, root = (Z - self.measured[self.forced])[..., None], self.whiten[self.forced]
-        both = root @ np.stack((gap.real, gap.imag), -2)
-        J = root @ np.stack((dZ.real, dZ.imag), -2)
-        return both[self.rows][:, 0], J[self.rows]
-
-    def _modes(
-        self, theta: FloatArray
-    ) -> Iterator[tuple[int, FloatArray, FloatArray, tuple[float, FloatArray] | None]]:
-        """Dynamic stiffness, its derivatives and the mode most like each free vibration."""
+    def _answers(self, theta: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray, FloatArray]:
+        """Amplitudes and natural frequencies, each with derivatives by θ behind it."""
+        data, (n, e) = self.experiments, self.measured.shape
+        Z, dZ = np.full((n, e), np.nan, dtype=complex), np.zeros((n, e, len(theta)), dtype=complex)
+        natural, by_theta = np.full(n, np.nan), np.zeros((n, len(theta)))
+        of_forced, *of_free = (
+            {name: values[rows] for name, values in data.varying.items()}
+            for rows in (self.forced, *self.free[:, None])
+        )
+        inputs, w = data.table(self.model.inputs)[self.forced], data.frequencies[self.forced]
+        Z[self.forced], dZ[self.forced] = self.model.forced(theta, w, inputs, True, of_forced)
         for k, i in enumerate(self.free):
             if not k or self.model.varying:
-                A, dA = self.model.dynamic_stiffness(theta, self._row(np.array([i])))
+                A, dA = self.model.dynamic_stiffness(theta, of_free[k])
                 z, v = natural_modes(A)
-            w, shape = float(self.experiments.frequencies[i]), self.measured[i].real
-            yield int(i), A, dA, nearest_mode(z, v, w, shape)
+            shape = self.measured[i].real
+            mode, reference = (
+                nearest_mode(z, v, float(data.frequencies[i]), shape),
+                reference_amplitude(shape),
+            )
+            if mode is not None and mode[1][reference]:
+                square, Z[i] = mode[0], mode[1] / mode[1][reference] * shape[reference]
+                dz, dZ[i] = mode_slopes(A, dA, square, Z[i].real, reference)
+                natural[i], by_theta[i] = np.sqrt(square), dz / (2 * np.sqrt(square))
+        return Z, dZ, natural, by_theta
 
-    def _free_rows(self, theta: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-        for i, A, dA, mode in self._modes(theta):
-            shape, omega = self.measured[i].real, float(self.experiments.frequencies[i])
+    def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if (key := theta.tobytes()) in self._last:
+            return self._last[key]
+        try:
+            with np.errstate(all="ignore"):
+                Z, dZ, natural, by_theta = self._answers(theta)
+        except np.linalg.LinAlgError:
+            Z, dZ = np.nan * self.measured, np.full((*self.measured.shape, len(theta)), np.nan + 0j)
+            natural, by_theta = dZ[:, 0, 0].real, dZ[:, 0].real
+        # values and derivatives side by side
+        gap = np.concatenate(((Z - self.measured)[..., None], dZ), axis=-1)
+        both = self.whiten @ np.stack((gap.real, gap.imag), axis=-2)
+        over, frequency = self.whiten[..., 0, 0], np.column_stack((natural, by_theta))
+        frequency[:, 0] -= self.experiments.frequencies
+        for i in self.free:
+            shape, std, rows = self.measured[i].real, self.experiments.frequency_std, self.rows[i, :, 0]
             reference = reference_amplitude(shape)
-            others = np.flatnonzero(~np.isnan(shape) & (np.arange(len(shape)) != reference))
-            if mode is None or mode[1][reference] == 0:
-                raise np.linalg.LinAlgError("the model has no such mode")
-            v = mode[1] / mode[1][reference]
-            dz, dv = mode_slopes(A, dA, mode[0], v, reference)
-            over = self.whiten[i, :, 0, 0]
             # without an error of its own the frequency has the relative one of the reference amplitude
-            share, white = over[reference] * abs(shape[reference]) / omega, np.diag(over[others])
-            if self.experiments.frequency_std is not None:
-                share = 1 / self.experiments.frequency_std[i]
-                # then the error of the reference is one of all that is given relative to it
-                common = shape[others] / (shape[reference] * over[reference])
-                whole = np.diag(over[others] ** -2) + np.outer(common, common)
-                white = np.linalg.inv(np.linalg.cholesky(whole))
-            root = np.sqrt(mode[0])
-            r = np.concatenate(([(root - omega) * share], white @ (v * shape[reference] - shape)[others]))
-            yield r, np.vstack((dz / (2 * root) * share, shape[reference] * white @ dv[others]))
+            size = over[i, reference] * abs(shape[reference])
+            frequency[i] *= size / self.experiments.frequencies[i] if std is None else 1 / std[i]
+            if std is not None:  # then the error of the reference is one of all that is given relative to it
+                common = (over[i] * shape)[rows] / size
+                square = common @ common
+                share = (1 - 1 / np.sqrt(1 + square)) / square if square else 0.0
+                both[i, rows, 0] -= share * np.outer(common, common @ both[i, rows, 0])
+        every = np.concatenate((both[self.rows], frequency[self.free]))
+        self._last.clear()
+        self._last[key] = every[:, 0], every[:, 1:]
+        return self._last[key]
 
 
 def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
@@ -198,10 +182,12 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     if not usable.any():
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
     forced, free = (np.flatnonzero(usable & kind) for kind in (~experiments.free, experiments.free))
-    rows = np.repeat(given[forced][:, :, None], 2, axis=2)
+    rows = np.repeat((given & known[:, None])[:, :, None], 2, axis=2)
+    for i in free:
+        rows[i, :, 1] = rows[i, reference_amplitude(measured[i].real), 0] = False
     if not (model.power % 2).any():
-        real = (inputs[forced].imag == 0).all(axis=1)[:, None]
-        rows[..., 1] &= ~(real & (np.abs(measured.imag) <= ROUNDING * np.abs(measured))[forced])
+        real = (inputs.imag == 0).all(axis=1)[:, None]
+        rows[..., 1] &= ~(real & (np.abs(measured.imag) <= ROUNDING * np.abs(measured)))
     whiten = whitening(experiments, model.outputs, measured)
     return Comparison(model, experiments, measured, forced, free, rows, whiten, tuple(left_out))
 
