@@ -1,63 +1,35 @@
-"""Checks of an identified model: what it leaves of the readings, units, phases, signs of elements."""
+"""Checks of an identified model: what it leaves of the readings, signs of elements."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.identify.amplitude_residuals import Comparison, compare
-from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.linear_start import linear_fit
 from rotorid.identify.operator_model import HarmonicModel
-from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds
 
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
-EXPLAINS = 0.2
-"""Another reading of the data is named where it leaves less than this share of what is left without it."""
 KINDS = ("spring", "damper", "mass")
-UNITS = {"Hz": 2 * np.pi, "rpm": np.pi / 30}
 
 
-def unexplained(comparison: Comparison, theta: FloatArray, estimate: Estimate) -> list[str]:
-    """What the model leaves, if it is much, and units or phases that would explain it.
+def unexplained(left: float, estimate: Estimate) -> list[str]:
+    """What the model leaves of the readings, a share, if it is much.
 
-    Stated errors: residuals that these explain with a probability below 0.1 %. Otherwise more than a share
-    of the readings.
+    Stated errors: residuals that these explain with a probability below 0.1 %.
     """
-    left = comparison.left(theta)
     if why := estimate.misfit():
-        words = [
+        return [
             f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies elsewhere "
             "(try another start)"
         ]
-    elif not estimate.errors_stated and left > LARGE:
-        words = [
-            f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the "
-            "model, a reading or a unit is wrong"
-        ]
-    else:
+    if estimate.errors_stated or not left > LARGE:
         return []
-    model, data = comparison.model, replace(comparison.experiments, errors=None, covariances={}, rounding={})
-    turned = {name: np.conj(z) for name, z in data.signals.items()}
-    others = {"phases of the other sign": replace(data, signals=turned)}
-    for unit, factor in UNITS.items():
-        others[f"frequencies in {unit}, not rad/s,"] = replace(data, frequencies=data.frequencies * factor)
-    for what, other in others.items():
-        with suppress(ValueError, IndexError, np.linalg.LinAlgError):
-            share = compare(model, other).left(linear_fit(model, other).recovery.solutions[0])
-            if share < min(EXPLAINS * left, LARGE):
-                words.append(
-                    f"with {what} the model leaves {100 * share:.2g} % of the readings, not {100 * left:.0f} %"
-                )
-    return words
+    return [
+        f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the model, a "
+        "reading, a unit or the sign of phases is wrong"
+    ]
 
 
 def negative(
@@ -107,27 +79,3 @@ def passive_elements(model: HarmonicModel) -> dict[str, int]:
         if passive and not any(model.features[f].varying for f in used):
             (found[name],) = kinds
     return found
-
-
-def what_more_can_tell(model: HarmonicModel, experiments: Experiments, now: int) -> str:
-    """Whether experiments of the same kind could determine more than `now` combinations of the parameters.
-
-    The rank of the derivatives of predicted amplitudes (or modes) at many frequencies, at general values.
-    """
-    rng, n, most = np.random.default_rng(3), len(model.parameters), 0
-    many = experiments.take(np.tile(np.arange(len(experiments)), 1 + 16 * n // len(experiments)))
-
-    def moved(table: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: values * rng.uniform(0.5, 1.5, len(values)) for name, values in table.items()}
-
-    w, signals, varying = 10 ** rng.uniform(-2, 2, len(many)), moved(many.signals), moved(many.varying)
-    plan = Experiments(many.names, w, signals, many.free, varying=varying)
-    with suppress(ValueError, np.linalg.LinAlgError):
-        theta = rng.uniform(0.6, 1.7, n)
-        J = compare(model, plan).jacobian(theta) * theta
-        J = J[np.isfinite(J).all(axis=1)]
-        J /= np.fmax(np.linalg.norm(J, axis=1, keepdims=True), 1e-300)
-        most = least_squares(J, np.zeros(len(J)), rcond=1e-9).rank
-    if 0 < most <= now:
-        return "no experiment of this kind tells more: make a parameter known, or excite or measure elsewhere"
-    return "more experiments, at other frequencies, may determine the rest"

@@ -25,7 +25,7 @@ from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitude_residuals import Comparison, compare
 from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.checks_amplitudes import negative, unexplained, what_more_can_tell
+from rotorid.identify.checks_amplitudes import negative, unexplained
 from rotorid.identify.combinations import NAME, only_determined, why_several
 from rotorid.identify.linear_start import LinearFit, linear_fit, reasons
 from rotorid.identify.operator_model import HarmonicModel
@@ -217,23 +217,20 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
     apart = several(points) & ~np.isnan(points).any(axis=0)
     values = np.where(apart, np.nan, estimate.values) if converged else theta
     combinations = _combinations(estimate, linear) if converged else ()
-    more = ""
-    if not (linear or fit).estimate.full_rank or (np.isnan(values).any() and not estimate.full_rank):
-        more = what_more_can_tell(model, data, estimate.rank)
-    why = reasons(linear, more) if linear and linear.recovery.solutions else ()
+    why = reasons(linear) if linear and linear.recovery.solutions else ()
     if prior and prior.alone and why:
         prior = replace(prior, alone=why[0])
     if not why and estimate.full_rank:
         why = tuple(why_several(points, model.parameters, np.flatnonzero(apart).tolist()))
     elif not why:
         words = [c.words for c in combinations]
-        why = only_determined(model.parameters, estimate.undetermined, words), more
+        why = (only_determined(model.parameters, estimate.undetermined, words),)
     covariance = estimate.covariance
     if covariance is not None:
         covariance = np.where(apart[:, None] | apart, np.nan, covariance)
 
     warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
-    warnings += unexplained(comparison, theta, estimate) if converged else []
+    warnings += unexplained(comparison.left(theta), estimate) if converged else []
     return Identification(
         model=model,
         experiments=data,
@@ -266,7 +263,6 @@ def _by_regression(data: Experiments, linear: LinearFit) -> Identification:
         lost = np.isnan(values)
         covariance[lost[:, None] | lost] = np.nan
     notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
-    more = "" if estimate.full_rank else what_more_can_tell(model, data, estimate.rank)
     combinations = zip(linear.words, system.values.tolist(), spread.tolist(), strict=True)
     return Identification(
         model=model,
@@ -285,7 +281,7 @@ def _by_regression(data: Experiments, linear: LinearFit) -> Identification:
             _named(model, np.where(recovery.undetermined, np.nan, theta)) for theta in recovery.solutions
         ),
         theta=recovery.solutions[0] if recovery.solutions else values,
-        unidentifiable=reasons(linear, more) if np.isnan(values).any() else (),
+        unidentifiable=reasons(linear) if np.isnan(values).any() else (),
         predicted={},
         left_out=linear.left_out,
         converged=True,
@@ -334,7 +330,7 @@ def _finished(found: Identification, bounds: Bounds) -> Identification:
         words.append(
             "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
         )
-    if found.linear and not found.linear.recovery.complete:
+    if found.linear and found.solutions and not found.linear.recovery.solutions:
         words.append("the parameters were found by a search; there may be more solutions than shown")
     words += found.warnings
     if found.converged:

@@ -207,8 +207,8 @@ def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
     return {model.monomials[j - 1]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
 
 
-def reasons(fit: LinearFit, more: str) -> tuple[str, ...]:
-    """Why parameters have no one value, in words; `more` says whether other experiments can tell more."""
+def reasons(fit: LinearFit) -> tuple[str, ...]:
+    """Why parameters have no one value, in words."""
     model, recovery, words = fit.model, fit.recovery, []
     if recovery.undetermined.any():
         lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
@@ -224,6 +224,6 @@ def reasons(fit: LinearFit, more: str) -> tuple[str, ...]:
     if not fit.estimate.full_rank:
         words.append(
             f"these experiments determine {fit.estimate.rank} of the {len(fit.estimate.names)} combinations "
-            f"that the model could show; {more}"
+            "that the model could show"
         )
     return (*words, *recovery.reasons)

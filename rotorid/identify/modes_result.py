@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
@@ -68,9 +68,12 @@ class FittedModes:
         left = max(float(estimate.residuals @ estimate.residuals), 1e-300)
         return 1.0 if estimate.errors_stated else left / estimate.dof if estimate.dof > 0 else np.nan
 
-    def _linear(self, q: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        """R, a and b (C, k + 2), and their covariances but for `unit`."""
-        return projected(self.answers.basis(q), self.readings.vectors, self.root)[2:]
+    def _linear(
+        self, q: FloatArray, rows: BoolArray | slice = slice(None)
+    ) -> tuple[ComplexArray, FloatArray]:
+        """R, a and b (C, k + 2), and their covariances but for `unit`, by some of the readings."""
+        columns, slopes = self.answers.basis(q)
+        return projected((columns[rows], slopes[rows]), self.readings.vectors[rows], self.root[rows])[2:]
 
     def curve(self, omega: FloatArray) -> ComplexArray:
         """The fitted amplitudes at frequencies between the readings, (m,): (m, P)."""
@@ -95,51 +98,41 @@ class FittedModes:
         linear = np.einsum("miaj,pajbk,mnbk->mpin", rows, self._linear(q)[1], rows)
         return sums(q), by_q @ of_q @ np.swapaxes(by_q, -1, -2) + self.unit * linear
 
-    @cached_property
-    def by_noise(self) -> FloatArray:
-        """Bound for the probability that noise alone makes each mode, (k,)."""
-        return self._by_noise(np.ones(len(self.readings.speeds), dtype=bool))
-
-    def _by_noise(self, rows: FloatArray) -> FloatArray:
-        """The same of some of the readings."""
+    def by_noise(self, rows: BoolArray | slice = slice(None)) -> FloatArray:
+        """Bound for the probability that noise alone makes each mode, (k,), by some of the readings."""
         from scipy.special import chdtrc
 
-        basis = self.answers.basis(self.fit.estimate.solution)
-        _, _, linear, spread = projected(
-            (basis[0][rows], basis[1][rows]), self.readings.vectors[rows], self.root[rows]
-        )
-        parts = np.stack((linear.real, linear.imag), axis=-1)[:, :-2]
-        spread = np.einsum("piaib->piab", spread)[:, :-2]
-        size = np.einsum("pki,pkij,pkj->k", parts, np.linalg.inv(spread), parts) / self.unit
+        linear, spread = self._linear(self.fit.estimate.solution, rows)
+        parts, spread = np.stack((linear.real, linear.imag), axis=-1), np.einsum("piaib->piab", spread)
+        size = np.einsum("pki,pkij,pkj->k", parts, np.linalg.inv(spread), parts)[:-2] / self.unit
         return np.asarray((self.fit.estimate.dof + 1) * chdtrc(2 * len(parts) + 2, size))
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words: at most one clause a mode."""
-        words = () if self.fit.converged else (self.fit.message,)
-        return (*words, *(why for mode in range(len(self.ends)) if (why := self._doubt(mode))))
-
-    def _doubt(self, mode: int) -> str:
-        read, (low, high), count = self.readings.speeds, self.ends[mode], len(self.ends) + 2
-        omega, zeta, error, other = self.values[:, mode]
-        name = f"mode {mode + 1} ({self.readings.words(omega)})"
-        near = read[(3 * low - 2 * high <= read) & (read <= 3 * high - 2 * low)]
-        rest = read != read[np.abs(read - omega).argmin()]
-        alone = min(np.count_nonzero(~np.isnan(self.readings.vectors[rest]), axis=0)) >= count
-        if self.by_noise[mode] > RARE:
-            return f"{name} is no more than noise: say in --bands where modes are"
-        if self.fit.std is not None and not 2 * error < high - low:
-            return f"these readings do not tell frequency and damping of mode {mode + 1}"
-        if alone and self._by_noise(rest)[mode] > RARE:
-            return (
-                f"{name} stands on one frequency, perhaps a wild reading: measure closer by, or say in --bands "
-                "where modes are"
-            )
-        if not near.min() < omega < near.max():  # in a fast sweep it stands beside its peak
-            return f"{name} is read on one side only"
-        if zeta + 2 * np.nan_to_num(other) < 0:
-            return f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads"
-        return ""
+        words = [] if self.fit.converged else [self.fit.message]
+        read, by_noise = self.readings.speeds, self.by_noise()
+        for mode, ((low, high), (omega, zeta, error, other)) in enumerate(
+            zip(self.ends, self.values.T, strict=True)
+        ):
+            name = f"mode {mode + 1} ({self.readings.words(omega)})"
+            near = read[(3 * low - 2 * high <= read) & (read <= 3 * high - 2 * low)]
+            rest = read != read[np.abs(read - omega).argmin()]
+            alone = min((~np.isnan(self.readings.vectors[rest])).sum(axis=0)) >= len(self.ends) + 2
+            if by_noise[mode] > RARE:
+                words.append(f"{name} is no more than noise: say in --bands where modes are")
+            elif self.fit.std is not None and not 2 * error < high - low:
+                words.append(f"these readings do not tell frequency and damping of mode {mode + 1}")
+            elif alone and self.by_noise(rest)[mode] > RARE:
+                words.append(
+                    f"{name} stands on one frequency, perhaps a wild reading: measure closer by, or say in "
+                    "--bands where modes are"
+                )
+            elif not near.min() < omega < near.max():  # in a fast sweep it stands beside its peak
+                words.append(f"{name} is read on one side only")
+            elif zeta + 2 * np.nan_to_num(other) < 0:
+                words.append(f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads")
+        return tuple(words)
 
     @cached_property
     def _misfit(self) -> tuple[str, ...]:

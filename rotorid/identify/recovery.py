@@ -2,8 +2,8 @@
 
 The combinations are polynomials in the parameters. One unknown after the other is eliminated: a polynomial in
 one unknown by its roots, else one in which an unknown stands linearly with a single term as its factor.
-Polynomials of sympy with rational coefficients cancel exactly. Where that does not end, a search does, which
-may miss solutions. All combinations together then refine each solution, weighted by their errors.
+Polynomials of sympy with rational coefficients cancel exactly. Where that does not end, the start is left to
+a search (`starting_values`). All combinations together then refine each solution, weighted by their errors.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ GAUGE = 0.7318
 """Value given to a parameter that nothing determines while the others are solved for."""
 SAME = 1e-6
 """Relative difference below which two solutions are one; also of what is nearly real."""
-STARTS, MOST = 300, 2000
-"""Starts of a search; terms of a polynomial that is still multiplied out."""
+MOST = 2000
+"""Terms of a polynomial that is still multiplied out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,6 @@ class Recovery(NamedTuple):
         (n, q): change of the parameters per change of the combinations; NaN rows where nobody knows.
     reasons
         In words, why there are several solutions or none.
-    complete
-        False: they were searched for, and there may be more.
     """
 
     solutions: tuple[FloatArray, ...]
@@ -87,7 +85,6 @@ class Recovery(NamedTuple):
     values: FloatArray
     gain: FloatArray
     reasons: tuple[str, ...] = ()
-    complete: bool = True
 
 
 def several(solutions: Sequence[FloatArray]) -> BoolArray:
@@ -103,9 +100,8 @@ def recover(system: System) -> Recovery:
     if not q:
         return Recovery((), np.ones(n, dtype=bool), values, gain)
     undetermined, free = _free(system)
-    starts, complete = _candidates(system, free)
-    weight, solutions = _weights(system), list[FloatArray]()
-    refined = (_refined(system, start, free, weight) for start in starts)
+    starts, weight, solutions = _candidates(system, free), _weights(system), list[FloatArray]()
+    refined = (_refined(system, start, free, weight) for start in starts or ())
     fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
     for misfit, theta in fits:
         again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
@@ -113,14 +109,15 @@ def recover(system: System) -> Recovery:
             solutions.append(theta)
     if not solutions:
         reason = "no real values of the parameters give the estimated combinations"
-        return Recovery((), undetermined, values, gain, (reason,))
+        lost = "the estimated combinations do not lead back to the parameters by elimination"
+        return Recovery((), undetermined, values, gain, (lost if starts is None else reason,))
     solutions.sort(key=lambda theta: [-float(f"{x:.6g}") for x in theta])  # not by what rounding leaves
     lost = several(solutions) | undetermined
     gain[free] = solution(weight @ system.combinations(solutions[0])[1][:, free], weight, rcond=1e-13)
     gain[undetermined] = np.nan
     reasons = why_several(solutions, system.names, np.flatnonzero(lost & ~undetermined).tolist())
     values = np.where(lost, np.nan, solutions[0])
-    return Recovery(tuple(solutions), undetermined, values, gain, tuple(reasons), complete)
+    return Recovery(tuple(solutions), undetermined, values, gain, tuple(reasons))
 
 
 def _free(system: System) -> tuple[BoolArray, list[int]]:
@@ -135,8 +132,8 @@ def _free(system: System) -> tuple[BoolArray, list[int]]:
     return np.isnan(estimate.values), free
 
 
-def _candidates(system: System, free: list[int]) -> tuple[list[FloatArray], bool]:
-    """Real solutions (n,) for the free unknowns, the others at `GAUGE`, and whether these are surely all."""
+def _candidates(system: System, free: list[int]) -> list[FloatArray] | None:
+    """All real solutions (n,) for the free unknowns, the others at `GAUGE`; None: nobody knows them."""
     powers = [
         [Fraction(e).limit_denominator(50).denominator for e in column] for column in system.exponents.T
     ]
@@ -144,9 +141,9 @@ def _candidates(system: System, free: list[int]) -> tuple[list[FloatArray], bool
     try:
         branches = _eliminated(_polynomials(system, free, roots), frozenset(range(len(free))))
     except ValueError:
-        return _random(system, free), False
+        return None
     ends = (np.array([float(branch[j]) for j in range(len(free))]) for branch in branches)
-    return [_whole(system, free, end**roots) for end in ends if (end[roots > 1] >= 0).all()], True
+    return [_whole(system, free, end**roots) for end in ends if (end[roots > 1] >= 0).all()]
 
 
 def _polynomials(system: System, free: list[int], roots: FloatArray) -> list[Polynomial]:
@@ -225,16 +222,6 @@ def _real_roots(polynomial: Polynomial, j: int) -> list[Any]:
     roots = np.roots([exact.get(k, 0.0) for k in range(max(exact), -1, -1)])
     real = sorted({float(root.real) for root in roots if abs(root.imag) <= SAME * abs(root)})
     return [QQ(*root.as_integer_ratio()) for root in real]
-
-
-def _random(system: System, free: list[int]) -> list[FloatArray]:
-    """Points of all magnitudes and signs."""
-    rng = np.random.default_rng(1)
-    size = np.exp(np.log(np.where(system.values != 0, np.abs(system.values), 1.0)).mean())
-    points = 10 ** rng.uniform(-2, 2, (STARTS, len(free)))
-    points[::2] *= size
-    points[STARTS // 2 :] *= rng.choice((-1, 1), (STARTS - STARTS // 2, len(free)))
-    return [_whole(system, free, point) for point in points]
 
 
 def _whole(system: System, free: list[int], values: FloatArray) -> FloatArray:

@@ -55,9 +55,10 @@ def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
         around = peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise[order])
     while True:
         fit = fit_modes(sweep, answers, bands, around)
-        if not around or len(around) == 1 or fit.by_noise.max() <= RARE:
+        noise = fit.by_noise()
+        if not around or len(around) == 1 or noise.max() <= RARE:
             return fit
-        del around[int(fit.by_noise.argmax())]
+        del around[int(noise.argmax())]
 
 
 def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
