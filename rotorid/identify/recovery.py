@@ -9,6 +9,7 @@ a search (`starting_values`). All combinations together then refine each solutio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.identify.combinations import why_several
 from rotorid.identify.operator_model import products_of_powers
 from rotorid.regression import echelon, least_squares, solution
-from rotorid.regression.search import search_from
+from rotorid.regression.nonlinear import nonlinear_least_squares
 
 Polynomial = Any
 """Of sympy, which has no types."""
@@ -101,7 +102,7 @@ def recover(system: System) -> Recovery:
         return Recovery((), np.ones(n, dtype=bool), values, gain)
     undetermined, free = _free(system)
     starts, weight, solutions = _candidates(system, free), _weights(system), list[FloatArray]()
-    refined = (_refined(system, start, free, weight) for start in starts or ())
+    refined = (_refined(system, start, weight) for start in starts or ())
     fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
     for misfit, theta in fits:
         again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
@@ -239,26 +240,19 @@ def _weights(system: System) -> FloatArray:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(shares)) / scale)
 
 
-def _refined(system: System, start: FloatArray, free: list[int], weight: FloatArray) -> FloatArray:
+def _refined(system: System, start: FloatArray, weight: FloatArray) -> FloatArray:
     """Least squares of all combinations from a start (n,); NaN where it runs away."""
-
-    def residual(x: FloatArray) -> FloatArray:
-        return np.asarray(weight @ (system.combinations(_whole(system, free, x))[0] - system.values))
-
-    def jacobian(x: FloatArray) -> FloatArray:
-        return np.nan_to_num(weight @ system.combinations(_whole(system, free, x))[1][:, free])
-
-    if not free:
-        return start
-    with np.errstate(all="ignore"):
-        end = search_from(residual, start[free], jacobian, limit=100)
-        if end is None:
-            return np.full(len(start), np.nan)
-        x = end[1]
-        for _ in range(3):  # to the last digits
-            new = x - solution(jacobian(x), residual(x), rcond=1e-12)
-            x = new if np.linalg.norm(residual(new)) <= np.linalg.norm(residual(x)) else x
-    return _whole(system, free, x)
+    with np.errstate(all="ignore"), suppress(ValueError, np.linalg.LinAlgError):
+        fit = nonlinear_least_squares(
+            lambda theta: np.asarray(weight @ (system.combinations(theta)[0] - system.values)),
+            lambda theta: np.nan_to_num(weight @ system.combinations(theta)[1]),
+            start,
+            names=system.names,
+            sigma_stated=True,
+            near=True,
+        )
+        return fit.estimate.solution
+    return np.full(len(start), np.nan)
 
 
 def _misfit(system: System, theta: FloatArray) -> float:
