@@ -108,7 +108,7 @@ class Comparison:
             for rows in (self.forced, *self.free[:, None])
         )
         inputs, w = data.table(self.model.inputs)[self.forced], data.frequencies[self.forced]
-        Z[self.forced], dZ[self.forced] = self.model.forced(theta, w, inputs, True, of_forced)
+        Z[self.forced], dZ[self.forced] = self.model.forced(theta, w, inputs, of_forced)
         for k, i in enumerate(self.free):
             if not k or self.model.varying:
                 A, dA = self.model.dynamic_stiffness(theta, of_free[k])
@@ -183,8 +183,8 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
     forced, free = (np.flatnonzero(usable & kind) for kind in (~experiments.free, experiments.free))
     rows = np.repeat((given & known[:, None])[:, :, None], 2, axis=2)
-    for i in free:
-        rows[i, :, 1] = rows[i, reference_amplitude(measured[i].real), 0] = False
+    rows[free, :, 1] = False
+    rows[free, [reference_amplitude(shape.real) for shape in measured[free]], 0] = False
     if not (model.power % 2).any():
         real = (inputs.imag == 0).all(axis=1)[:, None]
         rows[..., 1] &= ~(real & (np.abs(measured.imag) <= ROUNDING * np.abs(measured)))
@@ -208,7 +208,7 @@ def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: Co
             raise ValueError(
                 f"errors are known for some outputs but not for {name}: state them with [errors]"
             )
-        turn = real_matrices(z.conj() / np.abs(z))
+        turn = real_matrices(np.exp(-1j * np.angle(z)))
         turned = turn @ covariance @ np.swapaxes(turn, -1, -2)
         trace = np.trace(turned, axis1=-2, axis2=-1)
         if (trace <= 0).any():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorid.base.unit_words import Shown
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class Experiments:
         n = len(self.names)
         if not n:
             raise ValueError("there are no experiments")
-        tables = {"frequencies": self.frequencies, "marks of free vibration": self.free}
+        tables: dict[str, AnyArray] = {"frequencies": self.frequencies, "marks of free vibration": self.free}
         tables |= {f"amplitudes {name}": values for name, values in self.signals.items()}
         tables |= {f"covariances of {name}": values for name, values in self.covariances.items()}
         for what, values in tables.items():

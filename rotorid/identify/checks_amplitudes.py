@@ -21,14 +21,14 @@ def unexplained(left: float, estimate: Estimate) -> list[str]:
     """
     if why := estimate.misfit():
         return [
-            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies elsewhere "
-            "(try another start)"
+            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies "
+            "elsewhere (try another start)"
         ]
     if estimate.errors_stated or not left > LARGE:
         return []
     return [
-        f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the model, a "
-        "reading, a unit or the sign of phases is wrong"
+        f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the model, "
+        "a reading, a unit or the sign of phases is wrong"
     ]
 
 

@@ -13,7 +13,7 @@ from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, experiment
 from rotorid.identify.operator_model import HarmonicModel, eigenvalues, natural_modes, reference_amplitude
 
 DUST, CHANGE = 1e-13, 1e-4
-"""Where so small a relative change of parameters and frequency changes amplitudes by so much, there are none."""
+"""Where so small a relative change of parameters and frequency changes amplitudes so much, there are none."""
 
 
 def forced_vibration(
@@ -39,8 +39,8 @@ def forced_vibration(
     for w in np.array(frequencies, dtype=float):
         try:
             with np.errstate(all="ignore"):
-                Z = model.forced(theta, np.array([w]), inputs, False, varying)[0][0]
-                off = model.forced(other, np.array([w * (1 + DUST)]), inputs, False, varying)[0][0] - Z
+                Z = model.forced(theta, np.array([w]), inputs, varying)[0][0]
+                off = model.forced(other, np.array([w * (1 + DUST)]), inputs, varying)[0][0] - Z
         except np.linalg.LinAlgError:
             off = Z = np.full(len(model.outputs), np.nan)
         if not np.abs(off).max() <= CHANGE * np.abs(Z).max():
@@ -81,7 +81,9 @@ def free_vibration(
     signals = dict(zip(model.outputs, shapes / [v[reference_amplitude(v)] for v in shapes.T], strict=True))
     signals |= {name: np.repeat(values, len(z)) for name, values in varying.items()}
     every = eigenvalues(A)[0]
-    return experiments(model, np.sqrt(z), signals, free=True), np.poly(every[np.isfinite(every)]).real
+    return experiments(model, np.sqrt(z), signals, free=True), np.real(
+        np.poly(every[np.isfinite(every)])
+    ).astype(float)
 
 
 def as_read(

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitude_residuals import Comparison, compare
@@ -82,7 +82,7 @@ def identify(
     ValueError
         For signals that were not measured at all, options that do not go together, unknown names.
     """
-    how = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
+    how: dict[str, Any] = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
     _check(model, experiments, start=start or {}, **how)
     data, copies = experiments.without_copies()
     found = _identified(model, data, start or {}, how)
@@ -92,7 +92,7 @@ def identify(
 
 
 def _check(
-    model: HarmonicModel, experiments: Experiments, *, loss: str, ridge: float, **by_name: Any
+    model: HarmonicModel, experiments: Experiments, *, loss: str, ridge: float, **by_name: Mapping[str, Any]
 ) -> None:
     """Refuse names that are not the model's, or that stand for two things."""
     find(LOSSES, loss, "loss")

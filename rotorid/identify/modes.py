@@ -16,6 +16,7 @@ from rotorid.identify.answers import Answers
 from rotorid.identify.modes_readings import Readings, projected
 from rotorid.identify.modes_result import FittedModes
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.search import Function
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
@@ -88,17 +89,11 @@ def _search(
     limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
     amplitudes = Z = readings.vectors
     for turn in range(ROUNDS):
-        root, last = readings.inverse_roots(amplitudes), dict[bytes, tuple[FloatArray, ...]]()
-
-        def at(q: FloatArray, root: FloatArray = root, last: dict = last) -> tuple[FloatArray, ...]:  # type: ignore[type-arg]
-            if q.tobytes() not in last:
-                last.clear()
-                last[q.tobytes()] = projected(answers.basis(q), Z, root)
-            return last[q.tobytes()]
-
+        root = readings.inverse_roots(amplitudes)
+        rest, slopes = _projectors(answers, Z, root)
         fit = nonlinear_least_squares(
-            lambda q, at=at: at(q)[0],
-            lambda q, at=at: at(q)[1],
+            rest,
+            slopes,
             q,
             names=names,
             sigma_stated=stated,
@@ -106,7 +101,8 @@ def _search(
             near=turn > 0,
         )
         q = fit.estimate.solution
-        model = answers.basis(q)[0] @ at(q)[2].T
+        basis = answers.basis(q)
+        model = basis[0] @ projected(basis, Z, root)[2].T
         with np.errstate(divide="ignore", invalid="ignore"):
             near = np.abs(np.log(np.abs(model) / np.abs(Z))) < np.log(TRUSTED)
         amplitudes = np.where(near, model, Z)
@@ -114,6 +110,19 @@ def _search(
     size = np.abs(np.linalg.det(root[~np.isnan(Z)]))
     likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))
     return float(likely * fit.estimate.dof / 2), fit, root
+
+
+def _projectors(answers: Answers, Z: ComplexArray, root: FloatArray) -> tuple[Function, Function]:
+    """What modes do not explain, and its slopes, as functions of q, evaluated together."""
+    last: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+
+    def at(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if q.tobytes() not in last:
+            last.clear()
+            last[q.tobytes()] = projected(answers.basis(q), Z, root)[:2]
+        return last[q.tobytes()]
+
+    return lambda q: at(q)[0], lambda q: at(q)[1]
 
 
 def peak_bands(

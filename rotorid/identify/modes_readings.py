@@ -88,7 +88,8 @@ class Readings:
         shares = np.array(self.shares or (1.0, 1.0))
         size = np.fmax(np.abs(amplitudes), SMALL * np.nanmedian(np.abs(amplitudes), axis=0))
         errors = np.multiply.outer(size, np.maximum(shares, THIN * shares.max()))
-        return real_matrices(np.exp(-1j * np.angle(np.nan_to_num(amplitudes)))) / errors[..., None]
+        turn = real_matrices(np.exp(-1j * np.angle(np.nan_to_num(amplitudes))))
+        return np.asarray(turn / errors[..., None])
 
 
 def projected(
@@ -128,5 +129,5 @@ def projected(
         turned = lapack.dormqr("L", "T", triangle, tau, turned, 64 * turned.shape[1])[0]
         spread = (inverse @ inverse.T).reshape(size // 2, 2, -1, 2)
         parts.append((y[size:], -turned[size:], linear, spread))
-    rest, by_q, linear, spread = zip(*parts, strict=True)
-    return np.concatenate(rest), np.concatenate(by_q), np.array(linear), np.array(spread)
+    rest, by_q, *others = zip(*parts, strict=True)
+    return np.concatenate(rest), np.concatenate(by_q), np.array(others[0]), np.array(others[1])

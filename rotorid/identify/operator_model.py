@@ -179,7 +179,7 @@ class HarmonicModel:
         table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
         for j, name in enumerate(self.inputs):
             table[:, j] = inputs[name]
-        amplitudes = self.forced(values, frequencies, table, False, varying)[0]
+        amplitudes = self.forced(values, frequencies, table, varying)[0]
         return dict(zip(self.outputs, amplitudes.T, strict=True))
 
     def forced(
@@ -187,10 +187,9 @@ class HarmonicModel:
         values: FloatArray,
         frequencies: FloatArray,
         inputs: ComplexArray,
-        slopes: bool = True,
         varying: Mapping[str, FloatArray] | None = None,
     ) -> tuple[ComplexArray, ComplexArray]:
-        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters), if asked for.
+        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters).
 
         Parameters
         ----------
@@ -200,8 +199,6 @@ class HarmonicModel:
             ω, shape (n,).
         inputs
             Amplitudes of the inputs, (n, inputs).
-        slopes
-            False: without derivatives (an empty array).
         varying
             Known quantities (n,) that change from row to row, by name.
 
@@ -217,8 +214,6 @@ class HarmonicModel:
         given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
         A = whole[:, :, :e]
         Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
-        if not slopes:
-            return Z, np.zeros((n, e, 0), dtype=complex)
         load = multipliers * np.concatenate((Z, given), axis=1)[:, self.column]
         G = [load[:, self.equation == i] @ dP[self.equation == i] for i in range(e)]
         return Z, np.asarray(np.linalg.solve(A, -np.stack(G, axis=1)))
@@ -267,16 +262,18 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
 
 
 def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """All z (k − 1)·e with Σ A_k z^k singular, and vectors of the companion form (.., z's), of A (k, e, e)."""
+    """All z with Σ A_k z^k singular, A (k, e, e), and vectors of the companion form, shapes above."""
     from scipy.linalg import eig
 
     degree, e = len(A) - 1, A.shape[1]
     # companion form L y = z R y with y = (v, z v, …)
     L, R = np.eye(degree * e, k=e), np.eye(degree * e)
-    if degree:
-        L[-e:], R[-e:, -e:] = -np.hstack([*A[:-1]]), A[-1]
+    if not degree:
+        return np.zeros(0, dtype=complex), np.zeros((e, 0), dtype=complex)
+    L[-e:], R[-e:, -e:] = -np.hstack([*A[:-1]]), A[-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return eig(L, R) if degree else (np.zeros(0), np.zeros((e, 0)))
+        z, vectors = eig(L, R)
+    return np.asarray(z), np.asarray(vectors)
 
 
 def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,7 +47,7 @@ def figure_identification(result: Identification) -> Figure:
     else:
         curve = _curve(result)
         for ax, (unit, names) in zip(axes, by_unit.items(), strict=False):
-            _draw(result, ax, names, curve, lambda z, unit=unit: unit.scale * np.abs(z), unit.scale, 0)
+            _draw(result, ax, names, curve, unit.scale)
             ax.set_ylabel(f"amplitude, {unit.word}")
             size = np.abs(result.experiments.table(names))[~result.experiments.free]
             if np.nanmax(size) > WIDE * np.nanmin(np.where(size > 0, size, np.nan)):
@@ -54,7 +55,7 @@ def figure_identification(result: Identification) -> Figure:
                 plain_numbers(ax)
             else:
                 ax.set_ylim(bottom=0.0)
-        _draw(result, axes[-1], result.model.outputs, curve, _degrees, np.degrees(1.0), 1)
+        _draw(result, axes[-1], result.model.outputs, curve, None)
         axes[-1].set(xlabel=result.experiments.axis.word, ylabel="phase lead, °", ylim=(-205, 205))
         axes[-1].set_yticks(range(-180, 181, 90))
         handles = [
@@ -63,7 +64,7 @@ def figure_identification(result: Identification) -> Figure:
         ]
         stated = " ± 2σ" if result.experiments.stated else ""
         lost = "; free vibrations not drawn" if result.experiments.free.any() else ""
-        words = f"points: measured{stated}; lines or crosses: model{lost}"
+        words = f"points: measured{stated}; lines: model{lost}"
         handles.append(Line2D([], [], ls="", label=words))
         legend_above(axes[0], 4, handles=handles)
     for ax in axes:
@@ -87,26 +88,26 @@ def _draw(
     result: Identification,
     axes: Axes,
     names: Sequence[str],
-    curve: tuple[FloatArray, dict[str, ComplexArray]] | None,
-    part: Callable[[ComplexArray], FloatArray],
-    scale: float,
-    across: int,
+    curve: tuple[FloatArray, Mapping[str, ComplexArray]],
+    scale: float | None,
 ) -> None:
-    """A part of amplitudes: as measured, with two standard deviations along or across, and of the model."""
+    """Sizes times a scale (None: phases), as measured, with two standard deviations, and of the model."""
+
+    def part(z: ComplexArray) -> FloatArray:
+        return _degrees(z) if scale is None else scale * np.abs(z)
+
     data, forced = result.experiments, ~result.experiments.free
     w = data.axis.scale * data.frequencies[forced]
     for name in names:
         j, z = result.model.outputs.index(name), data.table([name])[forced, 0]
         turn = real_matrices(np.exp(-1j * np.angle(z)))
-        spread = (turn @ data.covariance(name)[forced] @ np.swapaxes(turn, 1, 2))[:, across, across]
-        error = 2 * scale * np.sqrt(spread) / (np.abs(z) if across else 1.0)
+        spread = turn @ data.covariance(name)[forced] @ np.swapaxes(turn, 1, 2)
+        std = 2 * np.sqrt(np.diagonal(spread, axis1=1, axis2=2).T)
+        error = np.degrees(std[1] / np.abs(z)) if scale is None else scale * std[0]
         style = {**_mark(j), "color": look(j)["color"], "linestyle": ""}
         axes.errorbar(w, part(z), error if data.stated else None, elinewidth=1.2, zorder=3, **style)
-        if curve is not None:
+        if name in curve[1]:
             axes.plot(data.axis.scale * curve[0], part(curve[1][name]), lw=1.4, **look(j))
-        elif name in result.predicted:
-            fitted = part(np.asarray(result.predicted[name])[forced])
-            axes.plot(w, fitted, "x", ms=11, color=look(j)["color"])
 
 
 def _shapes(result: Identification, axes: Axes, unit: str) -> None:
@@ -138,27 +139,20 @@ def _intervals(result: Identification) -> list[tuple[str, float, float, str]]:
         several = len({solution[name] for solution in result.solutions}) > 1
         words = "no interval" if np.isfinite(value) else "several values" if several else "not determined"
         lines.append((name, float(value), factor * sigma, words))
-    for c in () if np.isfinite(result.values).all() else result.combinations:
-        lines.append((c.words, c.value, factor * (c.std or np.nan), "no interval"))
-    return lines
+    more = () if np.isfinite(result.values).all() else result.combinations
+    return [*lines, *((c.words, c.value, factor * (c.std or np.nan), "no interval") for c in more)]
 
 
-def _curve(result: Identification) -> tuple[FloatArray, dict[str, ComplexArray]] | None:
-    """Amplitudes over the measured range, where one excitation belongs to it; of values that fit the data."""
+def _curve(result: Identification) -> tuple[FloatArray, Mapping[str, ComplexArray]]:
+    """Predicted amplitudes over the measured range, where one excitation belongs to it, else at its tests."""
     model, data = result.model, result.experiments
-    w = data.frequencies[~data.free]
-    inputs = data.table(model.inputs)[~data.free]
-    if (
-        not result.predicted
-        or model.varying
-        or len(w) < 2
-        or not np.allclose(inputs, inputs[0], rtol=1e-9, atol=0)
-    ):
-        return None
+    rows = np.flatnonzero(~data.free)[np.argsort(data.frequencies[~data.free], kind="stable")]
+    w, inputs = data.frequencies[rows], data.table(model.inputs)[rows]
+    at_tests = w, {name: values[rows] for name, values in result.predicted.items()}
+    if not result.predicted or model.varying or not np.allclose(inputs, inputs[0], rtol=1e-9, atol=0):
+        return at_tests
     # what is measured may lie at a peak: the line passes exactly there
     grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), CURVE_POINTS), w)))
-    given = dict(zip(model.inputs, np.tile(inputs[0], (len(grid), 1)).T, strict=True))
-    try:
-        return grid, model.predict(result.theta, grid, given)
-    except np.linalg.LinAlgError:
-        return None
+    with suppress(np.linalg.LinAlgError):
+        return grid, model.predict(result.theta, grid, dict(zip(model.inputs, inputs[0], strict=True)))
+    return at_tests

@@ -110,8 +110,9 @@ def recover(system: System) -> Recovery:
             solutions.append(theta)
     if not solutions:
         reason = "no real values of the parameters give the estimated combinations"
-        lost = "the estimated combinations do not lead back to the parameters by elimination"
-        return Recovery((), undetermined, values, gain, (lost if starts is None else reason,))
+        if starts is None:
+            reason = "the estimated combinations do not lead back to the parameters by elimination"
+        return Recovery((), undetermined, values, gain, (reason,))
     solutions.sort(key=lambda theta: [-float(f"{x:.6g}") for x in theta])  # not by what rounding leaves
     lost = several(solutions) | undetermined
     gain[free] = solution(weight @ system.combinations(solutions[0])[1][:, free], weight, rcond=1e-13)
@@ -144,7 +145,7 @@ def _candidates(system: System, free: list[int]) -> list[FloatArray] | None:
     except ValueError:
         return None
     ends = (np.array([float(branch[j]) for j in range(len(free))]) for branch in branches)
-    return [_whole(system, free, end**roots) for end in ends if (end[roots > 1] >= 0).all()]
+    return [_whole(system, free, point**roots) for point in ends if (point[roots > 1] >= 0).all()]
 
 
 def _polynomials(system: System, free: list[int], roots: FloatArray) -> list[Polynomial]:
@@ -159,7 +160,9 @@ def _polynomials(system: System, free: list[int], roots: FloatArray) -> list[Pol
     def term(m: int, value: float) -> Polynomial:
         return R.term_new(tuple(powers[m]), QQ(*value.as_integer_ratio()))
 
-    return [_reduced(sum((term(m, float(row[m])) for m in np.flatnonzero(row)), R.zero)) for row in rows]
+    return [
+        _reduced(sum((term(m, float(row[m])) for m in np.flatnonzero(row).tolist()), R.zero)) for row in rows
+    ]
 
 
 def _reduced(polynomial: Polynomial) -> Polynomial:
@@ -182,12 +185,11 @@ def _eliminated(polynomials: Sequence[Polynomial], unknowns: frozenset[int]) -> 
     if single:
         polynomial = min(single, key=lambda p: (max(p.degrees()), len(p)))
         (j,), one = inside[polynomial], polynomial.ring.one
-        branches = [
+        return [
             {j: root, **branch}
             for root in _real_roots(polynomial, j)
             for branch in _eliminated([_put(p, j, one * root, one) for p in left], unknowns - {j})
         ]
-        return branches
     for polynomial in left:
         for j in inside[polynomial]:
             x = polynomial.ring.gens[j]

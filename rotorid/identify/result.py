@@ -107,7 +107,7 @@ class Identification(Answered, Uncertain):
 
     @cached_property
     def residuals(self) -> tuple[Column, ...]:
-        """Measured less predicted of each output, as a share of the size; without predictions of each equation.
+        """Measured less predicted, as a share of the size, of each output; else of each equation.
 
         A row an experiment and output; NaN where left out.
         """

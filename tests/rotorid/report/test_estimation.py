@@ -85,7 +85,10 @@ def test_readings_with_what_the_model_leaves():
     table = np.array([numbers([row[1], *row[3:]]) for row in rows_of(sheet, "Each reading")])
     data = np.loadtxt(IDENTIFY / "task_4_1" / "data.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2))
     np.testing.assert_allclose(table[:, 0], data[:, 0])
-    answer, w = identify(IDENTIFY / "task_4_1" / "model.toml", IDENTIFY / "task_4_1" / "data.csv"), table[:, 0]
+    answer, w = (
+        identify(IDENTIFY / "task_4_1" / "model.toml", IDENTIFY / "task_4_1" / "data.csv"),
+        table[:, 0],
+    )
     c, damping = answer.identification.values[0], answer.identification.combinations[0].value
     Z = data[:, 1] + 1j * data[:, 2]
     left = 1 - 10 * 1e-4 * w**2 / (-10 * w**2 + 1j * w * damping + c) / Z

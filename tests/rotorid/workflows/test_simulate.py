@@ -119,7 +119,9 @@ def test_lesson_7_rounds_z_first(cli, tmp_path):
     assert "z**3 - 3250*z**2 + 2.125e+06*z - 2.5e+08 = 0" in found.out.replace("\n  ", " ")
     for wrong in ("2", "z:0", "w:2"):
         assert "--round takes z and a number of digits" in cli("simulate", *words[:-1], wrong).err
-    refused = cli("simulate", task("task_5_1"), "--with", "c=1,alpha=1", "--frequencies", "1", "--round", "z:2")
+    refused = cli(
+        "simulate", task("task_5_1"), "--with", "c=1,alpha=1", "--frequencies", "1", "--round", "z:2"
+    )
     assert "--round" in refused.err
 
 
