@@ -104,7 +104,7 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> ModesOutcome
         fit = fit_modes(readings, SteadyAnswers(readings.speeds, force), bands(options.bands) or None)
 
     def picture() -> Figure:
-        from rotorid.identify.plots_modes import figure_modes
+        from rotorid.identify.plots import figure_modes
 
         return figure_modes(fit)
 

@@ -421,7 +421,7 @@ def _figure(sweeps: Sequence[Readings], fit: FittedModes | None, roll: SlowRoll,
     """Amplitude and phase over speed, or vectors as paths in the plane, less the slow roll."""
     import numpy as np
 
-    from rotorid.identify.plots_modes import bode_plot, polar_plot
+    from rotorid.identify.plots import bode_plot, polar_plot
 
     vectors = np.zeros(len(sweeps[0].sensors), dtype=complex) if roll.vectors is None else roll.vectors
     return polar_plot(sweeps, vectors) if view == "polar" else bode_plot(sweeps, vectors, fit)
