@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.arrays import ComplexArray, FloatArray
-    from rotorid.identify.modes_readings import Readings
-    from rotorid.identify.modes_result import FittedModes
+    from rotorid.identify.modes_result import FittedModes, Readings
 
 FEW_TURNS = 6.0
 """In the half-power band of a mode: vectors, means over turns, flatten one that is passed within fewer."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorid.identify.amplitudes import Experiments, real_matrices
+from rotorid.identify.amplitudes import Experiments, inverse_roots, trusted
 from rotorid.identify.operator_model import (
     HarmonicModel,
     mode_slopes,
@@ -22,12 +22,6 @@ from rotorid.identify.operator_model import (
     reference_amplitude,
 )
 
-THIN = 0.01
-"""An error ellipse is at least this share as thin as long: no direction of a reading is exact."""
-SMALL = 1e-3
-"""An amplitude counts as at least this share of its signal's median when errors are relative to it."""
-TRUSTED = 3.0
-"""A predicted amplitude farther than this factor from the measured one does not set the weight."""
 ROUNDING = 1e-9
 """Share of an amplitude below which its imaginary part is rounding."""
 
@@ -73,10 +67,7 @@ class Comparison:
 
     def reweighted(self, theta: FloatArray) -> Comparison:
         """The same with errors at the amplitudes predicted by θ, where these are near the measured ones."""
-        predicted, _ = self.predict(theta)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            far = np.abs(np.log(np.abs(predicted) / np.abs(self.measured)))
-        size = np.where(far < np.log(TRUSTED), predicted, self.measured)
+        size = trusted(self.predict(theta)[0], self.measured)
         return replace(self, whiten=whitening(self.experiments, self.model.outputs, size), _last={})
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -196,27 +187,12 @@ def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: Co
     """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across."""
     whiten = np.zeros((len(experiments), len(outputs), 2, 2))
     for j, name in enumerate(outputs):
-        size = np.abs(amplitudes[~np.isnan(amplitudes[:, j]), j])
-        floor = SMALL * float(np.median(size)) if size.any() else 1.0
-        z = np.where(np.abs(amplitudes[:, j]) >= floor, amplitudes[:, j], floor)
-        covariance = (np.abs(z) ** 2)[:, None, None] * np.eye(2)
-        if name in experiments.covariances:
-            covariance = experiments.covariances[name]
-        elif experiments.errors is not None:
-            covariance = experiments.errors.covariance(z)
-        elif experiments.covariances:
+        known, errors = experiments.covariances, experiments.errors
+        if known and errors is None and name not in known:
             raise ValueError(
                 f"errors are known for some outputs but not for {name}: state them with [errors]"
             )
-        turn = real_matrices(np.exp(-1j * np.angle(z)))
-        turned = turn @ covariance @ np.swapaxes(turn, -1, -2)
-        trace = np.trace(turned, axis1=-2, axis2=-1)
-        if (trace <= 0).any():
-            raise ValueError(
-                "an error of zero is stated for a measured amplitude: repeat the reading or state one"
-            )
-        low, high = np.moveaxis(np.linalg.eigvalsh(turned), -1, 0)
-        thin = np.sqrt(np.clip(low, 0, None) / high) < THIN
-        turned = turned + (thin * THIN**2 * trace)[:, None, None] * np.eye(2)
-        whiten[:, j] = np.linalg.inv(np.linalg.cholesky(turned)) @ turn
+        whiten[:, j] = inverse_roots(
+            amplitudes[:, [j]], errors, known[name][:, None] if name in known else None
+        )[:, 0]
     return whiten

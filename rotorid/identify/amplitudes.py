@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from rotorid.identify.operator_model import HarmonicModel
 
 RAD_PER_S = Shown("frequency, rad/s")
+THIN = 0.01
+"""An error ellipse is at least this share as thin as long: no direction of a reading is exact."""
+SMALL = 1e-3
+"""An amplitude counts as at least this share of its signal's median when errors are relative to it."""
+TRUSTED = 3.0
+"""A predicted amplitude farther than this factor from the measured one does not set the weight."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +50,15 @@ class AmplitudeErrors:
             raise ValueError("state at least one error of the amplitudes greater than zero, or none at all")
 
     def covariance(self, amplitudes: ComplexArray, real: BoolArray | bool = False) -> FloatArray:
-        """Covariance of real and imaginary part, shape (n, 2, 2), for amplitudes (n,).
+        """Covariance of real and imaginary part, shape (…, 2, 2), for amplitudes (…).
 
         The error along the amplitude is √((relative·|Z|)² + floor²), across it √((phase·|Z|)² + floor²).
         Where `real` (free vibration) there is no imaginary part and its variance is zero.
         """
-        z = np.asarray(amplitudes, dtype=complex)
-        turn = real_matrices(np.exp(1j * np.angle(z)))
-        variances = np.multiply.outer(np.abs(z) ** 2, (self.relative**2, self.phase**2)) + self.floor**2
-        covariance = turn * variances[:, None] @ np.swapaxes(turn, 1, 2)
-        covariance[np.broadcast_to(real, z.shape)] *= np.diag([1.0, 0.0])
+        turn = real_matrices(np.exp(1j * np.angle(amplitudes)))
+        shares = np.multiply.outer(np.abs(amplitudes) ** 2, (self.relative**2, self.phase**2))
+        covariance = turn * (shares + self.floor**2)[..., None, :] @ np.swapaxes(turn, -1, -2)
+        covariance[np.broadcast_to(real, np.shape(amplitudes))] *= np.diag([1.0, 0.0])
         return np.asarray(covariance)
 
     def drawn(self, amplitudes: ComplexArray, rng: np.random.Generator) -> ComplexArray:
@@ -67,6 +72,45 @@ class AmplitudeErrors:
 def real_matrices(z: ComplexArray) -> FloatArray:
     """How complex factors (…) act on real and imaginary parts, (…, 2, 2)."""
     return np.stack((np.stack((z.real, -z.imag), -1), np.stack((z.imag, z.real), -1)), -2)
+
+
+def inverse_roots(
+    amplitudes: ComplexArray, errors: AmplitudeErrors | None, covariances: FloatArray | None = None
+) -> FloatArray:
+    """Inverse roots of covariances of amplitudes (n, C), shape (n, C, 2, 2), rows along and across each.
+
+    The covariances are given or those of errors, which are None where only relative sizes count.
+
+    Raises
+    ------
+    ValueError
+        For an error of zero.
+    """
+    size = np.abs(amplitudes)
+    floor = SMALL * np.array(
+        [np.median(one[~np.isnan(one)]) if np.nansum(one) else 1 / SMALL for one in size.T]
+    )
+    z = np.where(size >= floor, amplitudes, floor)
+    if covariances is None:
+        covariances = (errors or AmplitudeErrors(1.0, 1.0)).covariance(z)
+    turn = real_matrices(np.exp(-1j * np.angle(z)))
+    turned = turn @ np.nan_to_num(covariances, nan=1.0) @ np.swapaxes(turn, -1, -2)
+    trace = np.trace(turned, axis1=-2, axis2=-1)
+    if (trace <= 0).any():
+        raise ValueError(
+            "an error of zero is stated for a measured amplitude: repeat the reading or state one"
+        )
+    low, high = np.moveaxis(np.linalg.eigvalsh(turned), -1, 0)
+    thin = low.clip(0) < THIN**2 * high
+    turned = turned + (thin * THIN**2 * trace)[..., None, None] * np.eye(2)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(turned)) @ turn)
+
+
+def trusted(predicted: ComplexArray, measured: ComplexArray) -> ComplexArray:
+    """Predicted amplitudes (n, C), where these are near the measured ones, else those: errors are of them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.abs(np.log(np.abs(predicted) / np.abs(measured)))
+    return np.where(far < np.log(TRUSTED), predicted, measured)
 
 
 @dataclass(frozen=True, eq=False)

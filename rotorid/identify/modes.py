@@ -7,22 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.identify.amplitudes import trusted
 from rotorid.identify.answers import Answers
-from rotorid.identify.modes_readings import Readings, projected
-from rotorid.identify.modes_result import FittedModes
+from rotorid.identify.modes_result import FittedModes, Readings, projected
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
-from rotorid.regression.search import Function
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
-TRUSTED, CLEARLY = 3.0, 3.0
-"""Farther than this factor from a reading the fit does not set its error; by so much more likely (logarithm,
-of as many readings as are spare) errors must be of one size."""
+CLEARLY = 3.0
+"""By so much more likely (logarithm, of as many readings as are spare) errors must be of one size."""
 ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
 Bands = Sequence[tuple[float, float]]
@@ -89,11 +88,15 @@ def _search(
     limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
     amplitudes = Z = readings.vectors
     for turn in range(ROUNDS):
-        root = readings.inverse_roots(amplitudes)
-        rest, slopes = _projectors(answers, Z, root)
+        root = readings.roots(amplitudes)
+
+        @lru_cache(maxsize=1)
+        def at(q: bytes, root: FloatArray = root) -> tuple[AnyArray, ...]:
+            return projected(answers.basis(np.frombuffer(q)), Z, root)
+
         fit = nonlinear_least_squares(
-            rest,
-            slopes,
+            lambda q, at=at: at(q.tobytes())[0],
+            lambda q, at=at: at(q.tobytes())[1],
             q,
             names=names,
             sigma_stated=stated,
@@ -101,28 +104,11 @@ def _search(
             near=turn > 0,
         )
         q = fit.estimate.solution
-        basis = answers.basis(q)
-        model = basis[0] @ projected(basis, Z, root)[2].T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            near = np.abs(np.log(np.abs(model) / np.abs(Z))) < np.log(TRUSTED)
-        amplitudes = np.where(near, model, Z)
+        amplitudes = trusted(answers.basis(q)[0] @ at(q.tobytes())[2].T, Z)
     r = fit.estimate.residuals
     size = np.abs(np.linalg.det(root[~np.isnan(Z)]))
     likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))
     return float(likely * fit.estimate.dof / 2), fit, root
-
-
-def _projectors(answers: Answers, Z: ComplexArray, root: FloatArray) -> tuple[Function, Function]:
-    """What modes do not explain, and its slopes, as functions of q, evaluated together."""
-    last: dict[bytes, tuple[FloatArray, FloatArray]] = {}
-
-    def at(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if q.tobytes() not in last:
-            last.clear()
-            last[q.tobytes()] = projected(answers.basis(q), Z, root)[:2]
-        return last[q.tobytes()]
-
-    return lambda q: at(q)[0], lambda q: at(q)[1]
 
 
 def peak_bands(

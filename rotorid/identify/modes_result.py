@@ -1,21 +1,28 @@
-"""Modes fitted to amplitudes: frequencies, damping and shapes with errors, and what speaks against them."""
+"""Modes fitted to amplitudes: frequencies, damping and shapes with errors, and what speaks against them.
+
+At every point X = Σ_r R_r g_r + a g_∞ + b g_0: all points have the same ω_r and ζ_r, on which the answers g_r
+depend; g_∞ and g_0 are those of modes above and below the range. R, a and b are linear and eliminated: with
+the whitened columns K = Q (T; 0) only the rows of Qᵀ x below T count, and the slopes of these by ω_r and ζ_r
+are −Qᵀ K' c, c = T⁻¹ Qᵀ x above (variable projection, Kaufman 1975). So the search has two parameters a mode.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from balancing import Labels
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.identify.amplitudes import real_matrices
+from rotorid.base.unit_words import SPEEDS
+from rotorid.identify.amplitudes import AmplitudeErrors, inverse_roots, real_matrices
 from rotorid.identify.answers import Answers
-from rotorid.identify.modes_readings import Readings, projected
 from rotorid.regression.nonlinear import NonlinearEstimate
 
 LARGEST = 10.0
@@ -24,7 +31,110 @@ RARE, EXACT = 1e-3, 1e-3
 """Probability below which chance explains nothing; a share of a shape that nobody minds."""
 ASIDE = 4.0
 """Standard deviations across the phase of its mode beyond which a probe may stand 90° apart."""
-Shapes = tuple[FloatArray, FloatArray, tuple[str, ...], tuple[str, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Vectors of some sensors over frequency or speed, of one run.
+
+    Attributes
+    ----------
+    run
+        Its name.
+    time
+        Rising, s, shape (N,), while the speed changes; None: nobody says.
+    speeds
+        Or frequencies, rad/s, (N,).
+    sensors
+        Names, length C.
+    vectors
+        Complex, in the unit of the readings inside, phase lead, (N, C); NaN where there is none.
+    covariances
+        Of their real and imaginary parts, (N, C, 2, 2); None: not stated.
+    labels
+        Units and conventions to print them in.
+    shares
+        Standard deviations of all amplitudes, as a share, and of all phases, rad, instead of covariances.
+    """
+
+    run: str
+    time: FloatArray | None
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    vectors: ComplexArray
+    covariances: FloatArray | None = None
+    labels: Labels = field(default_factory=Labels)
+    shares: tuple[float, float] | None = None
+
+    def take(self, rows: IntArray, columns: IntArray | slice = slice(None)) -> Readings:
+        """Some of the vectors, by rising time, of some sensors."""
+        return replace(
+            self,
+            time=None if self.time is None else self.time[rows],
+            speeds=self.speeds[rows],
+            sensors=tuple(np.array(self.sensors)[columns].tolist()),
+            vectors=self.vectors[rows][:, columns],
+            covariances=None if self.covariances is None else self.covariances[rows][:, columns],
+        )
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviation of each vector, (N, C): stated, or by differences of neighbours in speed."""
+        if self.covariances is not None:
+            return np.asarray(np.sqrt(np.trace(self.covariances, axis1=-2, axis2=-1)))
+        second = np.diff(self.vectors[np.argsort(self.speeds, kind="stable")], 2, axis=0)
+        return np.tile(np.nanmedian(np.abs(second), axis=0) / np.sqrt(6 * np.log(2)), (len(self.speeds), 1))
+
+    def words(self, omega: float) -> str:
+        """A frequency in its unit."""
+        unit, scale = SPEEDS[self.labels.speed_unit]
+        return f"{scale * omega:.5g} {unit}"
+
+    def roots(self, amplitudes: ComplexArray) -> FloatArray:
+        """Inverse roots of the covariances at these amplitudes (N, C), (N, C, 2, 2)."""
+        errors = None if self.shares is None else AmplitudeErrors(*self.shares)
+        return inverse_roots(amplitudes, errors, self.covariances)
+
+
+def projected(
+    basis: tuple[ComplexArray, ComplexArray], vectors: ComplexArray, root: FloatArray
+) -> tuple[FloatArray, FloatArray, ComplexArray, FloatArray]:
+    """What modes explain of vectors (N, C), by the inverse roots of their covariances (N, C, 2, 2).
+
+    Parameters
+    ----------
+    basis
+        Answers (N, k + 2), and their slopes by ω_r and ζ_r (N, 2k).
+    vectors, root
+        The readings, NaN where there is none.
+
+    Returns
+    -------
+    What R, a and b do not explain (m,), its slopes by ω_r and ζ_r (m, 2k), R, a and b (C, k + 2), and their
+    covariances, (C, k + 2, 2, k + 2, 2).
+    """
+    from scipy.linalg import lapack
+
+    columns, slopes = basis
+    design = np.stack((columns, 1j * columns), axis=-1).reshape(len(columns), -1)
+    size, parts = design.shape[1], []
+    for x, over in zip(vectors.T, np.swapaxes(root, 0, 1), strict=True):
+        seen = ~np.isnan(x)
+
+        def real(z: ComplexArray, seen: FloatArray = seen, over: FloatArray = over) -> FloatArray:
+            whitened = over[seen] @ np.stack((z[seen].real, z[seen].imag), axis=1)
+            return np.asarray(whitened.reshape(-1, z.shape[1]))
+
+        triangle, tau, *_ = lapack.dgeqrf(real(design))
+        y = lapack.dormqr("L", "T", triangle, tau, real(x[:, None]), 64)[0][:, 0]
+        inverse = np.linalg.inv(np.triu(triangle[:size]))
+        linear = (inverse @ y[:size]).reshape(-1, 2) @ (1, 1j)
+        turned = real(slopes * np.tile(linear[:-2], 2))
+        turned = lapack.dormqr("L", "T", triangle, tau, turned, 64 * turned.shape[1])[0]
+        spread = (inverse @ inverse.T).reshape(size // 2, 2, -1, 2)
+        parts.append((y[size:], -turned[size:], linear, spread))
+    rest, by_q, *others = zip(*parts, strict=True)
+    return np.concatenate(rest), np.concatenate(by_q), np.array(others[0]), np.array(others[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +208,19 @@ class FittedModes:
         linear = np.einsum("miaj,pajbk,mnbk->mpin", rows, self._linear(q)[1], rows)
         return sums(q), by_q @ of_q @ np.swapaxes(by_q, -1, -2) + self.unit * linear
 
+    def _residues(self, rows: BoolArray | slice = slice(None)) -> tuple[ComplexArray, FloatArray]:
+        """R (k, P), and covariances of their parts but for `unit`, (k, P, 2, 2), by some of the readings."""
+        linear, spread = self._linear(self.fit.estimate.solution, rows)
+        return linear.T[:-2], np.einsum("piaib->ipab", spread)[:-2]
+
     def by_noise(self, rows: BoolArray | slice = slice(None)) -> FloatArray:
         """Bound for the probability that noise alone makes each mode, (k,), by some of the readings."""
         from scipy.special import chdtrc
 
-        linear, spread = self._linear(self.fit.estimate.solution, rows)
-        parts, spread = np.stack((linear.real, linear.imag), axis=-1), np.einsum("piaib->piab", spread)
-        size = np.einsum("pki,pkij,pkj->k", parts, np.linalg.inv(spread), parts)[:-2] / self.unit
-        return np.asarray((self.fit.estimate.dof + 1) * chdtrc(2 * len(parts) + 2, size))
+        residues, spread = self._residues(rows)
+        parts = np.stack((residues.real, residues.imag), axis=-1)
+        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(spread), parts) / self.unit
+        return np.asarray((self.fit.estimate.dof + 1) * chdtrc(2 * parts.shape[1] + 2, size))
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
@@ -162,16 +277,15 @@ class FittedModes:
         return not (self.undetermined or self._misfit)
 
     @cached_property
-    def _shapes(self) -> Shapes:
+    def _shapes(self) -> tuple[FloatArray, FloatArray, tuple[str, ...], tuple[str, ...]]:
         """Real shapes and relative standard deviations, independent from point to point; warnings, notes.
 
         Probes 90° apart read a mode that whirls a quarter turn after each other: such residues are turned.
         """
         from scipy.special import chdtrc
 
-        linear, spread = self._linear(self.fit.estimate.solution)
-        residues, spread = linear.T[:-2], self.unit * np.einsum("piaib->ipab", spread)[:-2]
-        points, modes = np.array(self.readings.sensors), np.arange(len(residues))
+        residues, spread = self._residues()
+        points, modes, spread = np.array(self.readings.sensors), np.arange(len(residues)), self.unit * spread
         trace, size = np.trace(spread, axis1=2, axis2=3), np.abs(residues)
         first = (size >= 0.5 * size.max(axis=1, keepdims=True)).argmax(axis=1)
         beside = residues / (residues / size)[modes, first][:, None]

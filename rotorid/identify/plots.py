@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rotorid.identify.modes_readings import Readings
-    from rotorid.identify.modes_result import FittedModes
+    from rotorid.identify.modes_result import FittedModes, Readings
     from rotorid.identify.result import Identification
 
 POINTS, CURVES, NAMES, MODES = 1000, len(COLORS), 12, 4

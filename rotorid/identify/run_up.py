@@ -9,8 +9,7 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.identify.answers import Answers, SteadyAnswers, swept_answers
 from rotorid.identify.modes import Bands, fit_modes, peak_bands
-from rotorid.identify.modes_readings import Readings
-from rotorid.identify.modes_result import RARE, FittedModes
+from rotorid.identify.modes_result import RARE, FittedModes, Readings
 
 NOISE = 5.0
 """Standard deviations of a vector that are no peak."""

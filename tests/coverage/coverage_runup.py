@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import wofz
 
 from balancing import Labels
-from rotorid.identify.modes_readings import Readings
+from rotorid.identify.modes_result import Readings
 from rotorid.identify.run_up import fit_sweep
 
 RPM = np.pi / 30

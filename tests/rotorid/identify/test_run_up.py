@@ -8,7 +8,7 @@ from run_ups import drawn
 
 from balancing import Labels
 from rotorid.base.rpm import RPM
-from rotorid.identify.modes_readings import Readings
+from rotorid.identify.modes_result import Readings
 from rotorid.identify.run_up import (
     constant_vectors,
     fit_sweep,
