@@ -8,7 +8,8 @@ error, or else with that of this amplitude.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from rotorid.identify.operator_model import (
     nearest_mode,
     reference_amplitude,
 )
+from rotorid.regression.search import Function, together
 
 ROUNDING = 1e-9
 """Share of an amplitude below which its imaginary part is rounding."""
@@ -55,25 +57,28 @@ class Comparison:
     rows: BoolArray
     whiten: FloatArray
     left_out: tuple[str, ...]
-    _last: dict[bytes, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+
+    @cached_property
+    def _functions(self) -> tuple[Function, Function]:
+        return together(self._both)
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """(Predicted − measured) over the errors; NaN where the model has no answer (resonance, no mode)."""
-        return self._both(theta)[0]
+        return self._functions[0](theta)
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         """Derivatives of the residuals, (rows, parameters)."""
-        return self._both(theta)[1]
+        return self._functions[1](theta)
 
     def reweighted(self, theta: FloatArray) -> Comparison:
         """The same with errors at the amplitudes predicted by θ, where these are near the measured ones."""
         size = trusted(self.predict(theta)[0], self.measured)
-        return replace(self, whiten=whitening(self.experiments, self.model.outputs, size), _last={})
+        return replace(self, whiten=whitening(self.experiments, self.model.outputs, size))
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Amplitudes (n, e) and natural frequencies (n,), NaN where there are none."""
-        Z, frequencies = self._answers(theta)[::2]
-        return Z, frequencies
+        amplitudes, frequencies = self._answers(theta)
+        return amplitudes[..., 0], frequencies[:, 0]
 
     def left(self, theta: FloatArray) -> float:
         """Root mean square of what the model leaves of each output's readings and of natural frequencies.
@@ -89,61 +94,52 @@ class Comparison:
             shares.append(float(np.mean(np.nan_to_num(away, nan=1.0) ** 2)))
         return float(np.sqrt(np.mean(shares))) if shares else np.nan
 
-    def _answers(self, theta: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray, FloatArray]:
-        """Amplitudes and natural frequencies, each with derivatives by θ behind it."""
-        data, (n, e) = self.experiments, self.measured.shape
-        Z, dZ = np.full((n, e), np.nan, dtype=complex), np.zeros((n, e, len(theta)), dtype=complex)
-        natural, by_theta = np.full(n, np.nan), np.zeros((n, len(theta)))
-        of_forced, *of_free = (
-            {name: values[rows] for name, values in data.varying.items()}
-            for rows in (self.forced, *self.free[:, None])
-        )
-        inputs, w = data.table(self.model.inputs)[self.forced], data.frequencies[self.forced]
-        Z[self.forced], dZ[self.forced] = self.model.forced(theta, w, inputs, of_forced)
+    def _answers(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Amplitudes and natural frequencies, behind each its derivatives by θ, (n, e, 1 + n), (n, 1 + n)."""
+        data, varying, forced = self.experiments, self.experiments.varying, self.forced
+        amplitudes = np.full((*self.measured.shape, 1 + len(theta)), np.nan, dtype=complex)
+        frequencies = np.full(amplitudes[:, 0].shape, np.nan)
+        inputs, rows = data.table(self.model.inputs)[forced], {n: v[forced] for n, v in varying.items()}
+        Z, dZ = self.model.forced(theta, data.frequencies[forced], inputs, rows)
+        amplitudes[forced] = np.concatenate((Z[..., None], dZ), axis=-1)
         for k, i in enumerate(self.free):
-            if not k or self.model.varying:
-                A, dA = self.model.dynamic_stiffness(theta, of_free[k])
-                z, v = natural_modes(A)
+            if not k or varying:
+                A, dA = self.model.dynamic_stiffness(theta, {n: v[[i]] for n, v in varying.items()})
+                modes = natural_modes(A)
             shape = self.measured[i].real
-            mode, reference = (
-                nearest_mode(z, v, float(data.frequencies[i]), shape),
-                reference_amplitude(shape),
-            )
+            mode = nearest_mode(*modes, float(data.frequencies[i]), shape)
+            reference = reference_amplitude(shape)
             if mode is not None and mode[1][reference]:
-                square, Z[i] = mode[0], mode[1] / mode[1][reference] * shape[reference]
-                dz, dZ[i] = mode_slopes(A, dA, square, Z[i].real, reference)
-                natural[i], by_theta[i] = np.sqrt(square), dz / (2 * np.sqrt(square))
-        return Z, dZ, natural, by_theta
+                omega, v = np.sqrt(mode[0]), mode[1] / mode[1][reference] * shape[reference]
+                dz, dv = mode_slopes(A, dA, mode[0], v, reference)
+                amplitudes[i] = np.column_stack((v, dv))
+                frequencies[i] = (omega, *dz / (2 * omega))
+        return amplitudes, frequencies
 
     def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if (key := theta.tobytes()) in self._last:
-            return self._last[key]
+        """Residuals and their derivatives."""
         try:
             with np.errstate(all="ignore"):
-                Z, dZ, natural, by_theta = self._answers(theta)
+                gap, frequency = self._answers(theta)
         except np.linalg.LinAlgError:
-            Z, dZ = np.nan * self.measured, np.full((*self.measured.shape, len(theta)), np.nan + 0j)
-            natural, by_theta = dZ[:, 0, 0].real, dZ[:, 0].real
-        # values and derivatives side by side
-        gap = np.concatenate(((Z - self.measured)[..., None], dZ), axis=-1)
-        both = self.whiten @ np.stack((gap.real, gap.imag), axis=-2)
-        over, frequency = self.whiten[..., 0, 0], np.column_stack((natural, by_theta))
+            nothing = np.full((np.count_nonzero(self.rows) + len(self.free), 1 + len(theta)), np.nan)
+            return nothing[:, 0], nothing[:, 1:]
+        gap[..., 0] -= self.measured
         frequency[:, 0] -= self.experiments.frequencies
+        both = self.whiten @ np.stack((gap.real, gap.imag), axis=-2)
         for i in self.free:
-            shape, std, rows = self.measured[i].real, self.experiments.frequency_std, self.rows[i, :, 0]
-            reference = reference_amplitude(shape)
+            over, shape, rows = self.whiten[i, :, 0, 0], self.measured[i].real, self.rows[i, :, 0]
+            reference, std = reference_amplitude(shape), self.experiments.frequency_std
             # without an error of its own the frequency has the relative one of the reference amplitude
-            size = over[i, reference] * abs(shape[reference])
+            size = over[reference] * abs(shape[reference])
             frequency[i] *= size / self.experiments.frequencies[i] if std is None else 1 / std[i]
             if std is not None:  # then the error of the reference is one of all that is given relative to it
-                common = (over[i] * shape)[rows] / size
+                common = (over * shape)[rows] / size
                 square = common @ common
                 share = (1 - 1 / np.sqrt(1 + square)) / square if square else 0.0
                 both[i, rows, 0] -= share * np.outer(common, common @ both[i, rows, 0])
         every = np.concatenate((both[self.rows], frequency[self.free]))
-        self._last.clear()
-        self._last[key] = every[:, 0], every[:, 1:]
-        return self._last[key]
+        return every[:, 0], every[:, 1:]
 
 
 def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:

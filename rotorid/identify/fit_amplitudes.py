@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitude_residuals import Comparison, compare
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.checks_amplitudes import negative, unexplained
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import LinearFit, linear_fit, reasons
+from rotorid.identify.linear_start import LinearFit, linear_fit
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.recovery import SAME, several
 from rotorid.identify.result import Identification
@@ -83,32 +83,38 @@ def identify(
         For signals that were not measured at all, options that do not go together, unknown names.
     """
     how: dict[str, Any] = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
-    _check(model, experiments, start=start or {}, **how)
+    _check(model, experiments, start or {}, **how)
     data, copies = experiments.without_copies()
-    found = _identified(model, data, start or {}, how)
-    if data.rounding and not data.stated and found.method == "output-error" and len(found.solutions) == 1:
-        found = _by_digits(found, how)
-    return replace(found, left_out=(*copies, *found.left_out))
+    answer = _finished(_identified(model, data, start or {}, how), how["bounds"])
+    if data.rounding and not data.stated and answer.predicted and len(answer.solutions) == 1:
+        answer = _by_digits(answer, how)
+    return replace(answer, left_out=(*copies, *answer.left_out))
 
 
 def _check(
-    model: HarmonicModel, experiments: Experiments, *, loss: str, ridge: float, **by_name: Mapping[str, Any]
+    model: HarmonicModel,
+    experiments: Experiments,
+    start: Mapping[str, float],
+    *,
+    bounds: Bounds,
+    loss: str,
+    prior: Known,
+    ridge: float,
 ) -> None:
     """Refuse names that are not the model's, or that stand for two things."""
     find(LOSSES, loss, "loss")
-    for what, given in by_name.items():
-        for name in given:
-            if name not in model.parameters:
-                raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
-    for name, (low, high) in by_name["bounds"].items():
+    for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
+        if wrong := [name for name in names if name not in model.parameters]:
+            raise ValueError(f"{what}: {wrong[0]} is no parameter; those are {', '.join(model.parameters)}")
+    for name, (low, high) in bounds.items():
         if low is not None and high is not None and not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
-    if by_name["prior"] and not experiments.stated:
+    if prior and not experiments.stated:
         raise ValueError(
             "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
             "--phase-error, or [errors] in the model file)"
         )
-    if (by_name["prior"] or ridge or loss != "linear") and len(model.outputs) != len(model.equations):
+    if (prior or ridge or loss != "linear") and len(model.outputs) != len(model.equations):
         raise ValueError(
             "[prior], --ridge and --loss belong to models that have as many outputs as equations"
         )
@@ -126,7 +132,7 @@ def _identified(
     model: HarmonicModel, data: Experiments, start: Mapping[str, float], how: Mapping[str, Any]
 ) -> Identification:
     """By output error, or linear regression alone where the model cannot predict."""
-    linear, problem = None, ValueError()
+    linear, problem, fits = None, ValueError(), list[OutputError]()
     try:
         linear = linear_fit(model, data)
     except ValueError as error:  # an amplitude that it needs is missing
@@ -136,12 +142,12 @@ def _identified(
     without = all(nowhere[name] for name in model.outputs) or any(nowhere[name] for name in model.inputs)
     if linear is None and (not predicts or without):
         raise problem
+    solutions = linear.recovery.solutions if linear else ()
     if predicts:
         compare(model, data)  # which refuses readings that cannot be compared
-        fits: list[OutputError] = []
         given = np.array([start.get(name, np.nan) for name in model.parameters])
         whole = bool(np.isfinite(given).all())
-        ends = linear.recovery.solutions[:MOST_STARTS] if linear and not (whole and how["ridge"]) else ()
+        ends = solutions[: 0 if whole and how["ridge"] else MOST_STARTS]
         begins = [given] * whole + [end if whole else np.where(np.isnan(given), end, given) for end in ends]
         for begin in begins or starting_values(model, data, start):
             try:
@@ -149,12 +155,12 @@ def _identified(
             except ValueError as error:  # one of several starts may have no answer
                 problem = error
         good = any(fit.converged and fit.estimate.full_rank for fit, *_ in fits)
-        if fits and (good or linear is None or linear.recovery.solutions):
-            return _finished(_by_output_error(fits, linear, whole=whole), how["bounds"])
-        if linear is None or not (fits or linear.recovery.solutions) or how["prior"] or how["ridge"]:
+        if fits and (good or solutions or linear is None):
+            return _by_output_error(fits, linear, whole=whole)
+        if how["prior"] or how["ridge"] or not (fits or solutions):
             raise problem
     assert linear is not None
-    return _finished(_by_regression(data, linear), how["bounds"])
+    return _by_regression(model, data, linear)
 
 
 def output_error(
@@ -217,7 +223,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
     apart = several(points) & ~np.isnan(points).any(axis=0)
     values = np.where(apart, np.nan, estimate.values) if converged else theta
     combinations = _combinations(estimate, linear) if converged else ()
-    why = reasons(linear) if linear and linear.recovery.solutions else ()
+    why = linear.reasons if linear and linear.recovery.solutions else ()
     if prior and prior.alone and why:
         prior = replace(prior, alone=why[0])
     if not why and estimate.full_rank:
@@ -253,41 +259,32 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
     )
 
 
-def _by_regression(data: Experiments, linear: LinearFit) -> Identification:
+def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -> Identification:
     """The answer of linear regression alone."""
-    model, recovery, estimate, system = linear.model, linear.recovery, linear.estimate, linear.system
-    values, covariance, spread = linear.values, system.covariance, np.full(len(system.values), np.nan)
+    recovery, covariance, each = linear.recovery, linear.system.covariance, linear.system.values
+    values, spread = recovery.values, np.full(len(each), np.nan)
     if covariance is not None:
         spread = np.sqrt(np.diag(covariance).clip(0))
-        covariance = linear.gain @ covariance @ linear.gain.T
-        lost = np.isnan(values)
-        covariance[lost[:, None] | lost] = np.nan
+        covariance = recovery.gain @ covariance @ recovery.gain.T
+        covariance[np.isnan(values)[:, None] | np.isnan(values)] = np.nan
     notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
-    combinations = zip(linear.words, system.values.tolist(), spread.tolist(), strict=True)
     return Identification(
         model=model,
         experiments=data,
         method="equation-error",
         values=values,
         covariance=covariance,
-        estimate=estimate,
+        estimate=linear.estimate,
         linear=linear,
-        combinations=tuple(
-            FoundCombination(words, value, None if np.isnan(std) else std)
-            for words, value, std in combinations
-            if words not in model.parameters
-        ),
+        combinations=_listed(linear, each, spread, np.ones(len(each), dtype=bool)),
         solutions=tuple(
             _named(model, np.where(recovery.undetermined, np.nan, theta)) for theta in recovery.solutions
         ),
         theta=recovery.solutions[0] if recovery.solutions else values,
-        unidentifiable=reasons(linear) if np.isnan(values).any() else (),
-        predicted={},
+        unidentifiable=linear.reasons if np.isnan(values).any() else (),
         left_out=linear.left_out,
-        converged=True,
-        warnings=(),
         notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
-        normal_matrix=normal_matrix(estimate.names, linear.K),
+        normal_matrix=normal_matrix(linear.estimate.names, linear.K),
     )
 
 
@@ -357,11 +354,20 @@ def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[FoundCo
     scale = np.where(theta == 0, 1.0, theta)
     rows, relative = np.linalg.qr((estimate.row_space * scale).T)[0], slopes * scale
     beside = np.linalg.norm(relative - relative @ rows @ rows.T, axis=1)
-    known = beside <= WITHIN * np.linalg.norm(relative, axis=1)
-    variances = np.zeros(len(values)) if spread is None else np.einsum("qi,ij,qj->q", slopes, spread, slopes)
-    each = zip(linear.words, values.tolist(), np.sqrt(variances.clip(0)).tolist(), known, strict=True)
+    seen = beside <= WITHIN * np.linalg.norm(relative, axis=1)
+    std = np.full(len(values), np.nan)
+    if spread is not None:
+        std = np.sqrt(np.einsum("qi,ij,qj->q", slopes, spread, slopes).clip(0))
+    return _listed(linear, values, std, seen)
+
+
+def _listed(
+    linear: LinearFit, values: FloatArray, std: FloatArray, seen: BoolArray
+) -> tuple[FoundCombination, ...]:
+    """Combinations that the data see, but for single parameters; NaN: no standard deviation is known."""
+    each = zip(linear.words, values.tolist(), std.tolist(), seen, strict=True)
     return tuple(
-        FoundCombination(words, value, None if spread is None or np.isnan(std) else std)
-        for words, value, std, seen in each
-        if seen and words not in linear.model.parameters
+        FoundCombination(words, value, None if np.isnan(error) else error)
+        for words, value, error, shown in each
+        if shown and words not in linear.system.names
     )

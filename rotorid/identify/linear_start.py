@@ -34,37 +34,29 @@ class LinearFit:
 
     Attributes
     ----------
-    model
-        The equations.
     estimate, K, Y
         The regression: its unknowns, rows (m, u) and (m,).
     used, left_out
         Which real rows of the experiments these are, (n, 2·equations); the others in words.
     fixed
         1 for each of all unknowns that others are given relative to, else 0.
-    groups
-        Unknowns that may all be multiplied by one factor; of these only ratios are determined.
     system, words, recovery
         The combinations (q,) that the data determine as functions of the parameters, in words, and the
-        parameters from them.
-    values, gain
-        Parameters (n,), NaN where undetermined, and their change per change of the combinations (n, q); what
-        stands alone in the equations is known without a real solution, too.
+        parameters from them; what stands alone in the equations is known without a real solution, too.
+    reasons
+        Why parameters have no one value, in words.
     """
 
-    model: HarmonicModel
     estimate: Estimate
     K: FloatArray
     Y: FloatArray
     used: BoolArray
     left_out: tuple[str, ...]
     fixed: FloatArray
-    groups: tuple[IntArray, ...]
     system: System
     words: tuple[str, ...]
     recovery: Recovery
-    values: FloatArray
-    gain: FloatArray
+    reasons: tuple[str, ...]
 
 
 def linear_fit(model: HarmonicModel, experiments: Experiments) -> LinearFit:
@@ -76,60 +68,62 @@ def linear_fit(model: HarmonicModel, experiments: Experiments) -> LinearFit:
         If a signal of the model was measured nowhere or no complete row remains.
     """
     K, Y, used, left_out = build_rows(model, experiments)
+    combos = model.combinations
     groups, fixed = _relative(model, K, Y, np.nonzero(used)[1] // 2)
-    kept, known = np.flatnonzero(fixed == 0), K @ fixed
-    names = [model.combinations.words[i] for i in kept]
+    kept, right = np.flatnonzero(fixed == 0), Y - K @ fixed
+    names = [combos.words[i] for i in kept]
     alike = len({*names}) < len(names)  # in six digits
-    estimate = least_squares(K[:, kept], Y - known, names=None if alike else names, rcond=RCOND)
-    solution = fixed.copy()
-    solution[kept] = estimate.solution
+    estimate = least_squares(K[:, kept], right, names=None if alike else names, rcond=RCOND)
     picks = np.eye(len(kept)) if estimate.full_rank else np.array(echelon(estimate.row_space))
-    picks = picks.reshape(-1, len(kept))[: 0 if len(groups) and not fixed.any() else None]
+    picks = picks.reshape(-1, len(kept))[: 0 if groups and not fixed.any() else None]
     whole, below = np.zeros((2, len(picks), len(fixed)))
     whole[:, kept] = picks
     for group in groups:
-        rows = np.flatnonzero(whole[:, group].any(axis=1))
-        below[np.ix_(rows, group)] = fixed[group]
-    spread, to_monomials = estimate.solution_covariance, np.pad(model.combinations.rows, ((0, 0), (1, 0)))
+        below[np.ix_(whole[:, group].any(axis=1), group)] = fixed[group]
+    spread, to_monomials = estimate.solution_covariance, np.pad(combos.rows, ((0, 0), (1, 0)))
     under = below @ to_monomials
     under[~below.any(axis=1), 0] = 1.0
     system = System(
         names=model.parameters,
         exponents=model.exponents,
         matrix=whole @ to_monomials,
-        values=whole @ solution,
+        values=picks @ estimate.solution,
         covariance=None if spread is None else picks @ spread @ picks.T,
         below=under,
     )
     words = []
     for pick, top, bottom in zip(whole, system.matrix, under, strict=True):
-        if bottom[0] == 1.0 and np.count_nonzero(pick) == 1:
-            words.append(model.combinations.words[int(np.argmax(pick != 0))])
-        elif bottom[0] == 1.0:
-            words.append(sum_words(_polynomial(model, top)))
+        plain, alone = bottom[0] == 1.0, np.flatnonzero(pick)
+        if plain and len(alone) == 1:
+            words.append(combos.words[alone[0]])
         else:
-            words.append(ratio_words(_polynomial(model, top), _polynomial(model, bottom)))
+            above, beneath = (_polynomial(model, row) for row in (top, bottom))
+            words.append(sum_words(above) if plain else ratio_words(above, beneath))
     recovery = recover(system)
-    values, change = recovery.values.copy(), recovery.gain.copy()
     for i, name in enumerate(words if not recovery.solutions else ()):
         if name in model.parameters:
             j = model.parameters.index(name)
-            values[j], change[j] = system.values[i], np.eye(len(words))[i]
-    return LinearFit(
-        model,
-        estimate,
-        K[:, kept],
-        Y - known,
-        used,
-        left_out,
-        fixed,
-        groups,
-        system,
-        tuple(words),
-        recovery,
-        values,
-        change,
-    )
+            recovery.values[j], recovery.gain[j] = system.values[i], np.eye(len(words))[i]
+    reasons = []
+    if recovery.undetermined.any():
+        lost = np.array(model.parameters)[recovery.undetermined].tolist()
+        reasons.append(only_determined(model.parameters, lost, words))
+    for group in groups:
+        loose = [combos.words[i] for i in group]
+        if {*loose} <= {*model.parameters}:
+            reasons.append(
+                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
+                "in their equations: no experiment of this kind tells more than ratios; make one of them "
+                "known"
+            )
+    if not estimate.full_rank:
+        reasons.append(
+            f"these experiments determine {estimate.rank} of the {len(kept)} combinations that the model "
+            "could show"
+        )
+    reasons += recovery.reasons
+    parts = K[:, kept], right, used, left_out, fixed, system, tuple(words), recovery, tuple(reasons)
+    return LinearFit(estimate, *parts)
 
 
 def build_rows(
@@ -205,25 +199,3 @@ def _relative(
 
 def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
     return {model.monomials[j - 1]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
-
-
-def reasons(fit: LinearFit) -> tuple[str, ...]:
-    """Why parameters have no one value, in words."""
-    model, recovery, words = fit.model, fit.recovery, []
-    if recovery.undetermined.any():
-        lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
-        words.append(only_determined(model.parameters, lost, fit.words))
-    for group in fit.groups:
-        loose = [model.combinations.words[i] for i in group]
-        if set(loose) <= set(model.parameters):
-            words.append(
-                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
-                "in their equations: no experiment of this kind tells more than ratios; make one of them "
-                "known"
-            )
-    if not fit.estimate.full_rank:
-        words.append(
-            f"these experiments determine {fit.estimate.rank} of the {len(fit.estimate.names)} combinations "
-            "that the model could show"
-        )
-    return (*words, *recovery.reasons)

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.identify.amplitudes import trusted
 from rotorid.identify.answers import Answers
 from rotorid.identify.modes_result import FittedModes, Readings, projected
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.search import together
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
@@ -90,13 +90,11 @@ def _search(
     for turn in range(ROUNDS):
         root = readings.roots(amplitudes)
 
-        @lru_cache(maxsize=1)
-        def at(q: bytes, root: FloatArray = root) -> tuple[AnyArray, ...]:
-            return projected(answers.basis(np.frombuffer(q)), Z, root)
+        def both(q: FloatArray, root: FloatArray = root) -> tuple[FloatArray, FloatArray]:
+            return projected(answers.basis(q), Z, root)[:2]
 
         fit = nonlinear_least_squares(
-            lambda q, at=at: at(q.tobytes())[0],
-            lambda q, at=at: at(q.tobytes())[1],
+            *together(both),
             q,
             names=names,
             sigma_stated=stated,
@@ -104,7 +102,7 @@ def _search(
             near=turn > 0,
         )
         q = fit.estimate.solution
-        amplitudes = trusted(answers.basis(q)[0] @ at(q.tobytes())[2].T, Z)
+        amplitudes = trusted(answers.basis(q)[0] @ projected(answers.basis(q), Z, root)[2].T, Z)
     r = fit.estimate.residuals
     size = np.abs(np.linalg.det(root[~np.isnan(Z)]))
     likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))

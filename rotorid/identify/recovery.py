@@ -102,7 +102,7 @@ def recover(system: System) -> Recovery:
         return Recovery((), np.ones(n, dtype=bool), values, gain)
     undetermined, free = _free(system)
     starts, weight, solutions = _candidates(system, free), _weights(system), list[FloatArray]()
-    refined = (_refined(system, start, weight) for start in starts or ())
+    refined = (_refined(system, start, weight) for start in (() if starts is None else starts))
     fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
     for misfit, theta in fits:
         again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
@@ -134,18 +134,20 @@ def _free(system: System) -> tuple[BoolArray, list[int]]:
     return np.isnan(estimate.values), free
 
 
-def _candidates(system: System, free: list[int]) -> list[FloatArray] | None:
-    """All real solutions (n,) for the free unknowns, the others at `GAUGE`; None: nobody knows them."""
-    powers = [
-        [Fraction(e).limit_denominator(50).denominator for e in column] for column in system.exponents.T
-    ]
-    roots = np.array([int(np.lcm.reduce(one)) for one in powers])[free]  # 2 where sqrt(k) stands in the model
+def _candidates(system: System, free: list[int]) -> FloatArray | None:
+    """All real solutions (…, n) for the free unknowns, the others at `GAUGE`; None: nobody knows them."""
+    powers = [[Fraction(e).limit_denominator(50).denominator for e in row] for row in system.exponents]
+    roots = np.lcm.reduce(powers, axis=0)[free]  # 2 where sqrt(k) stands in the model
     try:
         branches = _eliminated(_polynomials(system, free, roots), frozenset(range(len(free))))
     except ValueError:
         return None
-    ends = (np.array([float(branch[j]) for j in range(len(free))]) for branch in branches)
-    return [_whole(system, free, point**roots) for point in ends if (point[roots > 1] >= 0).all()]
+    ends = np.array([[float(branch[j]) for j in range(len(free))] for branch in branches])
+    ends = ends.reshape(-1, len(free))
+    ends = ends[(ends[:, roots > 1] >= 0).all(axis=1)]
+    whole = np.full((len(ends), len(system.names)), GAUGE)
+    whole[:, free] = ends**roots
+    return whole
 
 
 def _polynomials(system: System, free: list[int], roots: FloatArray) -> list[Polynomial]:
@@ -225,12 +227,6 @@ def _real_roots(polynomial: Polynomial, j: int) -> list[Any]:
     roots = np.roots([exact.get(k, 0.0) for k in range(max(exact), -1, -1)])
     real = sorted({float(root.real) for root in roots if abs(root.imag) <= SAME * abs(root)})
     return [QQ(*root.as_integer_ratio()) for root in real]
-
-
-def _whole(system: System, free: list[int], values: FloatArray) -> FloatArray:
-    theta = np.full(len(system.names), GAUGE)
-    theta[free] = values
-    return theta
 
 
 def _weights(system: System) -> FloatArray:

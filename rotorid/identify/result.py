@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -77,12 +77,12 @@ class Identification(Answered, Uncertain):
     solutions: tuple[Mapping[str, float], ...]
     theta: FloatArray
     unidentifiable: tuple[str, ...]
-    predicted: Mapping[str, ComplexArray]
     left_out: tuple[str, ...]
-    converged: bool
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
     normal_matrix: NormalMatrix
+    notes: tuple[str, ...]
+    predicted: Mapping[str, ComplexArray] = field(default_factory=dict)
+    converged: bool = True
+    warnings: tuple[str, ...] = ()
     prior: PriorEffect | None = None
 
     @property

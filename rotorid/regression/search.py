@@ -99,6 +99,19 @@ def drive(
     return x, ok, why
 
 
+def together(both: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> tuple[Function, Function]:
+    """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
+    last: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+
+    def at(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if (key := x.tobytes()) not in last:
+            last.clear()
+            last[key] = both(x)
+        return last[key]
+
+    return lambda x: at(x)[0], lambda x: at(x)[1]
+
+
 def search_from(
     residual: Function, start: FloatArray, jacobian: Function | None = None, *, limit: int
 ) -> tuple[float, FloatArray] | None:

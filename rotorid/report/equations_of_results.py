@@ -46,7 +46,7 @@ def _(found: Identification) -> Equations:
     fit, tests = found.linear, found.experiments
     if fit is None:
         raise ValueError("--show equations needs every amplitude of the equations: one is not measured")
-    model, once = fit.model, len({*tests.frequencies.tolist()}) == len(tests)
+    model, once = found.model, len({*tests.frequencies.tolist()}) == len(tests)
     at = [
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)

@@ -40,7 +40,7 @@ def _estimates(folder, units, data="data.csv", words="estimate of {}"):
     model, readings, truth = exercise(folder, data)
     fit = linear_fit(model, readings)
     values = dict(zip(fit.words, fit.system.values, strict=True))
-    values |= dict(zip(model.parameters, fit.values, strict=True))
+    values |= dict(zip(model.parameters, fit.recovery.values, strict=True))
     numbers = {words.format(f"{n}{units.get(n, '')}"): value for n, value in values.items()}
     return numbers, lambda *names: 100 * max(abs(values[n] / truth[n] - 1) for n in names)
 

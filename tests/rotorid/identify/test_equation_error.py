@@ -43,7 +43,7 @@ def test_formula_50_is_one_more_model(modes, condition):
     found = identify(model, data).linear
     alpha = [[ALPHA[f"a{min(i, j)}{max(i, j)}"] for j in (1, 2, 3)] for i in (1, 2, 3)]
     masses = equivalent_masses(alpha, CRITICAL[:modes], SHAPES[:modes].T).values
-    np.testing.assert_allclose(found.values, masses, rtol=1e-9)
+    np.testing.assert_allclose(found.recovery.values, masses, rtol=1e-9)
     assert found.estimate.condition_number == pytest.approx(condition, rel=5e-3)
 
 
@@ -172,7 +172,7 @@ def test_unknowns_of_an_equation_without_a_known_term_are_not_zero_but_undetermi
     exact = model.predict(np.array([1.0, 20.0, 0.5, 2.0, 3.0]), w, load)
     data = experiments(model, w, {**load, "X": exact["X"], "Y": np.round(exact["Y"], 3)}, free=False)
     found = identify(model, data)
-    np.testing.assert_allclose(found.linear.values[:2], [1.0, 20.0], rtol=1e-9)
+    np.testing.assert_allclose(found.linear.recovery.values[:2], [1.0, 20.0], rtol=1e-9)
     np.testing.assert_allclose(found.values[:2], [1.0, 20.0], rtol=5e-3)
     assert np.isnan(found.values[2:]).all()
     assert found.estimate.rank == 4

@@ -44,7 +44,7 @@ def test_roots_of_parameters_are_unknowns_of_their_own(equation, estimate, truth
     model = harmonic_model([equation], estimate=estimate)
     assert set(model.combinations.words) == set(words)
     found = identify(model, exact(model, truth))
-    np.testing.assert_allclose(found.linear.values, truth, rtol=1e-8)
+    np.testing.assert_allclose(found.linear.recovery.values, truth, rtol=1e-8)
     np.testing.assert_allclose(found.values, truth, rtol=1e-8)
 
 

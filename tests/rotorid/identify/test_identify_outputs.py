@@ -52,7 +52,7 @@ def test_from_noisy_readings_it_fits_better_than_the_linear_estimate():
         z = model.predict(values, w, {"F1": np.full(10, 100.0 + 0j)})
         return sum(np.sum(np.abs(np.log(z[o] / data.signals[o])) ** 2) for o in model.outputs)
 
-    assert misfit(found.values) < misfit(linear.values)
+    assert misfit(found.values) < misfit(linear.recovery.values)
     same = identify(model, data, start=dict(zip(model.parameters, 1.01 * truth, strict=True)))
     np.testing.assert_allclose(same.values, found.values, rtol=1e-5)
 
