@@ -111,7 +111,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     ValueError
         For a table or an option that cannot be.
     """
-    from rotorid.identify.run_up import fit_sweep
+    from rotorid.identify.modes import fit_sweep
 
     options = options or RunUpOptions()
     one_of(options.view, "--view", get_args(View))
@@ -281,7 +281,7 @@ def _slow_roll(
     sweep: Readings, modes: FittedModes | None, given: str | float | Path, files: list[Path]
 ) -> SlowRoll:
     """Run-out: of the fit, the mean at slow speeds, or of a file."""
-    from rotorid.identify.run_up import constant_vectors, slow_vectors
+    from rotorid.identify.modes import constant_vectors, slow_vectors
     from rotorid.tables.runs.vectors_table import read_slow_roll
 
     if isinstance(given, str) and given == "fit":
@@ -312,7 +312,7 @@ def _passed(
 
     import numpy as np
 
-    from rotorid.identify.run_up import fit_sweep, vectors_when_passing
+    from rotorid.identify.modes import fit_sweep, vectors_when_passing
     from rotorid.tables.runs.vectors_table import runs_columns
 
     speeds = np.unique(read_speeds(options.speeds or (), sweeps[0].labels.speed_unit))

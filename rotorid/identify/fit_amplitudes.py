@@ -23,13 +23,10 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
-from rotorid.identify.amplitude_residuals import Comparison, compare
-from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.checks_amplitudes import negative, unexplained
+from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import LinearFit, linear_fit
-from rotorid.identify.operator_model import HarmonicModel
-from rotorid.identify.recovery import SAME, several
+from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, several
+from rotorid.identify.operator_model import HarmonicModel, passive_elements
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
@@ -45,6 +42,9 @@ deviations by which a round moves the parameters that ends them."""
 MOST_STARTS = 8
 WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
+LARGE = 0.12
+"""Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
+KINDS = ("spring", "damper", "mass")
 OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None]
 """A fit, the comparison with the last weights, and what a prior did."""
 
@@ -371,3 +371,48 @@ def _listed(
         for words, value, error, shown in each
         if shown and words not in linear.system.names
     )
+
+
+def unexplained(left: float, estimate: Estimate) -> list[str]:
+    """What the model leaves of the readings, a share, if it is much.
+
+    Stated errors: residuals that these explain with a probability below 0.1 %.
+    """
+    if why := estimate.misfit():
+        return [
+            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies "
+            "elsewhere (try another start)"
+        ]
+    if estimate.errors_stated or not left > LARGE:
+        return []
+    return [
+        f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the model, "
+        "a reading, a unit or the sign of phases is wrong"
+    ]
+
+
+def negative(
+    model: HarmonicModel, highest: float, values: FloatArray, high: FloatArray, bounds: Bounds
+) -> list[str]:
+    """Masses, dampers and springs that are negative beyond the upper end of their interval (n,).
+
+    Unless bounds say that it may be so; `highest` is the highest frequency of the data, rad/s.
+    """
+    kinds = passive_elements(model)
+    at = {name: model.parameters.index(name) for name in kinds}
+    forces = {name: abs(values[at[name]]) * highest**kind for name, kind in kinds.items()}
+    least = 1e-9 * np.nanmax([*forces.values(), 0.0])
+    allowed = {name for name, (low, _) in bounds.items() if low is None or low < 0}
+    named = [n for n in kinds if high[at[n]] < 0 and forces[n] > least and n not in allowed]
+    if not named:
+        return []
+    wrong, known = {kinds[n] for n in named}, [n for n in kinds if np.isfinite(values[at[n]])]
+    why = "a sign, a unit or the model may be wrong"
+    if len(named) == len(known) and len(wrong) > 1:
+        why = "does a force or a reading have the other sign?"
+    elif wrong == {1} and len(named) == sum(kinds[n] == 1 for n in known):
+        why = "are the phases counted the other way (lag, not lead)?"
+    listed = ", ".join(f"{name} = {values[at[name]]:.6g}" for name in named)
+    what = " or ".join(dict.fromkeys(KINDS[kinds[n]] for n in named))
+    verb = "is" if len(named) == 1 else "are"
+    return [f"{listed} {verb} negative, which no passive {what} is: {why}"]

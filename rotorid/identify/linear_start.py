@@ -1,31 +1,106 @@
-"""Equation error, K θ = Y of [S] (9): linear regression of the equations with the measured amplitudes.
+"""Where output error starts: equation error, K θ = Y of [S] (9), and the parameters from its combinations.
 
-Measured amplitudes stand in K, so that their errors bias the estimate: it is where output error starts, and
-the answer only where a model cannot predict. All rows count alike, as in the lessons, and what they leave
-tells their errors.
+Measured amplitudes stand in K, so that their errors bias the estimate: it is the answer only where a model
+cannot predict. All rows count alike, as in the lessons, and what they leave tells their errors.
+
+The combinations are polynomials in the parameters. One unknown after the other is eliminated: a polynomial in
+one unknown by its roots, else one in which an unknown stands linearly with a single term as its factor.
+Polynomials of sympy with rational coefficients cancel exactly. Where that does not end, the start is left to
+a search (`starting_values`). All combinations together then refine each solution, weighted by their errors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray, IntArray
 from rotorid.base.text import listing
 from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.combinations import Polynomial, only_determined, ratio_words, sum_words
-from rotorid.identify.operator_model import HarmonicModel
-from rotorid.identify.recovery import Recovery, System, recover
-from rotorid.regression import least_squares
+from rotorid.identify.combinations import (
+    Expression,
+    Polynomial,
+    only_determined,
+    ratio_words,
+    sum_words,
+    why_several,
+)
+from rotorid.identify.operator_model import HarmonicModel, products_of_powers
+from rotorid.regression import least_squares, solution
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.undetermined_combinations import echelon
 
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
 ROUNDING = 1e-13
 """A part of a row that is smaller than this share of its terms is what rounding leaves of zero."""
+GAUGE = 0.7318
+"""Value given to a parameter that nothing determines while the others are solved for."""
+SAME = 1e-6
+"""Relative difference below which two solutions are one; also of what is nearly real."""
+MOST = 2000
+"""Terms of a polynomial that is still multiplied out."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Combinations `matrix @ monomials(θ) / below @ monomials(θ) = values`: sums, and ratios of sums.
+
+    Attributes
+    ----------
+    names
+        Of the n parameters.
+    exponents
+        Of the monomials (m, n); a row of zeros is 1.
+    matrix, below
+        (q, m).
+    values, covariance
+        (q,), and (q, q) or None.
+    """
+
+    names: tuple[str, ...]
+    exponents: FloatArray
+    matrix: FloatArray
+    values: FloatArray
+    covariance: FloatArray | None
+    below: FloatArray
+
+    def combinations(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values (q,) at the parameters (n,), and their derivatives (q, n)."""
+        monomials, slopes = products_of_powers(self.exponents, theta)
+        bottom = self.below @ monomials
+        values = self.matrix @ monomials / bottom
+        return values, ((self.matrix - values[:, None] * self.below) @ slopes) / bottom[:, None]
+
+
+class Recovery(NamedTuple):
+    """Parameters recovered from combinations.
+
+    Attributes
+    ----------
+    solutions
+        All real ones, (n,) each; complete, also where `undetermined` says that a value is arbitrary.
+    undetermined
+        (n,) mask: parameters that the combinations do not fix at all.
+    values
+        Parameters with one value in all solutions; NaN for the others.
+    gain
+        (n, q): change of the parameters per change of the combinations; NaN rows where nobody knows.
+    reasons
+        In words, why there are several solutions or none.
+    """
+
+    solutions: tuple[FloatArray, ...]
+    undetermined: BoolArray
+    values: FloatArray
+    gain: FloatArray
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,3 +274,178 @@ def _relative(
 
 def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
     return {model.monomials[j - 1]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
+
+
+def several(solutions: Sequence[FloatArray]) -> BoolArray:
+    """Which parameters (n,) differ between solutions."""
+    table = np.array(solutions)
+    return np.asarray(np.ptp(table, axis=0) > SAME * np.abs(table).max(axis=0))
+
+
+def recover(system: System) -> Recovery:
+    """Solve for the parameters."""
+    n, q = len(system.names), len(system.values)
+    gain, values = np.full((n, q), np.nan), np.full(n, np.nan)
+    if not q:
+        return Recovery((), np.ones(n, dtype=bool), values, gain)
+    undetermined, free = _free(system)
+    starts, weight, solutions = _candidates(system, free), _weights(system), list[FloatArray]()
+    refined = (_refined(system, start, weight) for start in (() if starts is None else starts))
+    fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
+    for misfit, theta in fits:
+        again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
+        if misfit <= max(1.0, 3 * fits[0][0]) and np.isfinite(misfit) and not again:
+            solutions.append(theta)
+    if not solutions:
+        reason = "no real values of the parameters give the estimated combinations"
+        if starts is None:
+            reason = "the estimated combinations do not lead back to the parameters by elimination"
+        return Recovery((), undetermined, values, gain, (reason,))
+    solutions.sort(key=lambda theta: [-float(f"{x:.6g}") for x in theta])  # not by what rounding leaves
+    lost = several(solutions) | undetermined
+    gain[free] = solution(weight @ system.combinations(solutions[0])[1][:, free], weight, rcond=1e-13)
+    gain[undetermined] = np.nan
+    reasons = why_several(solutions, system.names, np.flatnonzero(lost & ~undetermined).tolist())
+    values = np.where(lost, np.nan, solutions[0])
+    return Recovery(tuple(solutions), undetermined, values, gain, tuple(reasons))
+
+
+def _free(system: System) -> tuple[BoolArray, list[int]]:
+    """Which parameters the combinations leave open at a general point, and which to solve for.
+
+    The last of the open ones are fixed, one per dimension of the null space.
+    """
+    J = system.combinations(np.random.default_rng(5).uniform(0.6, 1.7, len(system.names)))[1]
+    size = np.linalg.norm(J, axis=1, keepdims=True)
+    estimate = least_squares(J / np.where(size > 0, size, 1.0), np.zeros(len(J)), rcond=1e-9)
+    free = sorted({int(np.flatnonzero(row)[0]) for row in echelon(estimate.row_space)})
+    return np.isnan(estimate.values), free
+
+
+def _candidates(system: System, free: list[int]) -> FloatArray | None:
+    """All real solutions (…, n) for the free unknowns, the others at `GAUGE`; None: nobody knows them."""
+    powers = [[Fraction(e).limit_denominator(50).denominator for e in row] for row in system.exponents]
+    roots = np.lcm.reduce(powers, axis=0)[free]  # 2 where sqrt(k) stands in the model
+    try:
+        branches = _eliminated(_polynomials(system, free, roots), frozenset(range(len(free))))
+    except ValueError:
+        return None
+    ends = np.array([[float(branch[j]) for j in range(len(free))] for branch in branches])
+    ends = ends.reshape(-1, len(free))
+    ends = ends[(ends[:, roots > 1] >= 0).all(axis=1)]
+    whole = np.full((len(ends), len(system.names)), GAUGE)
+    whole[:, free] = ends**roots
+    return whole
+
+
+def _polynomials(system: System, free: list[int], roots: FloatArray) -> list[Expression]:
+    """Expressions that are 0, in a ring of sympy whose generators are the roots of the free unknowns."""
+    from sympy import QQ, ring
+
+    R = ring([f"x{j}" for j in range(len(free))], QQ)[0]
+    rows = system.matrix - system.values[:, None] * system.below
+    rows = rows * np.prod(np.delete(GAUGE**system.exponents, free, axis=1), axis=1)
+    powers = np.round(system.exponents[:, free] * roots).astype(int).tolist()
+
+    def term(m: int, value: float) -> Expression:
+        return R.term_new(tuple(powers[m]), QQ(*value.as_integer_ratio()))
+
+    return [
+        _reduced(sum((term(m, float(row[m])) for m in np.flatnonzero(row).tolist()), R.zero)) for row in rows
+    ]
+
+
+def _reduced(polynomial: Expression) -> Expression:
+    """Without powers of unknowns that all of several terms share: such an unknown is not 0."""
+    if not polynomial:
+        return polynomial
+    shared = np.min(list(polynomial), axis=0)
+    shared = shared if len(polynomial) > 1 else np.minimum(shared, 0)
+    lower = {tuple(np.subtract(m, shared).tolist()): x for m, x in polynomial.items()}
+    return polynomial.ring.from_dict(lower)
+
+
+def _eliminated(polynomials: Sequence[Expression], unknowns: frozenset[int]) -> list[dict[int, Any]]:
+    """All branches of values for the unknowns; ValueError where none can be eliminated by simple means."""
+    if not unknowns:
+        return [{}]
+    inside = {p: [j for j, degree in enumerate(p.degrees()) if degree > 0] for p in polynomials if p}
+    left = sorted((p for p, stand in inside.items() if stand), key=len)
+    single = [p for p in left if len(inside[p]) == 1]
+    if single:
+        polynomial = min(single, key=lambda p: (max(p.degrees()), len(p)))
+        (j,), one = inside[polynomial], polynomial.ring.one
+        return [
+            {j: root, **branch}
+            for root in _real_roots(polynomial, j)
+            for branch in _eliminated([_put(p, j, one * root, one) for p in left], unknowns - {j})
+        ]
+    for polynomial in left:
+        for j in inside[polynomial]:
+            x = polynomial.ring.gens[j]
+            top, bottom = -polynomial.coeff_wrt(x, 0), polynomial.coeff_wrt(x, 1)
+            if polynomial.degree(x) != 1 or len(bottom) != 1 or not top:
+                continue
+            others = [_put(p, j, top, bottom) for p in left if p is not polynomial]
+            branches = []
+            for branch in _eliminated(others, unknowns - {j}):
+                at = [branch.get(i, 0) for i in range(len(polynomial.ring.gens))]
+                if divisor := bottom(*at):
+                    branches.append({**branch, j: top(*at) / divisor})
+            return branches
+    raise ValueError("no unknown stands alone")
+
+
+def _put(polynomial: Expression, j: int, top: Expression, bottom: Expression) -> Expression:
+    """Put top/bottom for unknown j, multiplied out."""
+    x = polynomial.ring.gens[j]
+    degree, whole = polynomial.degree(x), polynomial.ring.zero
+    for e in range(degree, -1, -1):
+        whole = whole * top + polynomial.coeff_wrt(x, e) * bottom ** (degree - e)
+        if len(whole) > MOST:
+            raise ValueError("too many terms")
+    return _reduced(whole) if degree > 0 else polynomial
+
+
+def _real_roots(polynomial: Expression, j: int) -> list[Any]:
+    """Real roots of a polynomial in unknown j, as rational numbers."""
+    from sympy import QQ
+
+    exact = {m[j]: float(x) for m, x in polynomial.items()}
+    roots = np.roots([exact.get(k, 0.0) for k in range(max(exact), -1, -1)])
+    real = sorted({float(root.real) for root in roots if abs(root.imag) <= SAME * abs(root)})
+    return [QQ(*root.as_integer_ratio()) for root in real]
+
+
+def _weights(system: System) -> FloatArray:
+    """Matrix that makes the errors of the combinations independent and of size one (relative if unknown)."""
+    if system.covariance is None:
+        return np.diag(1.0 / np.where(system.values != 0, np.abs(system.values), 1.0))
+    scale = np.maximum(np.sqrt(np.diag(system.covariance)), 1e-14 * np.abs(system.values) + 1e-100)
+    shares = system.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(shares)) / scale)
+
+
+def _refined(system: System, start: FloatArray, weight: FloatArray) -> FloatArray:
+    """Least squares of all combinations from a start (n,); NaN where it runs away."""
+    with np.errstate(all="ignore"), suppress(ValueError, np.linalg.LinAlgError):
+        fit = nonlinear_least_squares(
+            lambda theta: np.asarray(weight @ (system.combinations(theta)[0] - system.values)),
+            lambda theta: np.nan_to_num(weight @ system.combinations(theta)[1]),
+            start,
+            names=system.names,
+            sigma_stated=True,
+            near=True,
+        )
+        return fit.estimate.solution
+    return np.full(len(start), np.nan)
+
+
+def _misfit(system: System, theta: FloatArray) -> float:
+    """Largest error of a combination in units of what rounding and four standard deviations allow."""
+    monomials = np.abs(products_of_powers(system.exponents, theta)[0])
+    size = np.abs(system.matrix) @ monomials / (np.abs(system.below) @ monomials)
+    size += np.abs(system.values) + 1e-300
+    std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
+    error = np.abs(system.combinations(theta)[0] - system.values)
+    return float(np.nan_to_num(error / (1e-6 * size + 4 * std), nan=np.inf).max())

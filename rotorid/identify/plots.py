@@ -26,8 +26,7 @@ from rotorid.base.plot_style import (
 )
 from rotorid.base.rpm import RPM
 from rotorid.base.unit_words import SPEEDS, Shown
-from rotorid.identify.amplitude_residuals import compare
-from rotorid.identify.amplitudes import real_matrices
+from rotorid.identify.amplitudes import compare, real_matrices
 from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:

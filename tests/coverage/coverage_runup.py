@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.special import wofz
 
 from balancing import Labels
+from rotorid.identify.modes import fit_sweep
 from rotorid.identify.modes_result import Readings
-from rotorid.identify.run_up import fit_sweep
 
 RPM = np.pi / 30
 ACCELERATIONS = (20.0, 60.0, 180.0, -60.0)

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotorid.identify import identify
-from rotorid.identify.amplitude_residuals import compare
-from rotorid.identify.amplitudes import AmplitudeErrors
+from rotorid.identify.amplitudes import AmplitudeErrors, compare
 from rotorid.identify.amplitudes import experiments as gather
 from rotorid.identify.equations import harmonic_model
 from rotorid.identify.fit_amplitudes import output_error as fit_from

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rotorid.identify import Identification, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.identify.recovery import System, recover
+from rotorid.identify.linear_start import System, recover
 
 TRUTH = {"T0": 1.0, "T1": 0.5, "T2": 0.8, "zeta": 0.3, "K": 10.0, "c": 1e5, "b": 1e4, "delta": 0.5}
 
@@ -34,8 +34,8 @@ def test_the_order_of_solutions_does_not_hang_on_rounding(last_digit, monkeypatc
     below = np.tile(np.eye(5)[0], (3, 1))
     system = System(names, exponents, matrix, np.array([1.0, 1.3, 0.4]), None, below)
     starts = [np.array([1.0 + last_digit, 0.5, 0.8]), np.array([1.0, 0.8, 0.5])]
-    monkeypatch.setattr("rotorid.identify.recovery._candidates", lambda *_: starts)
-    monkeypatch.setattr("rotorid.identify.recovery._refined", lambda _system, start, *_: start)
+    monkeypatch.setattr("rotorid.identify.linear_start._candidates", lambda *_: starts)
+    monkeypatch.setattr("rotorid.identify.linear_start._refined", lambda _system, start, *_: start)
     assert [solution[1] for solution in recover(system).solutions] == [0.8, 0.5]
 
 

@@ -8,13 +8,13 @@ from run_ups import drawn
 
 from balancing import Labels
 from rotorid.base.rpm import RPM
-from rotorid.identify.modes_result import Readings
-from rotorid.identify.run_up import (
+from rotorid.identify.modes import (
     constant_vectors,
     fit_sweep,
     slow_vectors,
     vectors_when_passing,
 )
+from rotorid.identify.modes_result import Readings
 
 
 def found(modes):
