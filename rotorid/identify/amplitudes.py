@@ -329,20 +329,6 @@ class Comparison:
         amplitudes, frequencies = self._answers(theta)
         return amplitudes[..., 0], frequencies[:, 0]
 
-    def left(self, theta: FloatArray) -> float:
-        """Root mean square of what the model leaves of each output's readings and of natural frequencies.
-
-        Relative to the root mean square of the readings; NaN where nothing is predicted.
-        """
-        predicted, natural = self.predict(theta)
-        gap = np.abs(predicted - self.measured) ** 2
-        size = np.where(np.isnan(gap), 0.0, np.abs(self.measured) ** 2).sum(axis=0)
-        shares = (np.nansum(gap, axis=0)[size > 0] / size[size > 0]).tolist()
-        if len(self.free):  # a mode that the model does not have is left whole
-            away = natural[self.free] / self.experiments.frequencies[self.free] - 1
-            shares.append(float(np.mean(np.nan_to_num(away, nan=1.0) ** 2)))
-        return float(np.sqrt(np.mean(shares))) if shares else np.nan
-
     def _answers(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Amplitudes and natural frequencies, behind each its derivatives by θ, (n, e, 1 + n), (n, 1 + n)."""
         data, varying, forced = self.experiments, self.experiments.varying, self.forced

@@ -236,7 +236,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
         covariance = np.where(apart[:, None] | apart, np.nan, covariance)
 
     warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
-    warnings += unexplained(comparison.left(theta), estimate) if converged else []
+    warnings += unexplained(estimate, stated=data.stated) if converged else []
     return Identification(
         model=model,
         experiments=data,
@@ -373,17 +373,15 @@ def _listed(
     )
 
 
-def unexplained(left: float, estimate: Estimate) -> list[str]:
-    """What the model leaves of the readings, a share, if it is much.
-
-    Stated errors: residuals that these explain with a probability below 0.1 %.
-    """
+def unexplained(estimate: Estimate, *, stated: bool) -> list[str]:
+    """What the model leaves of the readings, if it is much: more than stated errors, or a large share."""
     if why := estimate.misfit():
         return [
             f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies "
             "elsewhere (try another start)"
         ]
-    if estimate.errors_stated or not left > LARGE:
+    left = np.sqrt(2 * np.mean(estimate.residuals**2))  # of both parts of an amplitude, relative to it
+    if stated or not left > LARGE:
         return []
     return [
         f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the model, "

@@ -3,19 +3,21 @@
 Measured amplitudes stand in K, so that their errors bias the estimate: it is the answer only where a model
 cannot predict. All rows count alike, as in the lessons, and what they leave tells their errors.
 
-The combinations are polynomials in the parameters. One unknown after the other is eliminated: a polynomial in
-one unknown by its roots, else one in which an unknown stands linearly with a single term as its factor.
-Polynomials of sympy with rational coefficients cancel exactly. Where that does not end, the start is left to
-a search (`starting_values`). All combinations together then refine each solution, weighted by their errors.
+The combinations are polynomials in the parameters. As many independent ones as there are unknowns, the
+simplest first, are solved: unknowns that they link by a Gröbner basis of rational numbers, one after the
+other by its roots. Where that would take long, the start is left to a search (`starting_values`). All
+combinations together then refine each solution, weighted by their errors, and refuse those that they
+contradict.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,8 +46,8 @@ GAUGE = 0.7318
 """Value given to a parameter that nothing determines while the others are solved for."""
 SAME = 1e-6
 """Relative difference below which two solutions are one; also of what is nearly real."""
-MOST = 2000
-"""Terms of a polynomial that is still multiplied out."""
+MOST = 30
+"""Solutions, real or not, of linked unknowns that are still looked for, by the product of degrees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,9 +290,14 @@ def recover(system: System) -> Recovery:
     gain, values = np.full((n, q), np.nan), np.full(n, np.nan)
     if not q:
         return Recovery((), np.ones(n, dtype=bool), values, gain)
-    undetermined, free = _free(system)
-    starts, weight, solutions = _candidates(system, free), _weights(system), list[FloatArray]()
-    refined = (_refined(system, start, weight) for start in (() if starts is None else starts))
+    J = system.combinations(np.random.default_rng(5).uniform(0.6, 1.7, n))[1]  # at a general point
+    size = np.linalg.norm(J, axis=1, keepdims=True)
+    seen = least_squares(J / np.where(size > 0, size, 1.0), np.zeros(q), rcond=1e-9)
+    # of those that are open the last are fixed, one per dimension of the null space
+    free = sorted({int(np.flatnonzero(row)[0]) for row in echelon(seen.row_space)})
+    undetermined, weight, solutions = np.isnan(seen.values), _weights(system), list[FloatArray]()
+    starts = _candidates(system, free, J[:, free])
+    refined = (_refined(system, start, weight) for start in starts or ())
     fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
     for misfit, theta in fits:
         again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
@@ -299,7 +306,7 @@ def recover(system: System) -> Recovery:
     if not solutions:
         reason = "no real values of the parameters give the estimated combinations"
         if starts is None:
-            reason = "the estimated combinations do not lead back to the parameters by elimination"
+            reason = "the estimated combinations do not lead back to the parameters in a few steps"
         return Recovery((), undetermined, values, gain, (reason,))
     solutions.sort(key=lambda theta: [-float(f"{x:.6g}") for x in theta])  # not by what rounding leaves
     lost = several(solutions) | undetermined
@@ -310,111 +317,77 @@ def recover(system: System) -> Recovery:
     return Recovery(tuple(solutions), undetermined, values, gain, tuple(reasons))
 
 
-def _free(system: System) -> tuple[BoolArray, list[int]]:
-    """Which parameters the combinations leave open at a general point, and which to solve for.
+def _candidates(system: System, free: list[int], J: FloatArray) -> list[FloatArray] | None:
+    """All real solutions (n,) for the free unknowns, the others at `GAUGE`; None: nobody knows them.
 
-    The last of the open ones are fixed, one per dimension of the null space.
+    J are derivatives (q, free) at a general point.
     """
-    J = system.combinations(np.random.default_rng(5).uniform(0.6, 1.7, len(system.names)))[1]
-    size = np.linalg.norm(J, axis=1, keepdims=True)
-    estimate = least_squares(J / np.where(size > 0, size, 1.0), np.zeros(len(J)), rcond=1e-9)
-    free = sorted({int(np.flatnonzero(row)[0]) for row in echelon(estimate.row_space)})
-    return np.isnan(estimate.values), free
+    from scipy.linalg import qr
+    from scipy.sparse.csgraph import connected_components
 
-
-def _candidates(system: System, free: list[int]) -> FloatArray | None:
-    """All real solutions (…, n) for the free unknowns, the others at `GAUGE`; None: nobody knows them."""
     powers = [[Fraction(e).limit_denominator(50).denominator for e in row] for row in system.exponents]
     roots = np.lcm.reduce(powers, axis=0)[free]  # 2 where sqrt(k) stands in the model
-    try:
-        branches = _eliminated(_polynomials(system, free, roots), frozenset(range(len(free))))
-    except ValueError:
-        return None
-    ends = np.array([[float(branch[j]) for j in range(len(free))] for branch in branches])
-    ends = ends.reshape(-1, len(free))
-    ends = ends[(ends[:, roots > 1] >= 0).all(axis=1)]
-    whole = np.full((len(ends), len(system.names)), GAUGE)
-    whole[:, free] = ends**roots
-    return whole
-
-
-def _polynomials(system: System, free: list[int], roots: FloatArray) -> list[Expression]:
-    """Expressions that are 0, in a ring of sympy whose generators are the roots of the free unknowns."""
-    from sympy import QQ, ring
-
-    R = ring([f"x{j}" for j in range(len(free))], QQ)[0]
+    exponents = np.round(system.exponents[:, free] * roots).astype(int)
     rows = system.matrix - system.values[:, None] * system.below
     rows = rows * np.prod(np.delete(GAUGE**system.exponents, free, axis=1), axis=1)
-    powers = np.round(system.exponents[:, free] * roots).astype(int).tolist()
-
-    def term(m: int, value: float) -> Expression:
-        return R.term_new(tuple(powers[m]), QQ(*value.as_integer_ratio()))
-
-    return [
-        _reduced(sum((term(m, float(row[m])) for m in np.flatnonzero(row).tolist()), R.zero)) for row in rows
-    ]
-
-
-def _reduced(polynomial: Expression) -> Expression:
-    """Without powers of unknowns that all of several terms share: such an unknown is not 0."""
-    if not polynomial:
-        return polynomial
-    shared = np.min(list(polynomial), axis=0)
-    shared = shared if len(polynomial) > 1 else np.minimum(shared, 0)
-    lower = {tuple(np.subtract(m, shared).tolist()): x for m, x in polynomial.items()}
-    return polynomial.ring.from_dict(lower)
+    stands = (rows != 0) @ (exponents != 0)
+    simple = 4.0 ** -(np.count_nonzero(rows, axis=1) + stands.sum(axis=1))
+    sizes = simple / np.fmax(np.linalg.norm(J, axis=1), 1e-300)
+    chosen = qr((J * sizes[:, None]).T, mode="r", pivoting=True)[1][: len(free)]
+    solutions = [np.full(len(system.names), GAUGE)]
+    count, part = connected_components(stands[chosen].T @ stands[chosen])
+    for k in range(count):
+        inside = np.flatnonzero(part == k)
+        ends = _solved(rows[chosen][stands[chosen][:, inside].any(axis=1)], exponents[:, inside])
+        if ends is None:
+            return None
+        ends = [end ** roots[inside] for end in ends if (end[roots[inside] > 1] >= 0).all()]
+        places = np.array(free)[inside]
+        solutions = [_put(theta, places, end) for theta in solutions for end in ends]
+    return solutions
 
 
-def _eliminated(polynomials: Sequence[Expression], unknowns: frozenset[int]) -> list[dict[int, Any]]:
-    """All branches of values for the unknowns; ValueError where none can be eliminated by simple means."""
-    if not unknowns:
-        return [{}]
-    inside = {p: [j for j, degree in enumerate(p.degrees()) if degree > 0] for p in polynomials if p}
-    left = sorted((p for p, stand in inside.items() if stand), key=len)
-    single = [p for p in left if len(inside[p]) == 1]
-    if single:
-        polynomial = min(single, key=lambda p: (max(p.degrees()), len(p)))
-        (j,), one = inside[polynomial], polynomial.ring.one
-        return [
-            {j: root, **branch}
-            for root in _real_roots(polynomial, j)
-            for branch in _eliminated([_put(p, j, one * root, one) for p in left], unknowns - {j})
-        ]
-    for polynomial in left:
-        for j in inside[polynomial]:
-            x = polynomial.ring.gens[j]
-            top, bottom = -polynomial.coeff_wrt(x, 0), polynomial.coeff_wrt(x, 1)
-            if polynomial.degree(x) != 1 or len(bottom) != 1 or not top:
-                continue
-            others = [_put(p, j, top, bottom) for p in left if p is not polynomial]
-            branches = []
-            for branch in _eliminated(others, unknowns - {j}):
-                at = [branch.get(i, 0) for i in range(len(polynomial.ring.gens))]
-                if divisor := bottom(*at):
-                    branches.append({**branch, j: top(*at) / divisor})
-            return branches
-    raise ValueError("no unknown stands alone")
+def _solved(rows: FloatArray, exponents: IntArray) -> list[FloatArray] | None:
+    """Real zeros (u,) of polynomials (u, m) in monomials with exponents (m, u); None: not in a few steps."""
+    from sympy import QQ, ring
+    from sympy.polys.groebnertools import groebner
+
+    unknowns = exponents.shape[1]
+    R, polynomials = ring([f"x{j}" for j in range(unknowns)], QQ)[0], []
+    for row in rows:
+        powers, place = np.unique(exponents[row != 0], axis=0, return_inverse=True)
+        lowest = powers.min(axis=0)  # an unknown that all of several terms have is not 0
+        powers = powers - (lowest if len(powers) > 1 else lowest.clip(None, 0))
+        each = zip(powers.tolist(), np.bincount(place.ravel(), row[row != 0]).tolist(), strict=True)
+        polynomials.append(R.from_dict({tuple(e): QQ(*x.as_integer_ratio()) for e, x in each if x}))
+    if math.prod(max(map(sum, p), default=0) for p in polynomials) > MOST:
+        return None
+    basis = groebner(polynomials, R)
+    solutions = [np.zeros(unknowns)] if all(any(p.degrees()) for p in basis) else []
+    for j in reversed(range(unknowns) if solutions else ()):
+        stairs = [p for p in basis if p.degrees()[j] and not any(p.degrees()[:j])]
+        if not stairs:
+            return None
+        stairs.sort(key=lambda p: p.degrees()[j])
+        solutions = [_put(one, j, root) for one in solutions for root in _real_roots(stairs, j, one)]
+    return solutions
 
 
-def _put(polynomial: Expression, j: int, top: Expression, bottom: Expression) -> Expression:
-    """Put top/bottom for unknown j, multiplied out."""
-    x = polynomial.ring.gens[j]
-    degree, whole = polynomial.degree(x), polynomial.ring.zero
-    for e in range(degree, -1, -1):
-        whole = whole * top + polynomial.coeff_wrt(x, e) * bottom ** (degree - e)
-        if len(whole) > MOST:
-            raise ValueError("too many terms")
-    return _reduced(whole) if degree > 0 else polynomial
+def _real_roots(polynomials: Sequence[Expression], j: int, behind: FloatArray) -> list[float]:
+    """Real roots for unknown j of the first polynomial whose degree stays, at the values of those behind."""
+    for p in polynomials:
+        powers, x = np.array(p.monoms()), np.array([float(x) for x in p.coeffs()])
+        terms = x * np.prod(behind[j + 1 :] ** powers[:, j + 1 :], axis=1)
+        line = np.bincount(powers[:, j], terms)[::-1]
+        if abs(line[0]) > SAME * np.abs(terms[powers[:, j] == len(line) - 1]).sum():
+            break
+    return [float(root.real) for root in np.roots(line) if abs(root.imag) <= SAME * abs(root)]
 
 
-def _real_roots(polynomial: Expression, j: int) -> list[Any]:
-    """Real roots of a polynomial in unknown j, as rational numbers."""
-    from sympy import QQ
-
-    exact = {m[j]: float(x) for m, x in polynomial.items()}
-    roots = np.roots([exact.get(k, 0.0) for k in range(max(exact), -1, -1)])
-    real = sorted({float(root.real) for root in roots if abs(root.imag) <= SAME * abs(root)})
-    return [QQ(*root.as_integer_ratio()) for root in real]
+def _put(values: FloatArray, places: IntArray | int, new: FloatArray | float) -> FloatArray:
+    whole = values.copy()
+    whole[places] = new
+    return whole
 
 
 def _weights(system: System) -> FloatArray:

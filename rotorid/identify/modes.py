@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.identify.amplitudes import trusted
 from rotorid.identify.answers import Answers, SteadyAnswers, swept_answers
 from rotorid.identify.modes_result import RARE, FittedModes, Readings, projected
@@ -66,7 +66,7 @@ def fit_modes(
     omega, Z = readings.speeds, readings.vectors
     H = (Z.T / answers.excitation).T
     sections = sorted(bands or around or peak_bands(omega, H))
-    if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
+    if any(low < high for (_, high), (low, _) in pairwise(sections if bands else ())):
         raise ValueError("--bands overlap: each holds one mode")
     rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
     spare = np.count_nonzero(~np.isnan(Z), axis=0) - len(rows) - 2
@@ -77,17 +77,19 @@ def fit_modes(
         )
     q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel()
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
-    if readings.covariances is not None or readings.shares is not None:
-        return FittedModes(readings, answers, *_search(readings, answers, q, ends)[1:], ends, "")
+    stated = readings.covariances is not None or readings.shares is not None
+    share = _search(readings, answers, q, ends, stated=stated)
+    if stated:
+        return FittedModes(readings, answers, *share[1:], ends, "")
     size = replace(readings, covariances=np.broadcast_to(np.eye(2), (*Z.shape, 2, 2)))
-    share, other = (_search(each, answers, q, ends, stated=False) for each in (readings, size))
-    likely = other[0] >= share[0] + CLEARLY
-    same = "size everywhere" if likely else "share of every amplitude"
-    return FittedModes(readings, answers, *(other if likely else share)[1:], ends, same)
+    other = _search(size, answers, q, ends, stated=False)
+    if other[0] >= share[0] + CLEARLY:
+        return FittedModes(readings, answers, *other[1:], ends, "size everywhere")
+    return FittedModes(readings, answers, *share[1:], ends, "share of every amplitude")
 
 
 def _search(
-    readings: Readings, answers: Answers, q: FloatArray, ends: Bands, *, stated: bool = True
+    readings: Readings, answers: Answers, q: FloatArray, ends: Bands, *, stated: bool
 ) -> tuple[float, NonlinearEstimate, FloatArray]:
     """Likelihood (its logarithm but for a constant), fit, and inverse roots of the readings' covariances."""
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(ends) + 1)]
@@ -97,8 +99,8 @@ def _search(
     for turn in range(ROUNDS):
         root = readings.roots(amplitudes)
 
-        def both(q: FloatArray, root: FloatArray = root) -> tuple[FloatArray, FloatArray]:
-            return projected(answers.basis(q), Z, root)[:2]
+        def both(q: FloatArray, root: FloatArray = root) -> tuple[AnyArray, ...]:
+            return projected(answers.basis(q), Z, root)
 
         fit = nonlinear_least_squares(
             *together(both),
@@ -109,9 +111,8 @@ def _search(
             near=turn > 0,
         )
         q = fit.estimate.solution
-        amplitudes = trusted(answers.basis(q)[0] @ projected(answers.basis(q), Z, root)[2].T, Z)
-    r = fit.estimate.residuals
-    size = np.abs(np.linalg.det(root[~np.isnan(Z)]))
+        amplitudes = trusted(answers.basis(q)[0] @ both(q)[2].T, Z)
+    r, size = fit.estimate.residuals, np.abs(np.linalg.det(root[~np.isnan(Z)]))
     likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))
     return float(likely * fit.estimate.dof / 2), fit, root
 
@@ -149,8 +150,8 @@ def peak_bands(
     sections = []
     for peak, (first, last) in zip(peaks, pairwise(valleys), strict=True):
         rows = np.arange(first, last + 1)
-        near = rows[(level[rows] > level[peak] - np.log(SKIRT)) | (np.abs(rows - peak) < 2)]
-        sections.append((float(omega[near[0]]), float(omega[near[-1]])))
+        near = omega[rows[(level[rows] > level[peak] - np.log(SKIRT)) | (np.abs(rows - peak) < 2)]]
+        sections.append((float(near[0]), float(near[-1])))
     return sections
 
 
@@ -160,9 +161,8 @@ def _circle(omega: FloatArray, H: ComplexArray) -> tuple[float, float]:
     It is linear in s, which all points share, and in c and a of each (Kennedy and Pancu, 1947).
     """
     H = H[:, ~np.isnan(H).all(axis=0)]
-    H = np.where(np.isnan(H), np.nanmean(H, axis=0), H)
-    v = omega**2
-    line = np.stack((np.ones_like(v), v / v.mean()), axis=1)
+    H, v = np.where(np.isnan(H), np.nanmean(H, axis=0), H), omega**2
+    line = np.vander(v / v.mean(), 2)
     rest = H - line @ (np.linalg.pinv(line) @ H)
     s = np.vdot(rest, H * v[:, None]) / (np.vdot(rest, rest).real or 1.0)
     if not v[0] < s.real < v[-1]:
@@ -227,13 +227,12 @@ def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArra
         For a sensor without a vector there.
     """
     slow = sweep.take(np.flatnonzero(sweep.speeds <= speed))
-    read = ~np.isnan(slow.vectors)
+    read, words = ~np.isnan(slow.vectors), sweep.labels.speed_words
     count = read.sum(axis=0)
     if not count.all():
         raise ValueError(
             f"--slow-roll: sensor {sweep.sensors[int(count.argmin())]!r} has no vector at or below "
-            f"{sweep.labels.speed_words(speed)}; the lowest speed is "
-            f"{sweep.labels.speed_words(float(sweep.speeds.min()))}"
+            f"{words(speed)}; the lowest speed is {words(float(sweep.speeds.min()))}"
         )
     mean, variances = np.nanmean(slow.vectors, axis=0), slow.covariances
     if variances is None:  # as the vectors scatter
@@ -261,23 +260,22 @@ def vectors_when_passing(
     if len(beyond := speeds[(speeds < low * (1 - SAME)) | (speeds > high * (1 + SAME))]):
         first, last, other = (sweep.labels.speed_words(float(each)) for each in (low, high, beyond[0]))
         raise ValueError(f"--speeds: run {sweep.run!r} goes from {first} to {last}, not to {other}")
+    vectors, rest = np.zeros((len(speeds), len(sweep.sensors)), dtype=complex), sweep.vectors
     if modes is not None and modes.explains:
         answers = modes.answers.at(speeds)
         return modes.predicted(lambda q: answers.basis(q)[0])
-    vectors = np.zeros((len(speeds), len(sweep.sensors)), dtype=complex)
-    rest, covariances = sweep.vectors, np.zeros((*vectors.shape, 2, 2))
     if modes is not None:
         vectors, rest = modes.curve(speeds), rest - modes.curve(sweep.speeds)
+    covariances = np.zeros((*vectors.shape, 2, 2))
     for m, c in np.ndindex(vectors.shape):
-        seen = np.flatnonzero(~np.isnan(rest[:, c]))
-        rows = seen[np.argsort(np.abs(sweep.speeds[seen] - speeds[m]), kind="stable")[:NEIGHBOURS]]
+        seen, x = np.flatnonzero(~np.isnan(rest[:, c])), sweep.speeds - speeds[m]
+        rows = seen[np.argsort(np.abs(x[seen]), kind="stable")[:NEIGHBOURS]]
         if len(rows) < NEIGHBOURS:
             raise ValueError(
                 f"--speeds: run {sweep.run!r} has {len(rows)} vectors of sensor {sweep.sensors[c]!r}, and "
                 f"{NEIGHBOURS} are needed to find what lies between them"
             )
-        x = sweep.speeds[rows] - speeds[m]
-        parabola = np.vander(x / np.abs(x).max(), 3)
+        parabola = np.vander(x[rows] / np.abs(x[rows]).max(), 3)
         solve = np.linalg.pinv(parabola)
         left = rest[rows, c] - parabola @ (solve @ rest[rows, c])
         variance = np.vdot(left, left).real / (2 * NEIGHBOURS - 6)

@@ -225,28 +225,34 @@ class FittedModes:
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words: at most one clause a mode."""
-        words = [] if self.fit.converged else [self.fit.message]
-        read, by_noise = self.readings.speeds, self.by_noise()
-        for mode, ((low, high), (omega, zeta, error, other)) in enumerate(
-            zip(self.ends, self.values.T, strict=True)
-        ):
+        words, by_noise = [] if self.fit.converged else [self.fit.message], self.by_noise()
+        speeds, vectors = self.readings.speeds, self.readings.vectors
+        known = self.fit.std is not None
+        for mode, ((low, high), values) in enumerate(zip(self.ends, self.values.T, strict=True)):
+            omega, zeta, error, other = values
             name = f"mode {mode + 1} ({self.readings.words(omega)})"
-            near = read[(3 * low - 2 * high <= read) & (read <= 3 * high - 2 * low)]
-            rest = read != read[np.abs(read - omega).argmin()]
-            alone = min((~np.isnan(self.readings.vectors[rest])).sum(axis=0)) >= len(self.ends) + 2
-            if by_noise[mode] > RARE:
-                words.append(f"{name} is no more than noise: say in --bands where modes are")
-            elif self.fit.std is not None and not 2 * error < high - low:
-                words.append(f"these readings do not tell frequency and damping of mode {mode + 1}")
-            elif alone and self.by_noise(rest)[mode] > RARE:
-                words.append(
+            near = speeds[(3 * low - 2 * high <= speeds) & (speeds <= 3 * high - 2 * low)]
+            rest = speeds != speeds[np.abs(speeds - omega).argmin()]
+            alone = min((~np.isnan(vectors[rest])).sum(axis=0)) >= len(self.ends) + 2
+            doubts = (
+                (by_noise[mode] > RARE, f"{name} is no more than noise: say in --bands where modes are"),
+                (
+                    known and not 2 * error < high - low,
+                    f"these readings do not tell frequency and damping of mode {mode + 1}",
+                ),
+                (
+                    alone and self.by_noise(rest)[mode] > RARE,
                     f"{name} stands on one frequency, perhaps a wild reading: measure closer by, or say in "
-                    "--bands where modes are"
-                )
-            elif not near.min() < omega < near.max():  # in a fast sweep it stands beside its peak
-                words.append(f"{name} is read on one side only")
-            elif zeta + 2 * np.nan_to_num(other) < 0:
-                words.append(f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads")
+                    "--bands where modes are",
+                ),
+                # in a fast sweep it stands beside its peak
+                (not near.min() < omega < near.max(), f"{name} is read on one side only"),
+                (
+                    zeta + 2 * np.nan_to_num(other) < 0,
+                    f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads",
+                ),
+            )
+            words += [text for doubtful, text in doubts if doubtful][:1]
         return tuple(words)
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import AnyArray, BoolArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.linear import least_squares
@@ -99,11 +99,11 @@ def drive(
     return x, ok, why
 
 
-def together(both: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> tuple[Function, Function]:
+def together(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
     """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
-    last: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+    last: dict[bytes, tuple[AnyArray, ...]] = {}
 
-    def at(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def at(x: FloatArray) -> tuple[AnyArray, ...]:
         if (key := x.tobytes()) not in last:
             last.clear()
             last[key] = both(x)

@@ -182,19 +182,36 @@ def test_gain_is_the_derivative_of_the_recovery():
         np.testing.assert_allclose(found.gain[:, i], (up - down) / 2e-6, rtol=1e-6, atol=1e-8)
 
 
-def test_what_elimination_does_not_solve_is_left_to_a_search():
+def test_linked_unknowns_are_solved_for_together():
     # x³ + y³, x² + x·y + y²: no unknown is linear
     exponents = np.array([[0, 0], [3, 0], [0, 3], [2, 0], [1, 1], [0, 2]], dtype=float)
     matrix, below = np.array([[0.0, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1]]), np.tile(np.eye(6)[0], (2, 1))
     values = matrix @ np.prod(np.array([1.5, 0.5]) ** exponents, axis=1)
-    found = recover(System(("x", "y"), exponents, matrix, values, None, below))
-    assert found.solutions == ()
-    assert "by elimination" in found.reasons[0]
-    model = harmonic_model(["((x**3 + y**3)*p**2 + (x**2 + x*y + y**2)*p + 3)*X = F"], estimate=["x", "y"])
-    w = np.array([0.4, 0.9, 1.6])
+    solutions = recover(System(("x", "y"), exponents, matrix, values, None, below)).solutions
+    assert len(solutions) == 4
+    for one in solutions:
+        np.testing.assert_allclose(matrix @ np.prod(one**exponents, axis=1), values, rtol=1e-12)
+    assert any(np.allclose(one, [1.5, 0.5], rtol=1e-12) for one in solutions)
+
+
+def test_three_time_constants_can_be_exchanged():
+    model = harmonic_model(["(T1*p + 1)*(T2*p + 1)*(T3*p + 1)*X = F"], estimate=["T1", "T2", "T3"])
+    w, load = np.array([1.0, 3.0, 6.0]), {"F": np.ones(3, dtype=complex)}
+    found = identify(
+        model, experiments(model, w, {**load, **model.predict(np.array([0.9, 0.4, 0.1]), w, load)})
+    )
+    assert len(found.solutions) == 6
+    assert all(np.allclose(sorted(s.values()), [0.1, 0.4, 0.9], rtol=1e-7) for s in found.solutions)
+    assert found.unidentifiable[0].startswith("T1, T2 and T3 can be exchanged")
+
+
+def test_what_takes_many_steps_is_left_to_a_search():
+    equation = "((x**3 + y**3 + z**3)*p**3 + (x**4 + y**4 + z**4)*p**2 + (x**3 - y*z**2 + x)*p + 3)*X = F"
+    model = harmonic_model([equation], estimate=["x", "y", "z"])
+    w, truth = np.array([0.4, 0.9, 1.6]), np.array([1.5, 0.5, 0.9])
     load = {"F": np.ones(3, dtype=complex)}
-    answer = identify(model, experiments(model, w, {**load, **model.predict(np.array([1.5, 0.5]), w, load)}))
-    assert any(np.allclose(sorted(s.values()), [0.5, 1.5], rtol=1e-8) for s in answer.solutions)
+    answer = identify(model, experiments(model, w, {**load, **model.predict(truth, w, load)}))
+    assert any(np.allclose([*s.values()], truth, rtol=1e-8) for s in answer.solutions)
     assert "found by a search" in answer.warnings[0]
 
 
