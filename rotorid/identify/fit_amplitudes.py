@@ -85,10 +85,10 @@ def identify(
     how: dict[str, Any] = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
     _check(model, experiments, start or {}, **how)
     data, copies = experiments.without_copies()
-    answer = _finished(_identified(model, data, start or {}, how), how["bounds"])
+    answer = _identified(model, data, start or {}, how)
     if data.rounding and not data.stated and answer.predicted and len(answer.solutions) == 1:
         answer = _by_digits(answer, how)
-    return replace(answer, left_out=(*copies, *answer.left_out))
+    return replace(_finished(answer, how["bounds"]), left_out=(*copies, *answer.left_out))
 
 
 def _check(
@@ -288,35 +288,34 @@ def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -
     )
 
 
-def _by_digits(found: Identification, how: Mapping[str, Any]) -> Identification:
+def _by_digits(answer: Identification, how: Mapping[str, Any]) -> Identification:
     """With the digits of the readings as their errors, where these explain what is left with 5 % chance.
 
     What is left widens the intervals, if it is more than the digits make on average.
     """
     from scipy.special import chdtrc
 
-    data = found.experiments
+    data, without = answer.experiments, answer
     spread = {name: each for name, each in data.rounding.items() if name}
     std = np.sqrt(data.rounding[""]) if data.free.any() else None
     stated = replace(data, covariances=spread, frequency_std=std)
     try:
-        other = _identified(found.model, stated, _named(found.model, found.theta), how)
+        answer = _identified(answer.model, stated, _named(answer.model, answer.theta), how)
     except (ValueError, np.linalg.LinAlgError):
-        return found
-    chi_square, dof = other.estimate.chi_square or 0.0, other.dof
-    explained = dof < 1 or chdtrc(dof, chi_square) > 0.05
-    if other.method != found.method or not (other.converged and explained) or other.covariance is None:
-        return found
+        return without
+    chi_square, dof = answer.estimate.chi_square or 0.0, answer.dof
+    explained = answer.predicted and answer.converged and (dof < 1 or chdtrc(dof, chi_square) > 0.05)
+    if not explained or answer.covariance is None:
+        return without
     more = max(1.0, chi_square / max(dof, 1))
     note = "no errors are stated: those of the digits in which readings are written are taken"
     return replace(
-        other,
-        covariance=other.covariance * more,
-        combinations=tuple(replace(c, std=c.std and c.std * more**0.5) for c in other.combinations),
+        answer,
+        covariance=answer.covariance * more,
+        combinations=tuple(replace(c, std=c.std and c.std * more**0.5) for c in answer.combinations),
         experiments=data,
-        linear=found.linear,
-        notes=(note, *other.notes),
-        warnings=found.warnings,
+        warnings=without.warnings,
+        notes=(note, *answer.notes),
     )
 
 
@@ -397,20 +396,20 @@ def negative(
     Unless bounds say that it may be so; `highest` is the highest frequency of the data, rad/s.
     """
     kinds = passive_elements(model)
-    at = {name: model.parameters.index(name) for name in kinds}
-    forces = {name: abs(values[at[name]]) * highest**kind for name, kind in kinds.items()}
-    least = 1e-9 * np.nanmax([*forces.values(), 0.0])
-    allowed = {name for name, (low, _) in bounds.items() if low is None or low < 0}
-    named = [n for n in kinds if high[at[n]] < 0 and forces[n] > least and n not in allowed]
-    if not named:
+    kind = np.array([kinds.get(name, -1) for name in model.parameters])
+    force = np.where(kind < 0, 0.0, np.abs(values) * highest**kind)
+    lowest = [bounds.get(name, (0.0, None))[0] for name in model.parameters]
+    allowed = np.array([low is None or low < 0 for low in lowest])
+    known = (kind >= 0) & np.isfinite(values)
+    wrong = known & (high < 0) & (force > 1e-9 * np.nan_to_num(force).max()) & ~allowed
+    if not wrong.any():
         return []
-    wrong, known = {kinds[n] for n in named}, [n for n in kinds if np.isfinite(values[at[n]])]
     why = "a sign, a unit or the model may be wrong"
-    if len(named) == len(known) and len(wrong) > 1:
+    if len({*kind[wrong]}) > 1 and (wrong == known).all():
         why = "does a force or a reading have the other sign?"
-    elif wrong == {1} and len(named) == sum(kinds[n] == 1 for n in known):
+    elif (wrong == known & (kind == 1)).all():
         why = "are the phases counted the other way (lag, not lead)?"
-    listed = ", ".join(f"{name} = {values[at[name]]:.6g}" for name in named)
-    what = " or ".join(dict.fromkeys(KINDS[kinds[n]] for n in named))
-    verb = "is" if len(named) == 1 else "are"
+    listed = ", ".join(f"{model.parameters[j]} = {values[j]:.6g}" for j in np.flatnonzero(wrong))
+    what = " or ".join(dict.fromkeys(KINDS[k] for k in kind[wrong]))
+    verb = "is" if np.count_nonzero(wrong) == 1 else "are"
     return [f"{listed} {verb} negative, which no passive {what} is: {why}"]
