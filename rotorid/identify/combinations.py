@@ -123,8 +123,8 @@ def insert(polynomial: Polynomial, known: Mapping[str, Fraction]) -> Fraction:
 def monomials_of(features: Sequence[Feature], parameters: Sequence[str]) -> tuple[Monomial, ...]:
     """Monomials of the parameters in all features: single parameters first, in their order."""
     order = {name: i for i, name in enumerate(parameters)}
-    found = {m for feature in features for m in feature.exact if m != ONE}
-    return tuple(sorted(found, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
+    every = {m for feature in features for m in feature.exact if m != ONE}
+    return tuple(sorted(every, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
 
 
 def merge(

@@ -319,20 +319,20 @@ def _by_digits(answer: Identification, how: Mapping[str, Any]) -> Identification
     )
 
 
-def _finished(found: Identification, bounds: Bounds) -> Identification:
+def _finished(answer: Identification, bounds: Bounds) -> Identification:
     """With what any answer says: terms left out, that it was searched for, signs."""
-    model, data, words = found.model, found.experiments, []
+    model, data, words = answer.model, answer.experiments, []
     if data.free.any() and (model.power % 2 == 1).any():
         words.append(
             "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
         )
-    if found.linear and found.solutions and not found.linear.recovery.solutions:
+    if answer.linear and answer.solutions and not answer.linear.recovery.solutions:
         words.append("the parameters were found by a search; there may be more solutions than shown")
-    words += found.warnings
-    if found.converged:
-        high = found.values if found.ci95 is None else np.fmax(found.values, found.ci95[:, 1])
-        words += negative(model, float(data.frequencies.max()), found.values, high, bounds)
-    return replace(found, warnings=(*words, *(found.prior.warnings if found.prior else ())))
+    words += answer.warnings
+    if answer.converged:
+        high = answer.values if answer.ci95 is None else np.fmax(answer.values, answer.ci95[:, 1])
+        words += negative(model, float(data.frequencies.max()), answer.values, high, bounds)
+    return replace(answer, warnings=(*words, *(answer.prior.warnings if answer.prior else ())))
 
 
 def _named(model: HarmonicModel, theta: FloatArray) -> dict[str, float]:

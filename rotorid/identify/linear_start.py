@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -35,7 +34,6 @@ from rotorid.identify.combinations import (
 from rotorid.identify.operator_model import HarmonicModel, products_of_powers
 from rotorid.regression import least_squares, solution
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.undetermined_combinations import echelon
 
 RCOND = 1e-11
@@ -46,6 +44,8 @@ GAUGE = 0.7318
 """Value given to a parameter that nothing determines while the others are solved for."""
 SAME = 1e-6
 """Relative difference below which two solutions are one; also of what is nearly real."""
+STEPS = 50
+"""Of the refinement, at most: it ends where nothing is gained."""
 MOST = 30
 """Solutions, real or not, of linked unknowns that are still looked for, by the product of degrees."""
 
@@ -297,7 +297,7 @@ def recover(system: System) -> Recovery:
     free = sorted({int(np.flatnonzero(row)[0]) for row in echelon(seen.row_space)})
     undetermined, weight, solutions = np.isnan(seen.values), _weights(system), list[FloatArray]()
     starts = _candidates(system, free, J[:, free])
-    refined = (_refined(system, start, weight) for start in starts or ())
+    refined = [_refined(system, start, free, weight) for start in starts or ()]
     fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
     for misfit, theta in fits:
         again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
@@ -399,19 +399,18 @@ def _weights(system: System) -> FloatArray:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(shares)) / scale)
 
 
-def _refined(system: System, start: FloatArray, weight: FloatArray) -> FloatArray:
-    """Least squares of all combinations from a start (n,); NaN where it runs away."""
-    with np.errstate(all="ignore"), suppress(ValueError, np.linalg.LinAlgError):
-        fit = nonlinear_least_squares(
-            lambda theta: np.asarray(weight @ (system.combinations(theta)[0] - system.values)),
-            lambda theta: np.nan_to_num(weight @ system.combinations(theta)[1]),
-            start,
-            names=system.names,
-            sigma_stated=True,
-            near=True,
-        )
-        return fit.estimate.solution
-    return np.full(len(start), np.nan)
+def _refined(system: System, theta: FloatArray, free: list[int], weight: FloatArray) -> FloatArray:
+    """Least squares of all combinations from a solution (n,) of some, by Gauss–Newton steps."""
+    best, lowest = theta, np.inf
+    for _ in range(STEPS):
+        with np.errstate(all="ignore"):
+            values, J = system.combinations(theta)
+            left = weight @ (system.values - values)
+        if not left @ left < lowest:
+            break
+        best, lowest, theta = theta, float(left @ left), theta.copy()
+        theta[free] += solution(weight @ J[:, free], left, rcond=1e-13)
+    return best
 
 
 def _misfit(system: System, theta: FloatArray) -> float:

@@ -342,7 +342,7 @@ def passive_elements(model: HarmonicModel) -> dict[str, int]:
 
     Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite.
     """
-    e, found = len(model.equations), dict[str, int]()
+    e, kinds_of = len(model.equations), dict[str, int]()
     for j, name in enumerate(model.parameters if len(model.outputs) == e else ()):
         (m, *others) = np.flatnonzero(model.exponents[:, j])
         used = np.flatnonzero(model.coefficients[:, m])
@@ -355,5 +355,5 @@ def passive_elements(model: HarmonicModel) -> dict[str, int]:
         S = S[:, :e]
         passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
         if passive and not any(model.features[f].varying for f in used):
-            (found[name],) = kinds
-    return found
+            (kinds_of[name],) = kinds
+    return kinds_of
