@@ -107,16 +107,15 @@ def inverse_roots(
     z = np.where(size >= floor, amplitudes, floor)
     if covariances is None:
         covariances = (errors or AmplitudeErrors(1.0, 1.0)).covariance(z)
-    turn = real_matrices(np.exp(-1j * np.angle(z)))
+    turn = real_matrices(z.conj() / np.abs(z))
     turned = turn @ np.nan_to_num(covariances, nan=1.0) @ np.swapaxes(turn, -1, -2)
-    trace = np.trace(turned, axis1=-2, axis2=-1)
-    if (trace <= 0).any():
+    low, high = np.moveaxis(np.linalg.eigvalsh(turned), -1, 0)
+    if (high <= 0).any():
         raise ValueError(
             "an error of zero is stated for a measured amplitude: repeat the reading or state one"
         )
-    low, high = np.moveaxis(np.linalg.eigvalsh(turned), -1, 0)
-    thin = low.clip(0) < THIN**2 * high
-    turned = turned + (thin * THIN**2 * trace)[..., None, None] * np.eye(2)
+    thin = THIN**2 * (np.sqrt(low.clip(0) / high) < THIN) * (low + high)
+    turned = turned + thin[..., None, None] * np.eye(2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(turned)) @ turn)
 
 
