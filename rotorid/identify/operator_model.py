@@ -28,6 +28,7 @@ from rotorid.identify.combinations import (
     monomials_of,
 )
 
+POWERS_OF_I = np.array([1, 1j, -1, -1j])
 MAC_SLACK = 0.02
 """Modes whose MAC is this near to the best count as equally like; the nearest frequency decides."""
 
@@ -83,6 +84,11 @@ class HarmonicModel:
         return np.array([[float(f.exact.get(m, 0)) for m in (ONE, *self.monomials)] for f in self.features])
 
     @cached_property
+    def of_unknowns(self) -> FloatArray:
+        """Of the features in the combinations, the unknowns of regression, (features, u)."""
+        return self.coefficients[:, 1:][:, self.combinations.pivots] / self.combinations.scales
+
+    @cached_property
     def exponents(self) -> FloatArray:
         """Exponents of the parameters, (1 + monomials, parameters); row 0 is the constant 1."""
         powers = [dict(m) for m in (ONE, *self.monomials)]
@@ -118,7 +124,7 @@ class HarmonicModel:
         if (k < 0).any() and (w == 0).any():
             raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
         # exact powers of i, so that a real row has no imaginary dust
-        factors = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
+        factors = w[:, None] ** k * POWERS_OF_I[k % 4]
         for j, feature in enumerate(self.features):
             for name, exponent in feature.varying:
                 if name not in rows:
@@ -126,13 +132,12 @@ class HarmonicModel:
                         f"{name} stands as a factor in the equations and is neither known nor estimated: "
                         f"the measurements must have its value in every row (a column {name})"
                     )
-                value = np.asarray(rows[name], dtype=float)
-                if exponent < 0 and (value == 0).any():
+                if exponent < 0 and (rows[name] == 0).any():
                     raise ValueError(
                         f"an equation divides by {name}, which is 0 in a row of the measurements"
                     )
-                factors[:, j] *= value ** float(exponent)
-        return np.asarray(factors, dtype=complex)
+                factors[:, j] *= rows[name] ** float(exponent)
+        return np.asarray(factors)
 
     def polynomials(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values (f,) and derivatives (f, n) of the features' coefficients at parameters (n,)."""
@@ -156,14 +161,6 @@ class HarmonicModel:
         terms = self.multipliers(frequencies, varying) * self.polynomials(values)[0]
         return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
 
-    def sizes(
-        self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray]
-    ) -> FloatArray:
-        """Sums of the sizes of the terms of each coefficient, shape as of `matrices`."""
-        products = np.abs(products_of_powers(self.exponents, values)[0])
-        terms = np.abs(self.multipliers(frequencies, varying)) * (np.abs(self.coefficients) @ products)
-        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
-
     def predict(
         self,
         values: FloatArray,
@@ -182,7 +179,7 @@ class HarmonicModel:
         table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
         for j, name in enumerate(self.inputs):
             table[:, j] = inputs[name]
-        amplitudes, _ = self.forced(values, frequencies, table, False, varying)
+        amplitudes = self.forced(values, frequencies, table, varying)[0]
         return dict(zip(self.outputs, amplitudes.T, strict=True))
 
     def forced(
@@ -190,10 +187,9 @@ class HarmonicModel:
         values: FloatArray,
         frequencies: FloatArray,
         inputs: ComplexArray,
-        slopes: bool = True,
         varying: Mapping[str, FloatArray] | None = None,
     ) -> tuple[ComplexArray, ComplexArray]:
-        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters), if asked for.
+        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters).
 
         Parameters
         ----------
@@ -203,8 +199,6 @@ class HarmonicModel:
             ω, shape (n,).
         inputs
             Amplitudes of the inputs, (n, inputs).
-        slopes
-            False: without derivatives (an empty array).
         varying
             Known quantities (n,) that change from row to row, by name.
 
@@ -216,16 +210,13 @@ class HarmonicModel:
         n, e = len(frequencies), len(self.outputs)
         multipliers = self.multipliers(frequencies, varying)
         P, dP = self.polynomials(values)
-        whole = (multipliers * P @ self._place).reshape(n, e, -1)
+        whole = (multipliers * P @ self._place).reshape(n, e, 1 + len(self.signals))
         given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
         A = whole[:, :, :e]
         Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
-        if not slopes:
-            return Z, np.zeros((n, e, 0), dtype=complex)
         load = multipliers * np.concatenate((Z, given), axis=1)[:, self.column]
-        rows = [np.flatnonzero(self.equation == i) for i in range(e)]
-        G = -np.stack([load[:, f] @ dP[f] for f in rows], axis=1)
-        return Z, np.asarray(np.linalg.solve(A, G))
+        G = [load[:, self.equation == i] @ dP[self.equation == i] for i in range(e)]
+        return Z, np.asarray(np.linalg.solve(A, -np.stack(G, axis=1)))
 
     def dynamic_stiffness(
         self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None
@@ -236,18 +227,16 @@ class HarmonicModel:
         quantities (1,) have the values of one row.
         """
         P, dP = self.polynomials(values)
-        row = np.real(self.multipliers(np.ones(1), varying)[0] / np.array([1, 1j, -1, -1j])[self.power % 4])
-        P, dP = P * row, dP * row[:, None]
+        row = np.real(self.multipliers(np.ones(1), varying)[0] / POWERS_OF_I[self.power % 4])
         e = len(self.outputs)
-        use = (self.column < e) & (self.power % 2 == 0)
+        use = np.flatnonzero((self.column < e) & (self.power % 2 == 0))
         # multiplied by p^−lowest: a compliance form written with 1/p² would have no polynomial
-        k = (self.power - min(self.power[use], default=0)) // 2
-        sign = np.where(k % 2 == 0, 1.0, -1.0)
-        degree = max(k[use], default=0) + 1
-        A, dA = np.zeros((degree, e, e)), np.zeros((degree, e, e, len(values)))
-        at = (k[use], self.equation[use], self.column[use])
-        np.add.at(A, at, sign[use] * P[use])
-        np.add.at(dA, at, sign[use, None] * dP[use])
+        k = (self.power[use] - min(self.power[use], default=0)) // 2
+        shape = max(k, default=0) + 1, e, e
+        A, dA = np.zeros(shape), np.zeros((*shape, len(values)))
+        at, sign = (k, self.equation[use], self.column[use]), (-1.0) ** k * row[use]
+        np.add.at(A, at, sign * P[use])
+        np.add.at(dA, at, sign[:, None] * dP[use])
         return A, dA
 
     def check_square(self) -> None:
@@ -264,14 +253,27 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
     """Products Π θ^e (m,) of exponents (m, n), and their derivatives (m, n) by θ."""
     theta = np.asarray(values, dtype=float)
     products = np.prod(theta**exponents, axis=1)
-    if theta.all():
-        return products, products[:, None] * exponents / theta
-    slopes = np.zeros_like(exponents)
-    for j in range(len(theta)):
+    slopes = products[:, None] * exponents / np.where(theta == 0, 1.0, theta)
+    for j in np.flatnonzero(theta == 0):
         used = np.flatnonzero(exponents[:, j])
         lower = exponents[used] - np.eye(len(theta))[j]
         slopes[used, j] = exponents[used, j] * np.prod(theta**lower, axis=1)
     return products, slopes
+
+
+def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """All z with Σ A_k z^k singular, A (k, e, e), and vectors of the companion form, shapes above."""
+    from scipy.linalg import eig
+
+    degree, e = len(A) - 1, A.shape[1]
+    # companion form L y = z R y with y = (v, z v, …)
+    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
+    if not degree:
+        return np.zeros(0, dtype=complex), np.zeros((e, 0), dtype=complex)
+    L[-e:], R[-e:, -e:] = -np.hstack([*A[:-1]]), A[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z, vectors = eig(L, R)
+    return np.asarray(z), np.asarray(vectors)
 
 
 def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -287,26 +289,14 @@ def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     z (modes,), ascending, and shapes (e, modes), each of unit length. Complex, negative and infinite
     z are left out: they belong to no free vibration.
     """
-    from scipy.linalg import eig
-
-    degree, e = len(A) - 1, A.shape[1]
-    if degree < 1:
-        return np.zeros(0), np.zeros((e, 0))
-    # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
-    first, last = float(np.abs(A[0]).max()), float(np.abs(A[-1]).max())
-    unit = (first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
-    scaled = A * unit ** np.arange(degree + 1)[:, None, None]
-    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
-    L[-e:] = -np.hstack([*scaled[:-1]])
-    R[-e:, -e:] = scaled[-1]
-    (alpha, beta), y = eig(L, R, homogeneous_eigvals=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        z = alpha / beta
-    good = np.flatnonzero(np.isfinite(z) & (np.abs(z.imag) <= 1e-8 * np.abs(z)) & (z.real > 1e-12))
-    good = good[np.argsort(z[good].real)]
-    v = y[:e, good]
+    z, y = eigenvalues(A)
+    size = np.abs(z, where=np.isfinite(z), out=np.full(len(z), np.inf))
+    good = np.isfinite(size) & (np.abs(z.imag) <= 1e-8 * size)
+    good &= z.real > 1e-12 * size[good].max(initial=0.0)
+    order = np.flatnonzero(good)[np.argsort(z[good].real)]
+    v = y[: A.shape[1], order]
     v = (v / v[np.abs(v).argmax(axis=0), np.arange(v.shape[1])]).real
-    return z[good].real * unit, v / np.linalg.norm(v, axis=0)
+    return z[order].real, v / np.linalg.norm(v, axis=0)
 
 
 def nearest_mode(
@@ -316,9 +306,8 @@ def nearest_mode(
     if not len(z):
         return None
     seen = ~np.isnan(shape)
-    u, w = shape[seen], v[seen]
-    size = (w * w).sum(axis=0) * float(u @ u)
-    mac = np.divide((u @ w) ** 2, size, out=np.zeros_like(z), where=size > 0)
+    size = np.linalg.norm(v[seen], axis=0) * np.linalg.norm(shape[seen])
+    mac = np.divide(shape[seen] @ v[seen], size, out=np.zeros_like(z), where=size > 0) ** 2
     away = np.abs(np.log(np.sqrt(z) / frequency))
     best = int(np.argmin(np.where(mac >= mac.max() - MAC_SLACK, away, np.inf)))
     return float(z[best]), np.asarray(v[:, best])
@@ -332,15 +321,13 @@ def mode_slopes(
     A and dA as of `dynamic_stiffness`, z and the shape v (e,) of a mode.
     """
     k, e = np.arange(len(A)), len(v)
-    slope = np.tensordot(k[1:] * z ** k[:-1], A[1:], axes=1)
-    force = -np.einsum("k,keon,o->en", z**k, dA, v)
-    bordered = np.zeros((e + 1, e + 1))
+    bordered, right = np.zeros((e + 1, e + 1)), np.zeros((e + 1, dA.shape[-1]))
     bordered[:e, :e] = np.tensordot(z**k, A, axes=1)
-    bordered[:e, e] = slope @ v * z  # unknown: relative change of z, of the size of the others
-    bordered[e, reference] = 1.0
-    rows = np.abs(bordered).max(axis=1, keepdims=True)
-    rows[rows == 0] = 1.0
-    solved = np.linalg.solve(bordered / rows, np.vstack((force, np.zeros(force.shape[1]))) / rows)
+    bordered[:e, e] = np.tensordot(k * z**k, A, axes=1) @ v  # unknown: relative change of z, of others' size
+    right[:e] = -np.einsum("k,keon,o->en", z**k, dA, v)
+    size = np.abs(bordered).max()
+    bordered[e, reference] = size
+    solved = np.linalg.solve(bordered / size, right / size)
     return solved[e] * z, solved[:e]
 
 
@@ -348,3 +335,25 @@ def reference_amplitude(shape: FloatArray) -> int:
     """The first measured amplitude that is no node of the mode."""
     size = np.nan_to_num(np.abs(shape))
     return int(np.flatnonzero(size >= 0.1 * size.max())[0])
+
+
+def passive_elements(model: HarmonicModel) -> dict[str, int]:
+    """Parameters that stand as a mass (2), damper (1) or spring (0): the power of p.
+
+    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite.
+    """
+    e, kinds_of = len(model.equations), dict[str, int]()
+    for j, name in enumerate(model.parameters if len(model.outputs) == e else ()):
+        (m, *others) = np.flatnonzero(model.exponents[:, j])
+        used = np.flatnonzero(model.coefficients[:, m])
+        kinds = {*model.power[used].tolist()}
+        alone = not others and np.abs(model.exponents[m]).sum() == model.exponents[m, j] == 1
+        if not alone or len(kinds) > 1 or not kinds <= {0, 1, 2}:
+            continue
+        S = np.zeros((e, len(model.signals) + 1))
+        S[model.equation[used], model.column[used]] = model.coefficients[used, m]
+        S = S[:, :e]
+        passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
+        if passive and not any(model.features[f].varying for f in used):
+            (kinds_of[name],) = kinds
+    return kinds_of

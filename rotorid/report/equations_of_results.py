@@ -46,12 +46,12 @@ def _(found: Identification) -> Equations:
     fit, tests = found.linear, found.experiments
     if fit is None:
         raise ValueError("--show equations needs every amplitude of the equations: one is not measured")
-    model, once = fit.model, len({*tests.frequencies.tolist()}) == len(tests)
+    model, once = found.model, len({*tests.frequencies.tolist()}) == len(tests)
     at = [
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)
     ]
-    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.rows.used)]
+    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.used)]
     notes = [
         f"{model.combinations.words[i]} = 1: the others are relative to it" for i in fit.fixed.nonzero()[0]
     ]

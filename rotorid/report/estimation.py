@@ -74,7 +74,7 @@ def identification_report(
     from rotorid.identify.plots import figure_identification
 
     document = Document(document)
-    columns = result.misfit
+    columns = result.residuals
     count = len(columns[0].values)
     rows = evenly(count, READINGS)
     note = f"{len(rows)} of {count} readings; --table prints all." if len(rows) < count else ""

@@ -14,7 +14,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import turned
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
-from rotorid.identify.modes_readings import Readings
+from rotorid.identify.modes_result import Readings
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
