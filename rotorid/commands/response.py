@@ -565,7 +565,7 @@ def _of_small_model(
     import fem
 
     coarse = model.response(speeds, unbalance)
-    near = np.multiply.outer(model.critical_speeds(speeds[-1]), 1 + np.array(_AROUND))
+    near = np.multiply.outer(model.critical_speeds(speeds[0], speeds[-1]), 1 + np.array(_AROUND))
     added = near[(near > speeds[0]) & (near < speeds[-1])]
     finer, peaks = coarse, []
     if np.count_nonzero(speeds) > 2:
