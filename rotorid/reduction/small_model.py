@@ -56,8 +56,8 @@ NONE = 1e-12
 """Share of the largest entry below which damping, or a stiffness, is none."""
 INFINITE = 1e13
 """Response times largest stiffness, per unit force: beyond, only rounding is left."""
-POINTS = 61
-"""Speeds over a range at which whirl is looked at."""
+POINTS, SAME = 61, 1e-6
+"""Speeds over a range at which whirl is looked at, and relative distance of critical speeds that are one."""
 _ROUNDING = 1e-5  # share of the largest entry that stands in few digits
 _MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
 
@@ -271,7 +271,8 @@ class SmallModel(Answered):
             part = gap[i, k] / (gap[i, k] - gap[i + 1, k])
             crossings = (speeds[i] + part * (speeds[i + 1] - speeds[i]))[np.isfinite(part)]
             speeds = np.union1d(speeds, crossings)
-        return np.unique(crossings)
+        crossings = np.sort(crossings)
+        return crossings[np.diff(crossings, prepend=-1.0) > SAME * crossings]
 
     def deflections(self, speeds: FloatArray, unbalance: Mapping[int, complex]) -> ComplexArray:
         """Phasors of x, then y of the k nodes under unbalance as in `response`, m, shape (S, 2 k).
