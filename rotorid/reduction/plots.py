@@ -117,7 +117,7 @@ def plot_methods(methods: Methods, ax: Axes | None = None) -> Axes:
         ]
         axes.bar_label(bars, texts, padding=3, rotation=90, fontsize=TEXT)
     axes.axhline(0.0, color=DARK, linewidth=0.8)
-    axes.margins(y=0.6)
+    axes.margins(y=0.9)
     ticks = [f"mode {k + 1}\n{f * RPM:.0f} rpm" for k, f in enumerate(methods.rotor_frequencies[:n])]
     axes.set_xticks(range(n), ticks)
     axes.set_ylabel("frequency error, %")
