@@ -89,7 +89,9 @@ class BearingEquilibria(Delivered):
         every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
         shown = [*self.found[:-1:every], self.found[-1]]
         return Answer(
-            capital(self.stability.sentence()) + "." if self.stability else "One speed: no threshold is sought.",
+            f"{capital(self.stability.sentence())}."
+            if self.stability
+            else "One speed: no threshold is sought.",
             text(self._columns(shown), width=COLUMNS),
             self.warnings,
             tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),

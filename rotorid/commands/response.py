@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from rotorid.reduction import SmallModel
 
 STANDARD_GRAVITY = 9.80665  # m/s²
-_AROUND = (0.0, *(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3)))
+_AROUND = tuple(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3))
 """Relative distances from a critical speed of a small model at which its response is computed."""
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
@@ -373,7 +372,7 @@ def _peak_table(name: str, named: Sequence[tuple[str, Peak]], place: str = "") -
         return ()
     sensors, peaks = zip(*named, strict=True)
     columns = (
-        dataclasses.replace(column, key=place and key and f"{place}.*.{key}", scale=scale)
+        replace(column, key=place and key and f"{place}.*.{key}", scale=scale)
         for column, key, scale in zip(
             fem.peak_columns(peaks, "µm", 1e6), _KEYS, (1, 1, 1e6, 1, 1, 1, 1), strict=True
         )
@@ -477,7 +476,7 @@ def response(
         by_node = {model.node(node): amount for node, amount in unbalance.items()}
         coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
     result = Vibration(
-        response=dataclasses.replace(coarse, windows=finer.windows, warnings=finer.warnings),
+        response=replace(coarse, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
         std=std,
         sensors=places,
@@ -549,7 +548,7 @@ def _of_rotor(
 
     std, doubts = error_band(model, "the amplitudes", amplitudes)
     log_rotor(model, speeds=len(speeds))
-    return coarse, dataclasses.replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
+    return coarse, replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
 
 
 def _of_small_model(
@@ -565,18 +564,25 @@ def _of_small_model(
     import fem
 
     coarse = model.response(speeds, unbalance)
-    near = np.multiply.outer(model.critical_speeds(speeds[-1]), 1 + np.array(_AROUND))
+    near = np.multiply.outer(model.critical_speeds(speeds[0], speeds[-1]), 1 + np.array(_AROUND))
     added = near[(near > speeds[0]) & (near < speeds[-1])]
     finer, peaks = coarse, []
     if np.count_nonzero(speeds) > 2:
         finer = model.response(np.union1d(speeds, added), unbalance)
-        peaks = [fem.response_peaks(finer, place, operating=operating) for place in places]
+        for place in places:
+            found = fem.response_peaks(finer, place, operating=operating).peaks
+            # of an undamped peak the half-power band is rounding
+            each = (replace(one, below=None, above=None) if one.undamped else one for one in found)
+            peaks.append(fem.Peaks(tuple(each), operating))
         every = [peak for each in peaks for peak in each.peaks]
         added = np.append(added, [peak.speed for peak in every])
         # beside undamped peaks the amplitude has no limit and no meaning
         undamped = np.array([peak.speed for peak in every if peak.undamped])
         near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
         finer = model.response(np.union1d(speeds, added[~near]), unbalance)
+        if undamped.size:
+            words = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
+            finer = replace(finer, warnings=(*finer.warnings, words))
     return coarse, finer, peaks, None
 
 

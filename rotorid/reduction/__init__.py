@@ -5,7 +5,6 @@ from rotorid.reduction.comparison import (
     StabilityCost,
     compare_response,
     compare_stability,
-    stability_threshold,
 )
 from rotorid.reduction.condensation import Method, Methods, compare_methods
 from rotorid.reduction.masses import (
@@ -55,5 +54,4 @@ __all__ = [
     "reduce_measured",
     "separate",
     "small_model",
-    "stability_threshold",
 ]

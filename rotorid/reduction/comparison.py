@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from fem import (
     solve_whirl,
 )
 from fem.assembly import both_planes
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
@@ -107,18 +106,17 @@ class ResponseCost(Answered):
         used, size = self.speeds[~self.excluded], self.sizes
         speed, sensor, plane = self.where
         details = (
-            f"In percent of the largest influence coefficient at the same speed; worst at {rpm_text(speed)}, "
-            f"reading at node {label(sensor)}, unbalance at node {plane}. Left out: "
+            f"in percent of the largest influence coefficient at the same speed; worst at {rpm_text(speed)}, "
+            f"reading at node {label(sensor)}, unbalance at node {plane}; left out: "
             f"{np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within ±{100 * self.bands:.3g} "
-            "% of the full rotor's critical speeds."
+            "% of the full rotor's critical speeds"
         )
         return Answer(
             f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
             f"masses is within {percent(size['largest'])} % of the full rotor's, median "
             f"{percent(size['median'])} %.",
             warnings=self.warnings,
-            tables=(fill(details, COLUMNS, subsequent_indent="  "),),
-            more="where the response differs most",
+            notes=(details,),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -219,29 +217,6 @@ def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:
     even = np.linspace(max([top / POINTS, *(table[0] for table in tables)]), top, POINTS)
     ends = np.outer((1 - bands, 1 + bands), criticals)
     return np.union1d(even, ends[(ends > even[0]) & (ends < top)])
-
-
-def stability_threshold(
-    small: SmallModel, highest: float, *, lowest: float = 0.0, steps: int = STEPS
-) -> fem.Stability:
-    """The first speed at which a mode of a small model stops decaying, as `fem.stability_threshold`.
-
-    Parameters
-    ----------
-    small
-        The small model, of which all motions are watched.
-    highest, lowest
-        Range of speeds, rad/s: within the tables of all supports.
-    steps
-        Into how many steps the range is divided; a mode that is unstable only between two neighbouring
-        speeds is not seen. The threshold itself is found by iteration, to 1e-10 of it or better.
-
-    Raises
-    ------
-    ValueError
-        For an impossible range, or outside the table of a support.
-    """
-    return fem.threshold_of(small.whirl(fem.range_of_speeds(lowest, highest, steps)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -331,18 +331,15 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
     ]
     model = dataclasses.replace(rotor.model, gyroscopic=False)
     plane = dataclasses.replace(rotor, supports=supports, model=model)
-    remarks, pedestals = [], any(s.pedestal and s.pedestal.mass for s in rotor.supports)
+    remarks = []
+    pedestals = any(s.pedestal and s.pedestal.mass for s in rotor.supports)
     if rotor.model.gyroscopic or not rotor.symmetric or any(s.coupled for s in rotor.supports) or pedestals:
-        masses = ", and the masses of the pedestals are left out" if pedestals else ""
         remarks.append(
-            "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
-            f"of the rotor at rest{masses}; all that comes back in the small model"
+            "formula (50) knows neither rotation nor coupling of the planes nor masses of pedestals: the "
+            "model holds for the plane x of the rotor at rest; all that comes back in the small model"
         )
     if not rotor.constant:
-        which = "the lowest of" if speed is None else "chosen in"
-        remarks.append(
-            f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s, {which} their tables"
-        )
+        remarks.append(f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s (--speed)")
     return plane, remarks
 
 
@@ -372,11 +369,8 @@ class Separated:
         return np.stack((self.span - self.positions, self.positions), axis=1) / self.span
 
     def compliance(self, stiffness: ArrayLike) -> FloatArray:
-        """α, m/N, shape (n, n), with supports of this stiffness, N/m, one or (2,); ValueError unless > 0."""
-        c = np.asarray(stiffness, dtype=float)
-        if c.shape not in ((), (2,)) or not (np.isfinite(c) & (c > 0)).all():
-            raise ValueError(f"the stiffness of both supports must be positive and finite, in N/m; got {c}")
-        return np.asarray(self.delta + (self.fractions / c) @ self.fractions.T)
+        """α, m/N, shape (n, n), with supports of this stiffness, N/m, one or (2,)."""
+        return np.asarray(self.delta + (self.fractions / np.asarray(stiffness)) @ self.fractions.T)
 
 
 def separate(rotor: fem.Rotor, nodes: Sequence[int | str]) -> Separated:

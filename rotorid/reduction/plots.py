@@ -117,7 +117,7 @@ def plot_methods(methods: Methods, ax: Axes | None = None) -> Axes:
         ]
         axes.bar_label(bars, texts, padding=3, rotation=90, fontsize=TEXT)
     axes.axhline(0.0, color=DARK, linewidth=0.8)
-    axes.margins(y=0.6)
+    axes.margins(y=0.9)
     ticks = [f"mode {k + 1}\n{f * RPM:.0f} rpm" for k, f in enumerate(methods.rotor_frequencies[:n])]
     axes.set_xticks(range(n), ticks)
     axes.set_ylabel("frequency error, %")
@@ -212,7 +212,7 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     plain(axes)
     known = np.concatenate((cost.full_decrement, cost.small_decrement))
     known = known[np.isfinite(known)]
-    far = 20 * float(np.median(np.abs(known), axis=0)) if known.size else 1.0  # beyond nothing is of interest
+    far = 20 * float(np.median(np.abs(known), axis=0)) if known.any() else 1.0  # beyond nothing matters
     low, high = np.clip([known.min(initial=-1e-9), known.max(initial=1e-9)], -far, far) * 1.1
     low -= 0.1 * high  # 0 is in sight with room below
     for name, decrement, threshold, style in (

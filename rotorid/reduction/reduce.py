@@ -392,21 +392,15 @@ def reduce(  # noqa: PLR0913
     shapes = full.shapes[np.array(places) - 1]
     seals, apart = np.zeros(n), None
     if supports_apart:
-        kept, zero = [], np.zeros(1)
+        kept = []
         for support in plane.supports:
             if support.kind == "seal" and support.node in places and support.plain:
                 seals[places.index(support.node)] += float(support.stiffness)
             else:
                 kept.append(support)
-        apart = separate(dataclasses.replace(plane, supports=kept), places)
-        alpha = apart.compliance(
-            [
-                sum(float(s.dynamic_stiffness(zero)[0, 0, 0].real) for s in kept if s.node == node)
-                for node in apart.supports
-            ]
-        )
-    else:
-        alpha = fem.compliance(plane, places)
+        plane = dataclasses.replace(plane, supports=kept)
+        apart = separate(plane, places)
+    alpha = fem.compliance(plane, places)
     modes_of = full.frequencies, shapes
     if measured is not None:
         modes_of = _modes(measured, n)

@@ -56,8 +56,8 @@ NONE = 1e-12
 """Share of the largest entry below which damping, or a stiffness, is none."""
 INFINITE = 1e13
 """Response times largest stiffness, per unit force: beyond, only rounding is left."""
-POINTS = 61
-"""Speeds over a range at which whirl is looked at."""
+POINTS, SAME = 61, 1e-6
+"""Speeds over a range at which whirl is looked at, and relative distance of critical speeds that are one."""
 _ROUNDING = 1e-5  # share of the largest entry that stands in few digits
 _MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
 
@@ -262,24 +262,17 @@ class SmallModel(Answered):
         K, on = np.abs(Q.at(omega[:1])[1][0].diagonal()), np.flatnonzero(self.masses)
         return solve(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
 
-    def critical_speeds(self, highest: float) -> FloatArray:
-        """Speeds up to the highest, rad/s, ascending, at which a mode whirls once a turn, either way."""
-        speeds, found = self._range(0.0, highest), np.empty(0)
-        for _ in range(3):  # crossings of lines through two speeds each, the last between near ones
+    def critical_speeds(self, lowest: float, highest: float) -> FloatArray:
+        """Speeds between two, rad/s, ascending, at which a mode whirls once a turn, either way."""
+        speeds, crossings = np.linspace(lowest, highest, POINTS), np.empty(0)
+        for _ in range(3):  # of lines through two speeds each, the last between near ones
             gap = np.abs(self.whirl(speeds).values.imag) - speeds[:, None]
-            before, after = gap[:-1], gap[1:]
-            i, k = np.nonzero((before > 0) != (after > 0))
-            found = (speeds[:-1] + np.diff(speeds) * (before / (before - after)).T).T[i, k]
-            found = found[np.isfinite(found)]
-            speeds = np.union1d(speeds, found)
-        return np.unique(found)
-
-    def _range(self, lowest: float, highest: float) -> FloatArray:
-        """Speeds over a range, within the tables of the supports and with all of theirs, rad/s."""
-        tables = [support.speeds for support in self.supports if support.speeds]
-        low, high = max([lowest, *(t[0] for t in tables)]), min([highest, *(t[-1] for t in tables)])
-        every = np.concatenate((np.linspace(low, high, POINTS), *tables))
-        return np.unique(every[(every >= low) & (every <= high)])
+            i, k = np.nonzero((gap[:-1] > 0) != (gap[1:] > 0))
+            part = gap[i, k] / (gap[i, k] - gap[i + 1, k])
+            crossings = (speeds[i] + part * (speeds[i + 1] - speeds[i]))[np.isfinite(part)]
+            speeds = np.union1d(speeds, crossings)
+        crossings = np.sort(crossings)
+        return crossings[np.diff(crossings, prepend=-1.0) > SAME * crossings]
 
     def deflections(self, speeds: FloatArray, unbalance: Mapping[int, complex]) -> ComplexArray:
         """Phasors of x, then y of the k nodes under unbalance as in `response`, m, shape (S, 2 k).
@@ -332,7 +325,7 @@ class SmallModel(Answered):
         omega, k = checked_speeds(speeds), len(self.nodes)
         if not (mounted := dict(self.unbalance if unbalance is None else unbalance)):
             raise ValueError("no unbalance is given: name at least one node")
-        grows = fem.windows_of(self.whirl(self._range(omega.min(), omega.max())))
+        grows = fem.windows_of(self.whirl(np.unique(np.linspace(omega.min(), omega.max(), POINTS))))
         windows = tuple(one for one in grows if any(one.first <= w <= one.last for w in omega))
         bent = ("the bow of the model is left out: `rotorid motion` has it",) * bool(self.bow)
         warnings = (*self.warnings, *bent, *(window.sentence() for window in windows))
@@ -424,10 +417,7 @@ def small_model(
     Inertia of tilting is in the masses as far as they were fitted to modes that know it; none is added.
     """
     places = mass_nodes(rotor, nodes)
-    try:
-        m = np.array(masses, dtype=float)
-    except (TypeError, ValueError):
-        m = np.empty(0)
+    m = np.array(masses, dtype=float)
     if m.shape != (len(places),):
         raise ValueError(f"{len(places)} nodes need as many masses, numbers in kg")
     others = {*(each.node for each in rotor.supports), *(each.node for each in rotor.forces)}
@@ -565,15 +555,13 @@ def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
     return tuple(sorted({*films, *springs}))
 
 
-def held_rigidly(rotor: fem.Rotor, stiffness: float = RIGID) -> fem.Rotor:
+def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
     """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
 
     Parameters
     ----------
     rotor
         With its supports and forces.
-    stiffness
-        Of a support, by that of the shaft, 48 E I / l³.
 
     Raises
     ------
@@ -586,7 +574,7 @@ def held_rigidly(rotor: fem.Rotor, stiffness: float = RIGID) -> fem.Rotor:
             "to keep the supports, the masses are found with the shaft held rigidly at its bearings, journal "
             f"bearings and squeeze films: two nodes at least are needed, this rotor has {len(nodes)}"
         )
-    stiffness *= bending_stiffness(rotor)
+    stiffness = RIGID * bending_stiffness(rotor)
     tilting = {node: sum(s.tilting_stiffness for s in rotor.supports if s.node == node) for node in nodes}
     return replace(
         rotor,

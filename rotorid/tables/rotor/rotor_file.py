@@ -124,7 +124,7 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
     data = problems.need(read_toml(path, problems))
     if "shaft" not in data and "masses_kg" in data:
-        expected = "a rotor file; this is a small model, for `rotorid motion`, `bearings`, `fit` and such"
+        expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
         problems.add(str(path), None, "shaft", None, expected)
         problems.stop()
     said = take(Section(str(path), data, problems), ROTOR)

@@ -182,6 +182,22 @@ def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
     assert all(path.stat().st_size > 1000 for path in made)
 
 
+def test_an_undamped_small_model_has_one_row_for_each_critical_speed(cli, tmp_path):
+    """Its peaks are infinite: forward and backward whirl coincide, and all sensors show the same speeds."""
+    rotor = read_rotor(sample_data() / "rotor23.csv")
+    small = tmp_path / "small.toml"
+    small.write_bytes(small_model_bytes(small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0))))
+    table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [12, 1000, 0]])
+    outcome = cli(
+        "response", small, "--unbalance", table, "--speeds", "500:9000:10rpm", "--sensors", "7,12,18"
+    )
+    assert outcome.out.startswith("2 critical speeds at 851 speeds")
+    assert "practically undamped peaks" in outcome.out
+    criticals = small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0)).critical_speeds(50.0, 900.0)
+    for speed in criticals:
+        assert f"{speed / RPM:.2f}" in outcome.out
+
+
 def test_unbalance_of_a_small_model(cli, tmp_path):
     rotor = fem.Rotor([0.5, 0.5], 0.05, density=0.0, discs=[fem.Disc(2, 30.0)],
                       supports=[fem.Support(1, 1e7, 2e3), fem.Support(3, 1e7, 2e3)])  # fmt: skip

@@ -75,7 +75,7 @@ def test_bands():
     assert (cost.excluded == expected).all()
     assert cost.left_out[0] == pytest.approx((0.9 * first, 1.1 * first))
     assert np.isnan(cost.relative_difference[0]).all()
-    assert "Left out: " in cost.answer.whole()
+    assert "left out: " in cost.answer.whole()
     narrow = compare_response(book(), cost.speeds, bands=0.02)
     assert narrow.sizes["largest"] > cost.sizes["largest"]
     assert np.count_nonzero(narrow.excluded) < np.count_nonzero(cost.excluded)

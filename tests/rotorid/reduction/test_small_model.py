@@ -303,7 +303,6 @@ def test_damped_supports_cannot_be_condensed():
         ((4, 12), (1.0, 1.0), {}, "node 12 does not exist"),
         (("fan",), (1.0,), {}, "no station is called 'fan'"),
         ((4, 8), (1.0,), {}, "as many masses"),
-        ((4, 8), ("a", 1.0), {}, "numbers in kg"),
         ((4, 8), (1.0, -2.0), {}, "node 8 is -2 kg, not positive: a physical model needs positive masses"),
         ((4, 8), (1.0, 0.0), {}, "positive masses"),
         ((4, 8), (np.nan, 1.0), {}, "positive masses"),
@@ -390,7 +389,7 @@ def test_critical_speeds_are_where_modes_whirl_once_a_turn():
         model=fem.Model(True, False, True),
     )
     small = small_model(rotor, (4, 8), (30.0, 20.0))
-    criticals = small.critical_speeds(2000.0)
+    criticals = small.critical_speeds(0.0, 2000.0)
     assert criticals.size >= 3  # forward and backward
     for speed in criticals:
         away = np.abs(np.abs(small.whirl(speed).values.imag) / speed - 1)
