@@ -26,7 +26,7 @@ from balancing import Holes, Limits, Mounted, ReadingErrors, Trials, Undetermine
 from balancing.influence import Whitening
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.tables import Job
-from rotorid.tables.runs.stated_conventions import Conventions
+from rotorid.files.conventions import Conventions
 
 ComplexArray = NDArray[np.complex128]
 

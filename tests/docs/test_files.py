@@ -19,8 +19,7 @@ from rotorid.tables.rotor import bow_table as bow
 from rotorid.tables.rotor import rotor_table as rotor
 from rotorid.tables.rotor import unbalance_table as unbalance
 from rotorid.tables.runs import influence_table as influence
-from rotorid.tables.runs import runs_table as runs
-from rotorid.tables.runs import weights_table as weights
+from rotorid.files import runs, weights
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
 WORDS = {

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rotorid.files.conventions import Conventions
+from rotorid.files.layout import read_runs_grid
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_from_excel import WrittenJob, open_job
 from rotorid.tables.job.job_keys import LARGEST, READINGS, TABLES
@@ -17,8 +19,6 @@ from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.settings_keys import Quantity
 from rotorid.tables.reader.text_file import read_bytes
-from rotorid.tables.runs.instrument_export import read_runs_grid
-from rotorid.tables.runs.stated_conventions import Conventions
 
 _SHEET = {"influence": "influence", "weights": "weights", "check_weights": "weights"}
 """Of a workbook that a job names for a table; all others are runs tables."""
@@ -85,7 +85,7 @@ def job_tables(source: JobSource, job: Job) -> JobTables:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TableWarning)  # said when the job was read
         if source.influence is not None or len(source.files) != 1:
-            named = dict(zip(TABLES, source.files, strict=False))
+            named: dict[str, Source] = dict(zip(TABLES, source.files, strict=False))
             if source.influence is not None:
                 named["influence"] = source.influence
             written, rotor = WrittenJob(Path()), None
@@ -110,13 +110,15 @@ def _comments(path: Path, problems: Problems) -> tuple[str, ...]:
     return tuple(line.lstrip("# ") for line in lines if line.startswith("#") and line.strip("# "))
 
 
-def _files(settings: dict[str, Any], job: Path) -> tuple[dict[str, Path], Path | None]:
+def _files(settings: dict[str, Any], job: Path) -> tuple[dict[str, Source], Path | None]:
     """Take the files out of the settings of a job that was read before."""
-    named = {
+    named: dict[str, Source] = {
         key: job.parent / settings.pop(key).strip()
         for key in TABLES
         if isinstance(settings.get(key), str)  # slow_roll may be vectors
     }
+    if isinstance(settings.get("runs"), list):
+        named["runs"] = tuple(job.parent / name.strip() for name in settings.pop("runs"))
     rotor = settings.pop("rotor", None)
     return named, None if rotor is None else job.parent / str(rotor).strip()
 

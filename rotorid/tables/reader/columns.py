@@ -30,8 +30,8 @@ from rotorid.tables.reader.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
 _UNCLEAR = Unit("?", "unclear")
-Source = str | Path | Grid
-"""A table: a file, or the cells of a sheet."""
+Source = str | Path | Grid | tuple[Path, ...]
+"""A table: a file, the cells of a sheet, or, of runs, files with one run each."""
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ def read_grid(
     """The cells of a text file or of a sheet; with `is_header` whatever stands above it is a comment."""
     if isinstance(source, Grid):
         return source
-    path = Path(source)
+    path = Path(source_name(source))
     if is_workbook(path):
         sheets = read_workbook(path, problems)
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
@@ -267,6 +267,8 @@ def read_grid(
 
 def source_name(source: Source) -> str:
     """How messages name a table."""
+    if isinstance(source, tuple):
+        return listing(map(str, source), "and")
     return source.source if isinstance(source, Grid) else str(source)
 
 

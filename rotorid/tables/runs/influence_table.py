@@ -13,6 +13,9 @@ from fem import label
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.runs import PHASE, SPEED
+from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
@@ -26,9 +29,6 @@ from rotorid.tables.runs.influence_comments import (
     read_errors,
 )
 from rotorid.tables.runs.influence_errors import BASELINE, error_columns, error_values, read_covariance
-from rotorid.tables.runs.runs_table import PHASE, SPEED
-from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
-from rotorid.tables.runs.stated_conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

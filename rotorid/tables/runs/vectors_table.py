@@ -14,14 +14,14 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import turned
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
+from rotorid.files import runs as runs_table
+from rotorid.files.conventions import FULL_TURN, Conventions
 from rotorid.identify.modes_readings import Readings
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs import runs_table
 from rotorid.tables.runs.slow_roll import make_slow_roll
-from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
 COLUMNS = (
     *(column for column in runs_table.COLUMNS if column.required),

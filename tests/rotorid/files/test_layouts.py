@@ -13,10 +13,10 @@ from cases import each_of
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
 from rotorid.base.text import listing
+from rotorid.files.runs import COLUMNS
 from rotorid.tables import InputError, read_job, read_trials
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
-from rotorid.tables.runs.runs_table import COLUMNS
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase
@@ -254,7 +254,7 @@ KNOWN = f"a known column: {NAMES}; remarks go into 'note'"
 VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
 EXPLAINED = {
     "radians or degrees": (
-        HEADINGS.replace("Phase angle [°]", "Phase"),
+        re.sub("(?m)^[0-9]+,", "3,", HEADINGS.replace("Phase angle [°]", "Phase")),
         "runs.csv, row 1, column Phase: found 'Phase', expected its unit too, such as 'Phase (deg)'",
     ),
     "radians or degrees in vectors": (
