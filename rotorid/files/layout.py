@@ -100,14 +100,14 @@ def _text_from_header(text: str, named: Mapping[str, str]) -> str:
     return "".join(line + end for line, end in zip(lines, ends, strict=True))
 
 
-def _open(source: Source, named: Mapping[str, str], problems: Problems) -> Grid | None:
+def _open(source: Source, named: Mapping[str, str], problems: Problems, *, first: bool) -> Grid | None:
     """The cells of a runs table from its header on."""
     if isinstance(source, Grid):
         return source
     path = Path(source_name(source))
     if is_workbook(path):
         sheets = read_workbook(path, problems)
-        chosen = None if sheets is None else pick_sheet(path, sheets, "runs", problems)
+        chosen = None if sheets is None else pick_sheet(path, sheets, "runs", problems, first=first)
         if chosen is None:
             return None
         return make_grid(sheet_source(path, chosen[0]), rows_from_header(chosen[1], named), "", problems)
@@ -128,7 +128,9 @@ def files_of_runs(source: object) -> tuple[Path, ...]:
     )
 
 
-def read_runs_grid(source: Source, conventions: Conventions, problems: Problems) -> Grid | None:
+def read_runs_grid(
+    source: Source, conventions: Conventions, problems: Problems, *, first: bool = False
+) -> Grid | None:
     """The cells of a runs table, whatever its form in the file; None and problems.
 
     Parameters
@@ -139,15 +141,19 @@ def read_runs_grid(source: Source, conventions: Conventions, problems: Problems)
         What phases mean, how the job says that columns are named, and the speed where no column has it.
     problems
         Collects the complaints.
+    first
+        Whether the first sheet of a workbook will do where none is called runs.
     """
-    grids = read_runs_grids(source, conventions, problems)
+    grids = read_runs_grids(source, conventions, problems, first=first)
     return None if grids is None else joined(grids, problems)
 
 
-def read_runs_grids(source: Source, conventions: Conventions, problems: Problems) -> list[Grid] | None:
+def read_runs_grids(
+    source: Source, conventions: Conventions, problems: Problems, *, first: bool = False
+) -> list[Grid] | None:
     """The same of each file; a file of several without a column of runs is one run, named as the file."""
     files = source if isinstance(source, tuple) else files_of_runs(source)
-    grids = [_read_one(file, conventions, problems) for file in files or (source,)]
+    grids = [_read_one(file, conventions, problems, first=first) for file in files or (source,)]
     if files:
         for k, (file, grid) in enumerate(zip(files, grids, strict=True)):
             if grid is not None and "run" not in grid.header:
@@ -174,11 +180,11 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     return replace(first, source=name, rows=tuple(rows), named=(), taken=())
 
 
-def _read_one(source: Source, conventions: Conventions, problems: Problems) -> Grid | None:
+def _read_one(source: Source, conventions: Conventions, problems: Problems, *, first: bool) -> Grid | None:
     stated = {} if conventions.columns is None else conventions.columns
     pairs = [(v, k) if isinstance(v, str) else (v.value, v.key) for k, v in stated.items() if v is not None]
     named: dict[str, str] = dict(pairs)
-    grid = _open(source, named, problems)
+    grid = _open(source, named, problems, first=first)
     if grid is None or not _are_there(named, grid, conventions):
         return None
     try:
@@ -425,7 +431,7 @@ def _remark(column: _Column, k: int) -> str:
 
 def _is_kept(name: str) -> bool:
     """Whether the reader of a runs table knows the name of a column without a reading."""
-    return name.casefold().startswith(REMARKS) or bool(DEVIATION.match(name))
+    return name == "time_s" or name.casefold().startswith(REMARKS) or bool(DEVIATION.match(name))
 
 
 def _once(common: Sequence[_Column]) -> bool:

@@ -41,6 +41,7 @@ COLUMNS = (
     Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
     PHASE,
     Column("repeat", required=False),
+    Column("time_s", required=False, blank=True),
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
