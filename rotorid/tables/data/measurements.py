@@ -146,9 +146,14 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
     """Read displacements at any points: as `read_measurements`, with any names and without a model.
 
     Velocities and accelerations, known by their units, become displacements. Repeated readings stay apart.
+    A UFF file (`.uff`, `.unv`) has frequency responses: displacements under a force of 1 N.
     """
     from rotorid.identify.amplitudes import Experiments
 
+    if Path(path).suffix.lower() in (".uff", ".unv"):
+        from rotorid.tables.data.frequency_responses import read_responses
+
+        return replace(read_responses(Path(path)), errors=errors)
     problems = Problems()
     grid = problems.need(read_grid(path, "measurements", problems, first=True))
     names = tuple(dict.fromkeys(found[1] for name in grid.header if (found := _AMPLITUDE.fullmatch(name))))
