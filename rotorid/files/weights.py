@@ -44,11 +44,12 @@ _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGN
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Complex weights of each run and plane, kg or kg·m, shape (R, P)."""
+    """Complex weights of each run and plane, kg or kg·m, shape (R, P); each row: run, plane, weight."""
 
     planes: tuple[str, ...]
     weights: ComplexArray
     unit: Unit
+    rows: tuple[tuple[str, str, complex], ...] = ()
 
 
 def read_weights(
@@ -107,7 +108,7 @@ def read_weights(
                 table.complain(i, "run", f"each weight once (row {table.rows[first]} says the same)")
             elif runs is not None:
                 total[runs.index(run[i]), planes.index(plane[i])] += values[i]
-    return Weights(planes, total, table.unit(what))
+    return Weights(planes, total, table.unit(what), tuple(seen))
 
 
 def _tidied(grid: Grid, runs: Sequence[str] | None, conventions: Conventions) -> Grid:

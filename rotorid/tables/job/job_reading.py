@@ -8,7 +8,7 @@ from pathlib import Path
 from balancing import Labels
 from rotorid.files.layout import files_of_runs
 from rotorid.tables.job.assumed_conventions import with_assumed
-from rotorid.tables.job.check_runs import read_check
+from rotorid.tables.job.check_runs import holes_taken, read_check
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_holes import read_holes
 from rotorid.tables.job.job_keys import JOB, TABLES
@@ -71,6 +71,8 @@ def job_of(
     check = None
     if "check" in tables:
         check = read_check(tables, readings, planes, problems)
+    if check is not None and "check_weights" in tables:
+        holes = holes_taken(tables["check_weights"], check, readings, holes)
     problems.stop()
     first = [tables.get(key) for key in ("runs", "weights", "influence")]
     records = (*files, *records)

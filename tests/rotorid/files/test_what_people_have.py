@@ -390,3 +390,48 @@ def test_exchanged_columns_are_asked_about_and_the_answer_is_a_key(tmp_path, cli
 
 def test_small_phases_of_large_amplitudes_with_decimals_are_no_exchange(tmp_path):
     assert trials_of(tmp_path, EXCHANGED.replace(",176,", ",176.2,")).sensors == ("A", "B")
+
+
+CHECKED = """\
+runs = "runs.csv"
+weights = "weights.csv"
+check = "check.csv"
+check_weights = "pieces.csv"
+[planes.P1]
+holes = 8
+available_g = [1, 2]
+[planes.P2]
+holes = 8
+available_g = [1, 2]
+"""
+CHECK = "run,speed_rpm,sensor,amplitude_mm_s,phase_deg\ncheck,1485,DE,0.5,10\ncheck,1485,NDE,0.4,20\n"
+
+
+def test_the_holes_of_a_check_run_are_taken(tmp_path):
+    """What the job says itself counts first; weights between the holes say nothing of holes."""
+    files = {"runs": PUMP, "weights": PLAIN_WEIGHTS, "check": CHECK}
+    holes = job_of(tmp_path, CHECKED, **files, pieces=PIECES).holes
+    np.testing.assert_allclose(holes["P1"].taken, [0.003, 0, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(holes["P2"].taken, [0, 0, 0, 0.004, 0, 0.01, 0, 0])
+    stated = CHECKED.replace("[planes.P2]", 'taken = { "2" = 7 }\n[planes.P2]')
+    holes = job_of(
+        tmp_path, stated, **files, pieces=PIECES.replace("135.0", "140.0").replace(",4,", ",,")
+    ).holes
+    np.testing.assert_allclose(holes["P1"].taken, [0, 0.007, 0, 0, 0, 0, 0, 0])
+    assert not holes["P2"].taken.any()
+
+
+def test_a_trim_leaves_the_holes_of_the_pieces_alone(tmp_path, cli):
+    files = {"runs": PUMP, "weights": PLAIN_WEIGHTS, "pieces": PIECES}
+    job = job_of(tmp_path, CHECKED, **files, check=CHECK)
+    trials = job.trials
+    W = balancing.estimate_influence(trials).W[0]
+    size, phase = trials.labels.vibration(trials.readings[0, 0, 0] + W @ job.check.weights[0])
+    check = CHECK.replace("0.5,10", f"{size[0]:.4f},{phase[0]:.3f}").replace(
+        "0.4,20", f"{size[1]:.4f},{phase[1]:.3f}"
+    )
+    job_of(tmp_path, CHECKED, **files, check=check)
+    rows = cli("balance", tmp_path / "job.toml", "--split", "--refine", "--json").json["mounting"]["holes"]
+    used = {(row["plane"], row["hole"]) for row in rows}
+    assert used
+    assert not used & {("P1", "1"), ("P2", "4"), ("P2", "6")}
