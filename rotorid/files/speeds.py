@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -41,10 +41,10 @@ def show_speeds(speeds: FloatArray, unit: Unit) -> str:
 def merge_speeds(
     table: Table, usable: Sequence[int], tolerance_percent: float
 ) -> tuple[FloatArray, dict[int, int], tuple[str, ...]]:
-    """Merge the speeds of different runs that lie within the tolerance; a merged speed is their mean.
+    """Merge the speeds that lie within the tolerance; a merged speed is their mean.
 
-    Two speeds of one run within the tolerance of each other, and a chain of speeds whose ends are not, are
-    noted as problems of the table.
+    They are those of different runs, or of the sensors of one steady run. Two such speeds of one sensor of
+    one run, and a chain of speeds whose ends are not within the tolerance, are noted as problems.
 
     Parameters
     ----------
@@ -76,11 +76,16 @@ def merge_speeds(
         f"within the tolerance of {tolerance_percent:g} %; write the nominal speed, or set "
         "speed_tolerance_percent smaller"
     )
-    unclear = set()
+    unclear, steady = set(), False
+    sensors, repeats = (table.texts(stem) if stem in table else runs for stem in ("sensor", "repeat"))
+    readings = Counter((index[row], runs[row], sensors[row], repeats[row]) for row in usable)
+    several = {key[:2] for key, count in readings.items() if count > 1}
     of_group: list[list[float]] = [[] for _ in groups]
     for (g, run), row_of in rows.items():
         of_group[g].extend(row_of)
-        if len(row_of) > 1:
+        if len(row_of) > 1 and (g, run) not in several:
+            steady = True
+        elif len(row_of) > 1:
             one, row = list(row_of.values())[:2]
             other = table.shown("speed", one)
             table.complain(row, "speed", f"one speed: run {run!r} has {other} as well, {remedy}")
@@ -97,7 +102,6 @@ def merge_speeds(
             numbers = ", ".join(f"{speed * unit.scale:.6g}" for speed in group)
             alike.append(f"{numbers} as {show_speed(merged[g], unit)}")
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
-    words = (
-        f"speeds of different runs within {tolerance_percent:g} % count as one: {'; '.join(alike[:3])}{more}"
-    )
+    of = "of one run, or of different ones," if steady else "of different runs"
+    words = f"speeds {of} within {tolerance_percent:g} % count as one: {'; '.join(alike[:3])}{more}"
     return np.array(merged), index, (words,) if alike else ()

@@ -8,6 +8,7 @@ import pytest
 from cases import each_of
 
 import balancing
+from rotorid.samples import sample_data
 from rotorid.tables import InputError, read_job, read_trials
 
 FAN = """\
@@ -435,3 +436,51 @@ def test_a_trim_leaves_the_holes_of_the_pieces_alone(tmp_path, cli):
     used = {(row["plane"], row["hole"]) for row in rows}
     assert used
     assert not used & {("P1", "1"), ("P2", "4"), ("P2", "6")}
+
+
+def test_the_speeds_of_the_sensors_of_one_steady_run_are_one(tmp_path):
+    runs = PUMP.replace("1485,DE", "1486.02,DE").replace("1485,NDE", "1482.7,NDE")
+    trials = trials_of(tmp_path, runs)
+    np.testing.assert_allclose(trials.speeds, [1484.36 * np.pi / 30], rtol=1e-12)
+    assert trials.readings.shape == (1, 3, 1, 2)
+    assert trials.warnings == (
+        "speeds of one run, or of different ones, within 0.5 % count as one: 1482.7, 1486.02 as 1484.36 rpm",
+    )
+    words = refused(trials_of, tmp_path, runs, speed_tolerance_percent=0.1)
+    assert "readings of run 'as found'" in words or "a reading of sensor" in words
+    twice = runs + "trial P2,1484,DE,3.6,188\n"
+    assert "one speed: run 'trial P2' has 1486.02 as well" in refused(trials_of, tmp_path, twice)
+
+
+WRONG_KINDS = {
+    "modes": (["modes", "modes/modes.csv"], "it seems to be a table of modes", 1),
+    "exchanged": (
+        ["balance", "bk_two_plane/weights.csv", "bk_two_plane/runs.csv"],
+        "it seems to be a weights",
+        2,
+    ),
+    "rotor": (["critical", "bk_two_plane/runs.csv"], "it seems to be a runs table", 1),
+}
+
+
+@each_of("name", WRONG_KINDS)
+def test_the_wrong_kind_of_file_is_one_message(name, cli):
+    (command, *files), words, lines = WRONG_KINDS[name]
+    outcome = cli(command, *(sample_data() / file for file in files))
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert outcome.err.strip().count("\n") == lines - 1
+
+
+def test_a_column_list_stands_once(tmp_path):
+    runs = PUMP.replace("phase_deg", "phase_deg,who,when,why").replace("\n", ",,,\n").replace("why,,,", "why")
+    words = refused(trials_of, tmp_path, runs)
+    assert words.count("remarks go into 'note'") == 1
+    assert "found 'who, when and why', expected known columns: run, speed_rpm" in words
+
+
+def test_a_plane_without_a_trial_weight_is_named(tmp_path):
+    files = {"runs": PUMP, "weights": PLAIN_WEIGHTS.replace("trial P2,P2,10,270\n", "")}
+    words = refused(job_of, tmp_path, EIGHT, **files)
+    assert "no trial weight in plane 'P2'" in words
+    assert "\n" not in words

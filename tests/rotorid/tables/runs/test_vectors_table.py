@@ -77,7 +77,7 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
         ),
         (HEAD.replace(",phase_std_deg", "") + ROWS.replace(",2,6", ",2").replace(",2,3", ",2"), "phase_std"),
         (HEAD.replace("std_um_pp", "std_mm_s") + ROWS, "amplitude_std_mm_s.* a unit that converts"),
-        (HEAD.replace("time_s", "time_h") + ROWS, "one of the units s or ms"),
+        (HEAD.replace("time_s", "time_h") + ROWS, "one of the units s, ms, us or min"),
         ("run,speed_rpm,sensor,amplitude,phase_deg\na,9,x,1,0\na,9,x,2,0\n", "need a column time_s"),
     ],
 )
