@@ -11,6 +11,7 @@ import csv
 import io
 import math
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -19,7 +20,7 @@ from typing import NamedTuple
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.files.conventions import Conventions
+from rotorid.files.conventions import PHASES, Conventions, Phase, as_phase
 from rotorid.files.headings import (
     DEVIATION,
     LONGEST,
@@ -34,7 +35,9 @@ from rotorid.files.headings import (
 from rotorid.tables.reader.columns import REMARKS, Source, sheet_source, source_name
 from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
 from rotorid.tables.reader.grid import MOST_ABOVE, Cell, Grid, Row, make_grid, show
+from rotorid.tables.reader.input_file import STANDARD_INPUT
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Said
 from rotorid.tables.reader.text_file import cells_of_line, decode, parse_text, read_bytes
 from rotorid.tables.reader.units import UnitError, spelt
 
@@ -164,6 +167,23 @@ def read_runs_grids(
     return known if len(known) == len(grids) else None
 
 
+def stated_phase(source: Source, columns: Said | None = None) -> Phase | None:
+    """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
+    named, words = _names_of(columns), set[str]()
+    for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
+        if not isinstance(file, Grid) and not is_workbook(path := Path(source_name(file))):
+            data = b"" if str(path) == STANDARD_INPUT else read_bytes(path, Problems()) or b""
+            if not re.search(b"lag|lead", data[: LONGEST * LONGEST], re.IGNORECASE):
+                continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a file that is read once more
+            grid = _open(file, named, Problems(), first=True)
+        units_ = [h.unit for h in read_headings(grid.header, named) if h.stem == "phase"] if grid else []
+        words |= {read_unit("phase", unit)[1] for unit in units_ if readable("phase", unit)}
+    words -= {""}
+    return as_phase(words.pop()) if len(words) == 1 and words <= {*PHASES} else None
+
+
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
     first, rows = grids[0], list(grids[0].rows)
@@ -181,9 +201,7 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
 
 
 def _read_one(source: Source, conventions: Conventions, problems: Problems, *, first: bool) -> Grid | None:
-    stated = {} if conventions.columns is None else conventions.columns
-    pairs = [(v, k) if isinstance(v, str) else (v.value, v.key) for k, v in stated.items() if v is not None]
-    named: dict[str, str] = dict(pairs)
+    named = _names_of(conventions.columns)
     grid = _open(source, named, problems, first=first)
     if grid is None or not _are_there(named, grid, conventions):
         return None
@@ -192,6 +210,14 @@ def _read_one(source: Source, conventions: Conventions, problems: Problems, *, f
     except Unclear as reason:
         problems.add(grid.source, reason.row or grid.header_row, reason.column, reason.value, str(reason))
         return None
+
+
+def _names_of(columns: Said | None) -> dict[str, str]:
+    """Names of a runs table by the names that the job says its file has."""
+    stated = {} if columns is None else columns
+    return dict(
+        (v, k) if isinstance(v, str) else (v.value, v.key) for k, v in stated.items() if v is not None
+    )
 
 
 def _are_there(named: Mapping[str, str], grid: Grid, conventions: Conventions) -> bool:

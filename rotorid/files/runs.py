@@ -23,7 +23,7 @@ from rotorid.files.conventions import (
     Phase,
     StatedErrors,
 )
-from rotorid.files.layout import is_severity, joined, read_runs_grids
+from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
 from rotorid.files.speeds import merge_speeds, same_speed, show_speed
 from rotorid.files.weights import read_weights
 from rotorid.tables.reader import units
@@ -66,7 +66,8 @@ def read_trials(
         Files (`.csv`, `.xlsx`); `runs` may be a folder with one file a run; weights may be None where
         influence coefficients are known.
     phase
-        Whether a positive phase in the runs table leads or lags; None: lead, which the labels call assumed.
+        Whether a positive phase in the runs table leads or lags; None: as its headings say, else lead,
+        which the labels call assumed.
     angles
         Whether angles in the weights table count with or against the rotation; None: with, which the labels
         call assumed where an angle other than 0° and 180° is mounted.
@@ -88,6 +89,7 @@ def read_trials(
         If an argument is none of the allowed values.
     """
     problems = Problems()
+    phase = phase or stated_phase(runs)
     labels = Labels(phase=phase or "lead", angles=angles or "with rotation")
     conventions = Conventions(labels, speed_tolerance_percent)
     trials = problems.need(make_trials(runs, weights, conventions, errors, problems))

@@ -21,6 +21,7 @@ from rotorid.files.conventions import (
     as_phase,
     resolve_angles,
 )
+from rotorid.files.layout import stated_phase
 from rotorid.files.runs import make_trials
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.job_holes import hole_angles
@@ -74,6 +75,8 @@ def read_readings(
         errors = replace(errors or StatedErrors(), **others)
     if "runs" not in tables:
         return None
+    if (overrides.phase or said["phase"]) is None:
+        overrides = replace(overrides, phase=stated_phase(tables["runs"], said["columns"]))
     # what is wrong with the planes must not hide what is wrong with the tables
     own = problems.apart({source_name(table) for table in tables.values()})
     found, name = None, ""

@@ -84,10 +84,11 @@ def trials_of(folder, runs, weights=None, **options):
     )
 
 
-def job_of(folder, settings, **files):
+def job_of(folder, settings, phase="lag", **files):
     for name, text in files.items():
         (folder / f"{name}.csv").write_text(text, encoding="utf-8")
-    text = 'phase = "lag"\nangles = "with rotation"\n' + settings
+    stated = "" if phase is None else f'phase = "{phase}"\n'
+    text = f'{stated}angles = "with rotation"\n{settings}'
     (folder / "job.toml").write_text(text, encoding="utf-8")
     return read_job(folder / "job.toml")
 
@@ -157,8 +158,19 @@ def test_lag_as_a_heading_is_the_phase_of_a_job_that_lags(tmp_path):
     trials = trials_of(tmp_path, runs)
     assert trials.sensors == ("1",)
     np.testing.assert_allclose(trials.labels.vibration(trials.readings)[1].ravel(), [212, 255])
+    unstated = read_trials(tmp_path / "runs.csv", None)
+    assert (unstated.labels.phase, unstated.labels.assumed) == ("lag", ())
+    np.testing.assert_allclose(unstated.readings, trials.readings)
     words = refused(read_trials, tmp_path / "runs.csv", None, phase="lead")
     assert "expected phases that lead, as the job says" in words
+
+
+def test_what_the_headings_say_of_phases_is_said_for_a_job(tmp_path):
+    runs = ONE_UNIT.replace("DE deg", "DE phase lag").replace("NNDE", "NDE")
+    files = {"runs": runs, "weights": PLAIN_WEIGHTS}
+    job = job_of(tmp_path, EIGHT, phase=None, **files)
+    assert (job.trials.labels.phase, job.trials.labels.assumed) == ("lag", ())
+    assert_same(job.trials, job_of(tmp_path, EIGHT, **files).trials)
 
 
 def test_one_sensor_and_one_speed_need_no_columns(tmp_path):
