@@ -15,8 +15,6 @@ from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 from rotorid.base.text import listing
 from rotorid.files.runs import COLUMNS
 from rotorid.tables import InputError, read_job, read_trials
-from rotorid.tables.job.job_as_written import JobSource
-from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase
@@ -237,15 +235,6 @@ def test_the_same_as_a_sheet(tmp_path, name):
     weights = write_csv(tmp_path / "weights.csv", WEIGHTS)
     tidy = read_trials(tmp_path / "tidy.xlsx", weights, phase="lag")
     assert_same(read_trials(tmp_path / "export.xlsx", weights, phase="lag"), tidy)
-
-
-@each_of("name", READ)
-def test_a_workbook_with_results_holds_the_runs_table(tmp_path, name):
-    job = read(tmp_path, READ[name])
-    (tmp_path / "out.xlsx").write_bytes(
-        job_workbook_bytes(job, JobSource((tmp_path / "job.toml",)), tmp_path / "out.xlsx")
-    )
-    assert_same(read_job(tmp_path / "out.xlsx").trials, job.trials)
 
 
 ONE_UNIT = "expected the same unit in all cells of the column (row 2 has {}), or in its heading"
