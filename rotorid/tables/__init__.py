@@ -11,6 +11,9 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from rotorid.files.conventions import Conventions as Conventions
+    from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.runs import read_trials as read_trials
     from rotorid.tables.data.measurements import read_measurements as read_measurements
     from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
     from rotorid.tables.data.modes_table import read_compliance as read_compliance
@@ -35,9 +38,6 @@ if TYPE_CHECKING:
     from rotorid.tables.runs.influence_table import influence_frame as influence_frame
     from rotorid.tables.runs.influence_table import read_influence as read_influence
     from rotorid.tables.runs.influence_table import write_influence as write_influence
-    from rotorid.tables.runs.stated_conventions import Conventions as Conventions
-    from rotorid.tables.runs.stated_conventions import StatedErrors as StatedErrors
-    from rotorid.tables.runs.trials import read_trials as read_trials
 
 _HOME = {
     "read_measurements": "data.measurements",
@@ -64,9 +64,9 @@ _HOME = {
     "influence_frame": "runs.influence_table",
     "read_influence": "runs.influence_table",
     "write_influence": "runs.influence_table",
-    "Conventions": "runs.stated_conventions",
-    "StatedErrors": "runs.stated_conventions",
-    "read_trials": "runs.trials",
+    "Conventions": ".files.conventions",
+    "StatedErrors": ".files.conventions",
+    "read_trials": ".files.runs",
 }
 
 __all__ = [*_HOME]

@@ -168,8 +168,8 @@ def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, A
 def convention(phase: str, angles: str) -> str:
     """Two drawings: how the angles of weights count, and what a phase is."""
     from balancing import Labels
+    from rotorid.files.conventions import as_angles, as_phase
     from rotorid.report import conventions_explained as explained
-    from rotorid.tables.runs.stated_conventions import as_angles, as_phase
 
     labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
     title = f"phase {phase}, angles {angles}"
@@ -183,11 +183,11 @@ def rows(name: str, data: str, phase: str) -> dict[str, Any]:
     A file that says that its phases are others than the job's, `phase`, is refused.
     """
     from balancing import Labels
+    from rotorid.files.conventions import Conventions, as_phase
+    from rotorid.files.layout import read_runs_grid
     from rotorid.tables.reader.grid import show
     from rotorid.tables.reader.input_file import each_file_once
     from rotorid.tables.reader.problems import Problems
-    from rotorid.tables.runs.instrument_export import read_runs_grid
-    from rotorid.tables.runs.stated_conventions import Conventions, as_phase
 
     problems, path = Problems(), Path(name)
     conventions = Conventions(Labels(phase=as_phase(phase)))

@@ -11,6 +11,9 @@ from functools import partial
 from pathlib import Path
 
 from rotorid.base.tables import guarded
+from rotorid.files import runs as runs_table
+from rotorid.files import weights as weights_table
+from rotorid.files.headings import looks_like_header
 from rotorid.tables.job.job_keys import READINGS
 from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS
 from rotorid.tables.reader.columns import REMARKS, column_of
@@ -18,8 +21,6 @@ from rotorid.tables.reader.decimal_numbers import decimal_comma, has_decimal_com
 from rotorid.tables.reader.grid import Grid, clean, show
 from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.text_file import SEP_LINE, decode_as, parse_text, text_from_header
-from rotorid.tables.runs import runs_table, weights_table
-from rotorid.tables.runs.column_headings import looks_like_header
 
 KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""

@@ -458,13 +458,11 @@ def _all() -> list[Case]:
     ]
     stored = "balance sample_data/model_job/runs.csv --influence w.csv --amplitude-error 2 --phase-error 2"
     saved = f"balance {TURBO}/job.toml --save-influence w"
-    filled = f"balance {TURBO}/holes.toml --output job.xlsx"
     cases += [
         Case("turbo-stored", stored, "balance", before=(f"{saved}.csv",)),
         Case(
             "turbo-stored-xlsx", stored.replace(".csv --a", ".xlsx --a"), "balance", before=(f"{saved}.xlsx",)
         ),
-        Case("workbook", "balance job.xlsx --output again.xlsx", "balance", before=(filled,)),
         Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
     ]
     added = "fleet add fans sample_data/fleet"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors, as_phase, check_angles
+from rotorid.files.conventions import Conventions, StatedErrors, as_phase, check_angles
 
 if TYPE_CHECKING:
     from balancing import Mounted

@@ -8,11 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from rotorid.tables.reader import units, value_kinds
-from rotorid.tables.reader.settings_keys import Key, Kind
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
-from rotorid.tables.runs.stated_conventions import (
+from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,
     PHASES,
@@ -21,6 +17,10 @@ from rotorid.tables.runs.stated_conventions import (
     VIEWS,
     StatedErrors,
 )
+from rotorid.tables.reader import units, value_kinds
+from rotorid.tables.reader.settings_keys import Key, Kind
+from rotorid.tables.reader.toml_file import Section
+from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""
@@ -229,6 +229,16 @@ def _file(section: Section, key: str) -> str | None:
     return name
 
 
+def _files(section: Section, key: str) -> str | tuple[str, ...] | None:
+    value = section.take(key)
+    if not isinstance(value, list):
+        return _file(section, key)
+    if not value or not all(isinstance(name, str) and name.strip() and name.isprintable() for name in value):
+        section.complain(key, 'the names of files, one a run: ["as found.csv", "trial.csv"]')
+        return None
+    return tuple(name.strip() for name in value)
+
+
 def _errors(section: Section, key: str) -> StatedErrors | None:
     said = _STATED.read(section, key)
     if said is None or said.section.refused:
@@ -276,6 +286,9 @@ _NAMES = Kind(
 )
 _PLACE = Kind(_place, {"type": ["integer", "string"]}, "a number, or a name")
 FILE = Kind(_file, TEXT.schema, cell="name")
+FILES = Kind(
+    _files, {"anyOf": [TEXT.schema, {"type": "array", "items": TEXT.schema, "minItems": 1}]}, cell="name"
+)
 FORBIDDEN = Key(
     "forbidden_deg",
     _ARCS,
@@ -395,7 +408,11 @@ COLUMNS = (
     Key("repeat", TEXT, "of repeated readings"),
 )
 JOB = (
-    Key("runs", FILE, "the runs table, relative to the job file"),
+    Key(
+        "runs",
+        FILES,
+        "the runs table, relative to the job file; or a folder, or a list of files, with one run each",
+    ),
     Key("weights", FILE, "the weights table"),
     Key("influence", FILE, "stored coefficients instead of trial runs, or beside them"),
     Key("rotor", FILE, "a rotor table or file: coefficients are computed"),
@@ -448,6 +465,7 @@ JOB = (
         f"speeds of different runs that differ by less count as one, default {DEFAULT_TOLERANCE:g}",
         default=DEFAULT_TOLERANCE,
     ),
+    Key("speed_rpm", ABOVE_ZERO, "the speed of runs tables without a column of speeds", units.SPEED),
     Key(
         "errors",
         replace(_STATED, read=_errors),

@@ -74,6 +74,8 @@ def _complain_about_names(said: Said, key: str, known: Sequence[str], problems: 
     for name in said[key]:
         if name not in known:
             expected = f"one of the job's {key}, {listing(known, 'and')}{did_you_mean(name, known)}"
+            if key == "planes":
+                expected += f" (no trial weight in plane {name!r}: is a row of the weights table missing?)"
             source, row, column = said.section.place(f"{key}.{name}")
             problems.add(source, row, column, name, expected)
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from balancing import Labels
+from rotorid.files.layout import files_of_runs
 from rotorid.tables.job.assumed_conventions import with_assumed
-from rotorid.tables.job.check_runs import read_check
+from rotorid.tables.job.check_runs import holes_taken, read_check
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_holes import read_holes
 from rotorid.tables.job.job_keys import JOB, TABLES, WEIGHTS, named_tables
@@ -49,6 +50,11 @@ def job_of(
     folder = Path() if path is None else path.parent
     named = {key: folder / name for key, name in named_tables({key: said[key] for key in TABLES}).items()}
     tables: dict[str, Source] = {**named, **sheets}
+    runs = said["runs"]
+    files = tuple(folder / name for name in runs) if isinstance(runs, tuple) else ()
+    files = files or files_of_runs(tables.get("runs"))
+    if files:
+        tables["runs"] = files
     if overrides.waveforms is not None:
         tables["runs"] = Path(overrides.waveforms)
     overrides, records = with_vectors(tables, overrides, said["phase"], problems)
@@ -65,8 +71,11 @@ def job_of(
     check = None
     if "check" in tables:
         check = read_check(tables, readings, planes, problems)
+    if check is not None and "check_weights" in tables:
+        holes = holes_taken(tables["check_weights"], check, readings, holes)
     problems.stop()
     first = [tables.get(key) for key in ("runs", "weights", "influence")]
+    records = (*files, *records)
     more = [tables.get(key) for key in ("check", "check_weights", "slow_roll")]
     read = [path, *first, *model.files, *more]
     phasor = said["key_phasor"]["angle_deg"] if said["key_phasor"] else 0.0

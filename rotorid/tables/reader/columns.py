@@ -29,9 +29,19 @@ from rotorid.tables.reader.text_file import decode, parse_text, read_bytes, text
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
+KINDS = {
+    "a runs table": ("run", "speed", "sensor", "amplitude", "phase"),
+    "an influence table": ("speed", "sensor", "plane", "influence"),
+    "a weights table": ("run", "plane", "angle"),
+    "a table of modes": ("mode", "node", "shape"),
+    "a table of compliances": ("node", "force_node", "compliance"),
+    "a rotor table": ("length", "diameter"),
+    "an unbalance table": ("unbalance", "angle"),
+}
+"""Columns by which a table is known that is taken for another kind."""
 _UNCLEAR = Unit("?", "unclear")
-Source = str | Path | Grid
-"""A table: a file, or the cells of a sheet."""
+Source = str | Path | Grid | tuple[Path, ...]
+"""A table: a file, the cells of a sheet, or, of runs, files with one run each."""
 
 
 @dataclass(frozen=True)
@@ -249,7 +259,7 @@ def read_grid(
     """The cells of a text file or of a sheet; with `is_header` whatever stands above it is a comment."""
     if isinstance(source, Grid):
         return source
-    path = Path(source)
+    path = Path(source_name(source))
     if is_workbook(path):
         sheets = read_workbook(path, problems)
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
@@ -267,6 +277,8 @@ def read_grid(
 
 def source_name(source: Source) -> str:
     """How messages name a table."""
+    if isinstance(source, tuple):
+        return listing(map(str, source), "and")
     return source.source if isinstance(source, Grid) else str(source)
 
 
@@ -280,9 +292,10 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     if not any(column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
         _complain_about_header(grid, columns, problems)
         return None
-    found = _match(grid, columns, problems)
     misspelt = _misspelt(grid, columns)
-    _complain_about_missing(grid, columns, {*found, *misspelt}, problems)
+    if not _has_columns(grid, columns, misspelt, problems):
+        return None
+    found = _match(grid, columns, problems)
     comma = decimal_comma(
         (
             cell
@@ -315,8 +328,10 @@ def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[st
         column = column_of(name, columns)
         if column is None:
             near = nearest(name, columns)
-            hint = f" (did you mean {near!r}?)" if near else f": {_known(columns)}; remarks go into 'note'"
-            problems.add(grid.source, grid.header_row, name, name, f"a known column{hint}")
+            if near:  # the others have been reported
+                problems.add(
+                    grid.source, grid.header_row, name, name, f"a known column (did you mean {near!r}?)"
+                )
             continue
         unit: Unit | None = None
         if column.unit is not None:
@@ -336,7 +351,8 @@ def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[st
 
 
 def _complain_about_header(grid: Grid, columns: Sequence[Column], problems: Problems) -> None:
-    expected = f"a header row with the names of columns, separated by , or ; or tabs: {_known(columns)}"
+    expected = "a header row with the names of columns, separated by , or ; or tabs: "
+    expected += _known(columns) + _seems(grid)
     shown = None  # who knows what stands in a file that is no table
     later = _header_below(grid, columns)
     problems.withdraw(grid.source)  # that rows are longer than a title is no news
@@ -394,14 +410,42 @@ def _misspelt(grid: Grid, columns: Sequence[Column]) -> frozenset[str]:
     return frozenset(column.stem for column in close if column is not None)
 
 
-def _complain_about_missing(
-    grid: Grid, columns: Sequence[Column], there: Collection[str], problems: Problems
-) -> None:
-    for column in columns:
-        if column.required and column.stem not in there:
-            present = listing([name for name in grid.named or grid.header if name], "and")
-            expected = f"a column {listing(column.names)}; the columns are {present}"
-            problems.add(grid.source, grid.header_row, column.names[0], None, expected)
+def _has_columns(
+    grid: Grid, columns: Sequence[Column], misspelt: Collection[str], problems: Problems
+) -> bool:
+    """Whether it may be a table of this kind; one problem each with unknown and with missing columns."""
+    names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
+    known = [column.stem for name in names if (column := column_of(name, columns)) is not None]
+    unknown = [name for name in names if column_of(name, columns) is None and nearest(name, columns) is None]
+    missing = [c for c in columns if c.required and c.stem not in known and c.stem not in misspelt]
+    present = listing([name for name in grid.named or grid.header if name], "and")
+    if (len(missing) > 1 and unknown) or len(unknown) > max(2, len(known)):
+        seems = _seems(grid) or "; remarks go into 'note'"
+        expected = f"a table with the columns {_known(columns)}; its columns are {present}{seems}"
+        problems.add(grid.source, grid.header_row, None, None, expected)
+        return False
+    if unknown:
+        one = unknown[0] if len(unknown) == 1 else None
+        expected = (
+            f"{'a known column' if one else 'known columns'}: {_known(columns)}; remarks go into 'note'"
+        )
+        problems.add(grid.source, grid.header_row, one, listing(unknown, "and"), expected)
+    if missing:
+        needed = (
+            listing(missing[0].names) if len(missing) == 1 else listing([c.names[0] for c in missing], "and")
+        )
+        expected = f"{'a column' if len(missing) == 1 else 'columns'} {needed}; the columns are {present}"
+        problems.add(grid.source, grid.header_row, missing[0].names[0], None, expected)
+    return True
+
+
+def _seems(grid: Grid) -> str:
+    """The kind of table that it is by its columns, as a clause; nothing where it is none that is known."""
+    names = [name for name in grid.named or grid.header if name]
+    for kind, stems in KINDS.items():
+        if all(any(name == stem or name.startswith(f"{stem}_") for name in names) for stem in stems):
+            return f": it seems to be {kind}"
+    return ""
 
 
 def _field(

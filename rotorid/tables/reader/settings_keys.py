@@ -72,7 +72,8 @@ class Key:
         For people: what it is, with examples, as a clause in Markdown.
     units
         Where the name ends in a unit: all units that it may end in, by name (those of the same kind of
-        quantity count for each name), or a reader of any unit after the name. The value is a `Quantity`.
+        quantity count for each name), or a reader of any unit after the name. The value is a `Quantity`,
+        with `si` a plain number in SI, the unit of the name.
     default
         The value without the key, and with a problem.
     required
@@ -85,6 +86,7 @@ class Key:
     units: Mapping[str, Unit] | UnitReader | None = None
     default: Any = None
     required: str = ""
+    si: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -117,7 +119,7 @@ class Key:
         present = [name for name in section.keys if self.accepts(name)]
         if not present and self.required:
             section.missing(self.names[0], self.required)
-        if self.units is None:
+        if self.units is None or self.si:
             return self._read(section, self.names[0]) if present else self.default
         found = {name: self._read(section, name) for name in present}
         for name in present[1:]:
@@ -158,6 +160,9 @@ def take(section: Section, keys: Sequence[Key]) -> Said:
         All that it may have, in the order in which they are read and named; every other key is a problem.
     """
     section.know(name for key in keys for name in key.names)
+    for key in keys:
+        if key.si:
+            section.convert(key.name, {name: unit for name, unit in key.variants.items() if unit is not None})
     said = Said((key.names[0], key.value(section)) for key in keys)
     said.section = section
     section.finish()

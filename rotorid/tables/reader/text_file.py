@@ -170,6 +170,12 @@ def text_from_header(text: str, is_header: Callable[[tuple[str, ...]], bool]) ->
     return text
 
 
+def cells_of_line(line: str) -> tuple[tuple[str, ...], str]:
+    """Cells of one line, and what separates them; csv.Error where its quotes are not closed."""
+    separator = _separator([line])
+    return _cells(line, separator), separator
+
+
 def _cells(line: str, separator: str) -> tuple[str, ...]:
     if '"' not in line:  # a line at a time: an open quote must not swallow the rest of the file
         return tuple(map(clean, line.split(separator))) if line else ()

@@ -15,6 +15,7 @@ from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
+from rotorid.tables.reader.units import Unit
 
 MOST_BYTES = 2_000_000
 _DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")
@@ -82,6 +83,7 @@ class Section:
         self._where = where or {}
         self._taken: list[str] = []
         self._known: list[str] = []
+        self._written: dict[str, tuple[str, Any]] = {}
         self.refused: set[str] = set()
 
     def __contains__(self, key: str) -> bool:
@@ -99,10 +101,26 @@ class Section:
     def complain(self, key: str, expected: str, *, value: bool = True) -> None:
         """Note a problem with a key, which is one of the `refused` then."""
         self.refused.add(key)
-        found = _shown(self._data[key]) if value and key in self._data else None
+        key, written = self._written.get(key, (key, self._data.get(key)))
+        found = _shown(written) if value and written is not None else None
         name = f"{self._prefix}{key}"
         source, row, column = self.place(name)
         self._problems.add(source, row, column, found, expected)
+
+    def convert(self, key: str, variants: Mapping[str, Unit]) -> None:
+        """Put what is written in another unit, one of `variants`, at the key in SI."""
+        present = [name for name in self._data if name in variants]
+        for name in present[1:]:
+            self.complain(name, f"one key of them; {present[0]} says it already")
+        for name in present[:1] if present != [key] else ():
+            written, unit = self._data[name], variants[name]
+            self._written[key] = name, written
+            items = written if isinstance(written, list) else [written]
+            numbers = [
+                unit.to_si(x) if isinstance(x, (int, float)) and type(x) is not bool else x for x in items
+            ]
+            rest = {k: v for k, v in self._data.items() if k not in present or k in self.refused}
+            self._data = {**rest, key: numbers if isinstance(written, list) else numbers[0]}
 
     def take(self, key: str) -> Any:  # noqa: ANN401  whatever the file holds
         """The value as it is, None if there is none."""

@@ -50,13 +50,14 @@ UnitReader = Callable[[str], Unit]
 _SPELLING = str.maketrans(
     {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "/": "_", "·": "_", "*": "_"}
 )
+_POUND, _POUND_FORCE = 0.45359237, 4.4482216152605
 _LENGTHS = {"m": (1.0, 1.0), "mm": (1.0, 1e3), "um": (1.0, 1e6), "mil": (254.0, 1e7), "in": (254.0, 1e4)}
 _MASSES = {
     "kg": (1.0, 1.0),
     "g": (1.0, 1e3),
     "mg": (1.0, 1e6),
-    "oz": (0.45359237, 16.0),
-    "lb": (0.45359237, 1.0),
+    "oz": (_POUND, 16.0),
+    "lb": (_POUND, 1.0),
 }
 _RADII = {"m": (1.0, 1.0), "mm": (1.0, 1e3), "in": (254.0, 1e4)}
 
@@ -75,13 +76,28 @@ UNBALANCE = {
 WEIGHT = {**MASS, **UNBALANCE}
 SPEED = _table("speed", {"rpm": (2.0 * pi, 60.0), "rad_s": (1.0, 1.0), "Hz": (2.0 * pi, 1.0)})
 ANGLE = _table("angle", {"deg": (pi, 180.0), "rad": (1.0, 1.0)})
-INERTIA = _table("inertia", {"kg_m2": (1.0, 1.0)})
-STIFFNESS = _table("stiffness", {"N_per_m": (1.0, 1.0), "N_per_mm": (1e3, 1.0), "N_per_um": (1e6, 1.0)})
-DAMPING = _table("damping", {"N_s_per_m": (1.0, 1.0), "N_s_per_mm": (1e3, 1.0)})
-MODULUS = _table("modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1.0)})
-DENSITY = _table("density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0)})
-FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (4.4482216152605, 1.0)})
-TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3)})
+INERTIA = _table("inertia", {"kg_m2": (1.0, 1.0), "lb_in2": (_POUND * 254.0**2, 1e8)})
+STIFFNESS = _table(
+    "stiffness",
+    {
+        "N_per_m": (1.0, 1.0),
+        "N_per_mm": (1e3, 1.0),
+        "N_per_um": (1e6, 1.0),
+        "lbf_per_in": (_POUND_FORCE * 1e4, 254.0),
+    },
+)
+DAMPING = _table(
+    "damping",
+    {"N_s_per_m": (1.0, 1.0), "N_s_per_mm": (1e3, 1.0), "lbf_s_per_in": (_POUND_FORCE * 1e4, 254.0)},
+)
+MODULUS = _table(
+    "modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1.0), "psi": (_POUND_FORCE * 1e8, 254.0**2)}
+)
+DENSITY = _table(
+    "density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0), "lb_per_in3": (_POUND * 1e12, 254.0**3)}
+)
+FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (_POUND_FORCE, 1.0)})
+TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "min": (60.0, 1.0)})
 VELOCITY = _table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)})
 VISCOSITY = _table("viscosity", {"Pa_s": (1.0, 1.0), "mPa_s": (1.0, 1e3), "cP": (1.0, 1e3)})
 CUBIC_STIFFNESS = _table("cubic stiffness", {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0)})
@@ -169,5 +185,6 @@ def weight(name: str) -> Unit:
 
 
 def spelt(name: str) -> str:
-    """A unit's name as this project spells it: `µm` is `um`, `mm/s` is `mm_s`, `g·mm` is `g_mm`."""
-    return name.translate(_SPELLING)
+    """A unit's name as this project spells it: `µm` is `um`, `mm/s` is `mm_s`, `lbs` is `lb`."""
+    spelling = name.translate(_SPELLING)
+    return "lb" if spelling == "lbs" else spelling

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +12,16 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import turned
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
+from rotorid.files import runs as runs_table
+from rotorid.files.conventions import FULL_TURN, Conventions
+from rotorid.files.layout import read_runs_grid
 from rotorid.identify.modes_result import Readings
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
+from rotorid.tables.reader.columns import Column, Source, Table, make_table
+from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs import runs_table
 from rotorid.tables.runs.slow_roll import make_slow_roll
-from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
 COLUMNS = (
     *(column for column in runs_table.COLUMNS if column.required),
@@ -29,8 +29,6 @@ COLUMNS = (
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
-_BESIDE = re.compile(r"(order\d+_|overall|gap|turns).*")
-"""Columns that say nothing about the vectors of order 1."""
 _SAME = 1e-9
 
 
@@ -40,6 +38,8 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
     `phase_deg`) and, optionally, `time_s` and, both or neither, `amplitude_std_<unit>` and `phase_std_deg`,
     one standard deviation. Vectors of one time were read at one speed; without times a speed stands once.
+    The table may have any layout of a runs table, such as columns for each sensor; without a column `run` it
+    is one run, named as the file.
 
     Raises
     ------
@@ -47,9 +47,10 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
         With all problems of the file.
     """
     problems = Problems()
-    grid = problems.need(read_grid(source, "vectors", problems, first=True))
-    header = tuple("note" if _BESIDE.fullmatch(name) else name for name in grid.header)
-    table = problems.need(make_table(replace(grid, header=header), COLUMNS, problems))
+    files = source if isinstance(source, (Grid, tuple)) else (Path(source),)
+    conventions = Conventions(Labels(phase=phase))
+    grid = problems.need(read_runs_grid(files, conventions, problems, first=True))
+    table = problems.need(make_table(grid, COLUMNS, problems))
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
     table.must_be("amplitude", table.numbers("amplitude") >= 0, "an amplitude of 0 or more")
     allowed = np.abs(table.numbers("phase")) <= FULL_TURN

@@ -201,8 +201,6 @@ BAD_COLUMNS = [
     (RUNS, "speed_rpm", "speed", "speed", "which is missing"),
     (RUNS, "amplitude_um_pp", "amplitude_um_pk", "amplitude_um_pk", "um_pp (peak to peak)"),
     (RUNS, "amplitude_um_pp", "ampltude_um_pp", "ampltude_um_pp", "did you mean 'amplitude_um_pp'?"),
-    (RUNS, "phase_deg", "phase", "phase", "one of the units deg or rad"),
-    (WEIGHTS, "mass_g", "Mass [kg]", "Mass [kg]", "did you mean 'mass_kg'?"),
     (WEIGHTS, "mass_g", "mass_gram", "mass_gram", "one of the units kg, g, mg, oz or lb"),
     (WEIGHTS, "mass_g", "unbalance_gmm", "unbalance_gmm", "did you mean 'g_mm'?"),
 ]

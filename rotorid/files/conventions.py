@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, radians
 from typing import cast, get_args
@@ -52,6 +53,12 @@ class Conventions:
         Which of "phase" and "angles" neither the job nor the caller states.
     columns
         Names that the columns of the runs tables have in the files, by their own names; None: these.
+    speed
+        Unit and number of the only speed, for runs tables without a column of speeds.
+    holes
+        Angle in degrees, as the job counts, of each hole by its name, for each plane that has holes.
+    removed
+        Planes in which material is taken away.
 
     Raises
     ------
@@ -63,6 +70,9 @@ class Conventions:
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
     unstated: tuple[str, ...] = ()
     columns: Said | None = None
+    speed: tuple[str, float] | None = None
+    holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    removed: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:

@@ -1,0 +1,1 @@
+"""Files of people and instruments: runs, weights and influence tables, read into SI and written."""
