@@ -89,7 +89,7 @@ class BearingEquilibria(Delivered):
         every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
         shown = [*self.found[:-1:every], self.found[-1]]
         return Answer(
-            f"{capital(self.stability.sentence())}."
+            capital(self.stability.sentence()) + "."
             if self.stability
             else "One speed: no threshold is sought.",
             text(self._columns(shown), width=COLUMNS),

@@ -76,7 +76,8 @@ def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:
     from fem import draw_rotor
     from rotorid.base.plot_style import DARK, legend_below, new_figure
 
-    tall = min(7.0 / len(unbalance.stations), 3.0)
+    many = len(unbalance.stations)
+    tall = min(7.0 / many, 3.0) + (1.4 if many > 8 else 0.0)  # of many the names stand upright
     figure = new_figure(tall + 4.0)
     above, below = figure.subplots(2, height_ratios=(tall + 1.0, 2.6))
     draw_unbalance(unbalance, above)

@@ -447,13 +447,11 @@ def _compared(
 
 
 def _warnings(result: Placement) -> list[str]:
-    warnings, top = [], result.condition[: min(_TOP, result.ranked)]
-    if not result.ranked:
-        warnings.append("no choice gives a physical model: use other candidates, more modes or fewer masses")
-    elif bad := int((top > BADLY).sum()):
-        warnings.append(
-            f"{bad} of the best {len(top)} by frequency are badly conditioned (condition number up to "
-            f"{top.max():.3g}): errors of 1 % in compliances and shapes can move their masses by up to that "
-            "many percent; use more modes or prefer a choice with a smaller number"
-        )
-    return warnings
+    top = result.condition[: min(_TOP, result.ranked)]
+    if not (bad := int((top > BADLY).sum())):
+        return []
+    return [
+        f"{bad} of the best {len(top)} by frequency are badly conditioned (condition number up to "
+        f"{top.max():.3g}): errors of 1 % in compliances and shapes can move their masses by up to that many "
+        "percent; use more modes or prefer a choice with a smaller number"
+    ]

@@ -212,7 +212,7 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     plain(axes)
     known = np.concatenate((cost.full_decrement, cost.small_decrement))
     known = known[np.isfinite(known)]
-    far = 20 * float(np.median(np.abs(known), axis=0)) if known.any() else 1.0  # beyond nothing matters
+    far = 20 * np.median(np.abs(known)) if known.any() else 1.0  # beyond nothing matters
     low, high = np.clip([known.min(initial=-1e-9), known.max(initial=1e-9)], -far, far) * 1.1
     low -= 0.1 * high  # 0 is in sight with room below
     for name, decrement, threshold, style in (

@@ -146,6 +146,11 @@ class SmallModel(Answered):
         return tuple(node for node, mass in zip(self.nodes, self.masses, strict=True) if mass > 0)
 
     @property
+    def stations(self) -> dict[str, int]:
+        """None: its nodes have numbers alone."""
+        return {}
+
+    @property
     def symmetric(self) -> bool:
         """Whether no support distinguishes a direction."""
         return all(support.symmetric for support in self.supports)
@@ -264,7 +269,7 @@ class SmallModel(Answered):
 
     def critical_speeds(self, lowest: float, highest: float) -> FloatArray:
         """Speeds between two, rad/s, ascending, at which a mode whirls once a turn, either way."""
-        speeds, crossings = np.linspace(lowest, highest, POINTS), np.empty(0)
+        speeds = np.linspace(lowest, highest, POINTS)
         for _ in range(3):  # of lines through two speeds each, the last between near ones
             gap = np.abs(self.whirl(speeds).values.imag) - speeds[:, None]
             i, k = np.nonzero((gap[:-1] > 0) != (gap[1:] > 0))
@@ -336,9 +341,8 @@ class SmallModel(Answered):
             F, b, nodes = (x + 1j * y) / 2, (x - 1j * y) / 2, np.array(self.nodes)
             size = np.abs(F) + np.abs(b)
             largest = size.max(axis=1), nodes[size.argmax(axis=1)]
-            return fem.Response(
-                *(speeds, F, mounted, cast(fem.Rotor, self), warnings, b, *largest, nodes, at, windows)
-            )
+            rotor = cast(fem.Rotor, self)
+            return fem.Response(speeds, F, mounted, rotor, warnings, b, *largest, nodes, at, windows)
 
         return at(omega)
 

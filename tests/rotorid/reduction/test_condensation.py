@@ -206,11 +206,6 @@ def test_a_singular_mass_matrix_is_said():
     assert np.isnan(guess.mac[1])
 
 
-def test_a_mass_that_is_not_positive_is_said():
-    result = compare_methods(rotor23(), (2, 3, 22))
-    assert any("the mass at node 2 is not positive" in text for text in result.warnings)
-
-
 @each_of(
     ("nodes", "options", "message"),
     [

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import fem
 from fem import state_space
+from rotorid.plots import plot
 from rotorid.reduction import reduce, small_model
 
 NODES = (7, 12, 18)
@@ -367,7 +368,10 @@ def test_the_response_is_that_of_a_rotor_which_is_a_few_masses():
     np.testing.assert_allclose(*forces, rtol=1e-7, atol=1e-12)
     np.testing.assert_array_equal(mine.largest, mine.major.max(axis=1))
     assert [w.to_dict() for w in mine.windows] == [pytest.approx(w.to_dict()) for w in full.windows]
-    assert "nodes. Largest amplitude" in mine.sentence()
+    assert "4 nodes. Largest amplitude" in repr(mine)
+    assert len(mine.to_frame()) == 46 * 4
+    drawn = plot(mine).get_lines()  # at its supports, as of a rotor without stations
+    assert [line.get_label() for line in drawn] == ["node 1", "node 11"]
 
 
 def test_the_response_of_an_unstable_model_has_a_range_without_steady_state():
