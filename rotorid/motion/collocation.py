@@ -368,5 +368,5 @@ def _along(
     states = np.empty((m, 5 + 2 * n, n))
     for i in range(m):
         states[i, 0], states[i, 1] = Q[i], V[i]
-        evaluate(equations, (angles[i], speed, 0.0), 0.0, states[i])
+        evaluate(equations, (angles[i], speed, 0.0), 0.0, states[i], True)
     return states

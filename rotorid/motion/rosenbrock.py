@@ -99,7 +99,7 @@ DENSE = np.array(
 
 
 @compiled
-def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray) -> None:
+def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray, slopes: bool) -> None:
     """Write f and its derivatives at the q and v of a state.
 
     Parameters
@@ -110,6 +110,8 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
         s.
     state
         q, v, f, ∂f/∂Ω, ∂f/∂t, and the rows of J_q and of J_v, shape (5 + 2 n, n).
+    slopes
+        Whether J_q and J_v are wanted; else they hold nothing.
     """
     codes, values, places, _, damping, stiffness, damping_slope, stiffness_slope, weight, u, b = equations
     angle, first, alpha = turning
@@ -118,19 +120,20 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
     gain = alpha * t
     speed = first + gain
     turned = np.exp(1j * (angle + (first + 0.5 * gain) * t))
-    state[2:] = 0.0
+    state[2 : len(state) if slopes else 5] = 0.0
     add_forces(codes, values, places, q, v, speed, f, J_q, J_v, f_speed)
     for i in range(n):
         linear, slope = 0.0, 0.0
         for j in range(n):
             linear -= damping[i, j] * v[j] + stiffness[i, j] * q[j]
             slope -= damping_slope[i, j] * v[j] + stiffness_slope[i, j] * q[j]
-            J_q[i, j] -= stiffness[i, j] + gain * stiffness_slope[i, j]
-            J_v[i, j] -= damping[i, j] + gain * damping_slope[i, j]
         force = u[i] * (speed * speed - 1j * alpha) + b[i]
         f[i] += weight[i] + linear + gain * slope + (force * turned).real
         f_speed[i] += slope + 2.0 * speed * (u[i] * turned).real
         f_t[i] = alpha * f_speed[i] + speed * (1j * force * turned).real
+    if slopes:
+        J_q -= stiffness + gain * stiffness_slope
+        J_v -= damping + gain * damping_slope
 
 
 @compiled
@@ -166,7 +169,7 @@ def attempt(
                 pull[i] += C[stage, k] / h * w[k, i]
             slip[i] += now[1, i]
         if stage:
-            evaluate(equations, turning, t + ALPHA[stage] * h, now)
+            evaluate(equations, turning, t + ALPHA[stage] * h, now, False)
         for i in range(n):
             right[i] = now[2, i] + h * D[stage] * state[4, i]
             for j in range(n):
@@ -177,8 +180,8 @@ def attempt(
                 w[stage, i] += inverse[i, j] * right[j]
             p[stage, i] = GAMMA * h * (slip[i] + w[stage, i])
     now[:2] += stages[:, 7]
-    evaluate(equations, turning, t + h, now)
-    return bool(np.isfinite(now).all())
+    evaluate(equations, turning, t + h, now, True)
+    return bool(np.isfinite(now[2]).all())
 
 
 @compiled
@@ -237,7 +240,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     state, now, stages = np.empty((5 + 2 * n, n)), np.empty((5 + 2 * n, n)), np.empty((2, 8, n))
     state[0], state[1] = q, v
     done, written = 0, 0
-    evaluate(equations, turning, t, state)
+    evaluate(equations, turning, t, state, True)
     while t < end:
         for force in range(len(walls)):
             if math.hypot(q[places[force, 0]], q[places[force, 1]]) >= TOUCH * walls[force]:

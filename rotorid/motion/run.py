@@ -206,7 +206,7 @@ def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Tur
     state, equations = np.zeros((5 + 2 * n, n)), equations_of(system, turning[1], turning[1])
     for _ in range(20 if free.size else 0):
         state[0], state[1] = q, v
-        evaluate(equations, turning, 0.0, state)
+        evaluate(equations, turning, 0.0, state, True)
         J = state[5 + n :][np.ix_(free, free)]
         if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
             where = system.coordinates[free[np.abs(J).sum(axis=1).argmin()]]
