@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rotorid.identify.modes_result import FittedModes
     from rotorid.identify.run_up import SweepModes
 
-FEW_TURNS = 6.0
+FEW_TURNS = 10.0
 """In the half-power band of a mode: vectors, means over turns, flatten one that is passed within fewer."""
 TABLES = (".csv", ".xlsx", ".txt")
 Phase = Literal["lead", "lag"]
