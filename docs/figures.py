@@ -277,17 +277,9 @@ GALLERY = (
     Picture(
         "tacho",
         "instruments",
-        f"vectors {RUN_UP} --picture tacho",
+        f"vectors {RUN_UP}",
         "No mark is missing. At the end a pulse is half a sample, 0.8°, early or late; the angle, "
         "through all of them, is not.",
-        dense=True,
-    ),
-    Picture(
-        "orbit",
-        "instruments",
-        f"vectors {RUN_UP} --picture orbit",
-        "Near the second critical speed the shaft goes round in a circle, with the rotation; each turn "
-        "begins at the mark.",
         dense=True,
     ),
     Picture(

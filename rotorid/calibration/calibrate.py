@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from fem import Calibration, Rotor, is_reading
@@ -35,6 +36,8 @@ LIMIT = 40
 """Evaluations of a search from one of several starts."""
 SAME = 1e-3
 """Relative, besides three standard deviations: nearer ends of searches are one."""
+TINY = 1e-9
+"""Mean χ² that is none: no degree of freedom is left."""
 AS_WELL = 4.0
 """Of χ²: other numbers that explain the data so nearly as well are reported."""
 
@@ -189,10 +192,9 @@ def _judged(
         return float(np.sum(equations.residual(theta) ** 2) + np.sum(prior.residual(theta) ** 2))
 
     chi_square, dof = mismatch(theta), r.size + len(prior) - spent - fit.estimate.rank
-    chance = float(chdtrc(dof, chi_square)) if dof > 0 else 1.0
+    chance, covariance = _of_errors(equations, prior, fit, chi_square)
     times = max(chi_square / dof, 1.0) if chance < LEVEL else 1.0
-    covariance = fit.estimate.solution_covariance
-    covariance = np.zeros((theta.size,) * 2) if covariance is None else times * np.nan_to_num(covariance)
+    covariance *= times
     if off := {number.path: number.prior for number in exact if number.prior}:
         H = equations.by([*off], values | {path: value for path, (value, _) in off.items()})
         H = np.vstack((H * [std for _, std in off.values()], np.zeros((len(prior), len(off)))))
@@ -233,6 +235,33 @@ def _judged(
     )
 
 
+def _of_errors(
+    equations: _Equations, prior: Prior, fit: NonlinearEstimate, chi_square: float
+) -> tuple[float, FloatArray]:
+    """How likely so large a χ² is, and the covariance (n, n), 0 where not determined.
+
+    Errors E ε and priors' ones make G⁺ E ε of the numbers, and leave (1 − G G⁺) E ε of the rows, whose χ² is
+    that of g χ²(ν) of the same mean and variance; mean over what errors between runs may be.
+    """
+    theta = fit.estimate.solution
+    known, values = fit.estimate.solution_covariance, equations.values(theta)
+    free = np.flatnonzero(np.zeros(theta.size) if known is None else ~np.isnan(np.diag(known)))
+    G = prior.below(equations.jacobian(theta))[:, free]
+    W = [rows.data.coefficients(equations.rotor, values)[0] for rows in equations.rows]
+    every = [rows.spreads(each) for rows, each in zip(equations.rows, W, strict=True)]
+    count, covariance = max(map(len, every)), np.zeros((theta.size,) * 2)
+    chances = []
+    for k in range(count):
+        E = block_diag(*(each[k % len(each)] for each in every), np.eye(len(prior)))
+        moved = solution(G, E)
+        covariance[np.ix_(free, free)] += moved @ moved.T / count
+        left = E - G @ moved
+        A = left @ left.T if len(left) < len(left.T) else left.T @ left
+        mean, square = np.trace(A), np.sum(A**2)
+        chances.append(float(chdtrc(mean**2 / square, chi_square * mean / square)) if mean > TINY else 1.0)
+    return float(np.mean(chances)), covariance
+
+
 def _lack_of_fit(equations: _Equations, values: dict[str, float]) -> float:
     """What the model leaves of what weights do beyond the errors: relative rms over speeds and sensors.
 
@@ -243,7 +272,7 @@ def _lack_of_fit(equations: _Equations, values: dict[str, float]) -> float:
         W = rows.data.coefficients(equations.rotor, values)[0]
         bare = np.einsum("scq,q->sc", W[..., len(rows.data.nodes) :], rows.residual(W)[2])[:, None]
         left = rows.raw(W) + bare
-        square = (np.abs(left) ** 2 / 2 - rows.variance.reshape(*left.shape, 2).mean(axis=3)).sum(axis=1)
+        square = (np.abs(left) ** 2 / 2 - rows.variance).sum(axis=1)
         size = np.maximum((np.abs(bare + rows.effect(W)) ** 2).sum(axis=1), np.finfo(float).tiny)
         mean, share = max(float(square.sum() / size.sum()), 0.0), 2 / left.shape[1]
         relative.append(np.ravel(share * mean + np.maximum(square, 0.0) / size) / (1 + share))

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Gaussian, Trials, usual_run_errors, with_parameters
+from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
-from rotorid.calibration import RunReadings
+from rotorid.calibration import RunReadings, run_errors
 from rotorid.commands.outcome import hash_of
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = np.full(W.shape[:2], calibration.lack_of_fit)
     none = Gaussian.none(*W.shape).noise
-    errors = Gaussian(none.own[0], none.columns, influence.reading, usual_run_errors(job.trials))
+    errors = Gaussian(none.own[0], none.columns, influence.reading, run_errors(job.trials))
     found = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
     if not calibration.needs_trial_run:
         return found

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.identify.modes_result import FittedModes, Readings
 
-FEW_TURNS = 6.0
+FEW_TURNS = 10.0
 """In the half-power band of a mode: vectors, means over turns, flatten one that is passed within fewer."""
 TABLES = (".csv", ".xlsx", ".txt")
 Phase = Literal["lead", "lag"]

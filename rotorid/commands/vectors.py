@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 Phase = Literal["lead", "lag"]
 Edge = Literal["leading", "trailing", "rising", "falling", "centre"]
-Picture = Literal["tacho", "orbit"]
 
 
 @dataclass(frozen=True)
@@ -53,8 +52,6 @@ class VectorsOptions:
     speeds : LIST
         Vectors at these (rad/s, or 900,1200rpm), where a run-up passes them first; default: one for a steady
         speed, else as many as are independent.
-    picture
-        What --plot draws of the first record.
     """
 
     tacho: str | None = None
@@ -67,12 +64,10 @@ class VectorsOptions:
     phase: Phase | None = None
     orders: str | Sequence[int] | None = None
     speeds: Speeds | None = None
-    picture: Picture = "tacho"
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "tacho sensors unit amplitude phase",
         "Tacho": "pulses edge rate",
         "Vectors": "orders speeds",
-        "Output": "picture",
     }
     to: ClassVar[Sequence[str]] = USUAL
 
@@ -99,12 +94,11 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     """
     from rotorid.tables.waveforms.vectors_of_records import find_each, vectors_columns
     from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
-    from rotorid.waveforms.plots import figure_of
+    from rotorid.waveforms.plots import figure_tacho
 
     options = options or VectorsOptions()
     if options.edge is not None:
         one_of(options.edge, "--edge", get_args(Edge))
-    one_of(options.picture, "--picture", get_args(Picture))
     given = WaveformWishes(
         tacho=options.tacho,
         sensors=names(options.sensors),
@@ -123,7 +117,9 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         each = find_each(waveforms)
     columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels
     orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
-    many = len(each) > 1
+    many, first = len(each) > 1, waveforms.records[0]
+    signal = first.tacho
+    assert signal is not None  # find_each refuses records without one
     words = [f"run {one.run!r}: {word}" if many else word for one in each for word in one.warnings]
     if waveforms.unstated:
         words.append("nothing states whether phases lead or lag: lead is written (--phase)")
@@ -161,7 +157,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         tables=(_table(columns, printed=True),),
         file=_table(columns),
         keys=dict(plain(document)),
-        pictures={"The first record.": lambda: figure_of(options.picture, waveforms.records[0], each[0])},
+        pictures={"The tacho of the first record.": lambda: figure_tacho(signal, first.rate, tachos[0])},
         warnings=tuple(words),
         provenance=provenance(waveforms.files, options),
     )

@@ -122,7 +122,7 @@ study-misspelt              study misspelt.toml
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
 influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
 vectors                     vectors sample_data/waveforms/waveforms.toml --orders 1,2 --output runs.csv
-vectors-run-up              vectors sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm --picture orbit --plot orbit.png
+vectors-run-up              vectors sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm --plot tacho.png
 runup-record                runup sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag --plot bode.png
 vectors-slow-roll           vectors sample_data/waveforms/slow_roll.toml
 vectors-no-tacho            vectors sample_data/waveforms/run_up.wav --unit um
