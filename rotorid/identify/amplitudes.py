@@ -104,7 +104,7 @@ def inverse_roots(
     floor = SMALL * np.array(
         [np.median(one[~np.isnan(one)]) if np.nansum(one) else 1 / SMALL for one in size.T]
     )
-    z = np.where(size >= floor, amplitudes, floor)
+    z = np.asarray(np.where(size >= floor, amplitudes, floor), dtype=complex)
     if covariances is None:
         covariances = (errors or AmplitudeErrors(1.0, 1.0)).covariance(z)
     turn = real_matrices(z.conj() / np.abs(z))
