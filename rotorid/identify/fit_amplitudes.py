@@ -326,6 +326,11 @@ def _finished(answer: Identification, bounds: Bounds) -> Identification:
         words.append(
             "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
         )
+    words += [
+        f"{name} is estimated as one unknown: what stands in it is not solved for from it"
+        for name in model.parameters
+        if not name.isidentifier()
+    ]
     if answer.linear and answer.solutions and not answer.linear.recovery.solutions:
         words.append("the parameters were found by a search; there may be more solutions than shown")
     words += answer.warnings
