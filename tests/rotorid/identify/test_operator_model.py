@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from rotorid.identify import harmonic_model, identify
-from rotorid.identify.amplitudes import experiments
+from rotorid.identify import harmonic_model
 
 MASS = "(m*p**2 + b*p + c)*X = F"
 
@@ -69,18 +68,6 @@ def test_functions_of_known_numbers_are_numbers():
     model = harmonic_model(["p**2*X + sqrt(k)*c*X = F"], known={"k": 4.0}, estimate=["c"])
     x = model.predict(np.array([3.0]), np.array([1.0]), {"F": np.ones(1)})["X"]
     np.testing.assert_allclose(x, 1 / 5, rtol=1e-14)
-
-
-def test_a_function_of_parameters_is_an_unknown_and_what_stands_in_it_is_not_solved_for():
-    w, load = np.array([10.0, 20.0, 30.0]), {"F": 10.0}
-    model = harmonic_model(["(m*p**2 + exp(-a)*p + c)*X = F"], known={"m": 10.0}, estimate=["a", "c"])
-    assert model.parameters == ("c", "exp(-a)")
-    x = 10 / (-10 * w**2 + 1j * w * np.exp(-0.5) + 1000.0)
-    found = identify(model, experiments(model, w, {**load, "X": x}, free=False))
-    np.testing.assert_allclose(found.values, [1000.0, np.exp(-0.5)], rtol=1e-8)
-    assert found.warnings[0].startswith("exp(-a) is estimated as one unknown")
-    both = harmonic_model(["(a*p**2 + sqrt(a + m)*p + c)*X = F"], known={"m": 2.0}, estimate=["a", "c"])
-    assert both.parameters == ("a", "c", "sqrt(a + m)")
 
 
 @each_of(
