@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from rotorid.identify.operator_model import (
     nearest_mode,
     reference_amplitude,
 )
-from rotorid.regression.search import Function, together
 
 RAD_PER_S = Shown("frequency, rad/s")
 THIN = 0.01
@@ -104,7 +102,7 @@ def inverse_roots(
     floor = SMALL * np.array(
         [np.median(one[~np.isnan(one)]) if np.nansum(one) else 1 / SMALL for one in size.T]
     )
-    z = np.where(size >= floor, amplitudes, floor)
+    z = np.asarray(np.where(size >= floor, amplitudes, floor), dtype=complex)
     if covariances is None:
         covariances = (errors or AmplitudeErrors(1.0, 1.0)).covariance(z)
     turn = real_matrices(z.conj() / np.abs(z))
@@ -306,18 +304,6 @@ class Comparison:
     whiten: FloatArray
     left_out: tuple[str, ...]
 
-    @cached_property
-    def _functions(self) -> tuple[Function, Function]:
-        return together(self._both)
-
-    def residual(self, theta: FloatArray) -> FloatArray:
-        """(Predicted − measured) over the errors; NaN where the model has no answer (resonance, no mode)."""
-        return self._functions[0](theta)
-
-    def jacobian(self, theta: FloatArray) -> FloatArray:
-        """Derivatives of the residuals, (rows, parameters)."""
-        return self._functions[1](theta)
-
     def reweighted(self, theta: FloatArray) -> Comparison:
         """The same with errors at the amplitudes predicted by θ, where these are near the measured ones."""
         size = trusted(self.predict(theta)[0], self.measured)
@@ -350,8 +336,11 @@ class Comparison:
                 frequencies[i] = (omega, *dz / (2 * omega))
         return amplitudes, frequencies
 
-    def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals and their derivatives."""
+    def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(Predicted − measured) over the errors, and derivatives (rows, parameters).
+
+        NaN where the model has no answer (resonance, no mode).
+        """
         try:
             with np.errstate(all="ignore"):
                 gap, frequency = self._answers(theta)

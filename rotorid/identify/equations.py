@@ -4,7 +4,7 @@ Left minus right over the common denominator is a polynomial with exact coeffici
 term stays, as negative exponents, so that 1/p**2 or 1/k needs no multiplying out; one of several terms is
 multiplied out but for powers that all of them share, scaled so that its lowest term has the coefficient 1.
 A fractional power of a parameter, such as sqrt(k), has a fraction as its exponent: one more unknown of the
-regression, and k ≥ 0.
+regression, and k ≥ 0. Any other function of parameters, such as exp(-a), is a parameter of that name.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def harmonic_model(
     known
         Numbers by name.
     estimate
-        Names of the parameters to be estimated; they may have fractional powers, such as sqrt(k).
+        Names of the parameters to be estimated; they may have fractional powers, such as sqrt(k). Another
+        function of them, such as exp(-a), is estimated as a parameter of that name, and what stands in it
+        is not solved for.
     inputs
         Signals that excite. Default: those that stand only on right sides.
     varying
@@ -101,7 +103,9 @@ def harmonic_model(
     used = {f.signal for f in features}
     signals = tuple(dict.fromkeys(n for text in texts for n in NAME.findall(text) if n in used))
     occurs = {name for f in features for m in f.exact for name, _ in m}
-    for name in (name for name in estimate if name not in occurs):
+    functions = sorted(occurs - {*estimate})
+    inside = {name for words in functions for name in NAME.findall(words)}
+    for name in (name for name in estimate if name not in occurs | inside):
         if name in left | right:
             raise ValueError(
                 f"the parameter {name} cancels out of the equations: nothing can be said about it"
@@ -109,6 +113,7 @@ def harmonic_model(
         near = difflib.get_close_matches(name, others, 1, 0.5)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
+    parameters = (*(name for name in estimate if name in occurs), *functions)
     chosen = tuple(inputs) if inputs is not None else tuple(n for n in signals if n not in left)
     if strange := [name for name in chosen if name not in signals]:
         raise ValueError(
@@ -118,7 +123,7 @@ def harmonic_model(
     if not outputs:
         raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
     ordered = tuple(name for name in others if name in changing)
-    model = HarmonicModel(texts, tuple(estimate), numbers, signals, chosen, outputs, tuple(features), ordered)
+    model = HarmonicModel(texts, parameters, numbers, signals, chosen, outputs, tuple(features), ordered)
     _check_independent(model)
     return model
 
@@ -142,17 +147,17 @@ def multiplied_out(
         return plain and not alone and all(s.name in known for s in part.free_symbols)
 
     whole = expression.replace(of_known, lambda part: _number(part, known))
+    whole = _functions_as_unknowns(whole, {*known, *estimate})
     powers, roots = [e for e in whole.atoms(Pow) if e.exp.is_Rational], dict[str, int]()
     for name in estimate:
         x = Symbol(name)
         if (root := math.lcm(1, *(int(e.exp.q) for e in powers if e.base.has(x)))) > 1:
             inner = Dummy(name, positive=True)
             roots[name], whole = root, whole.subs(x, inner**root)
-    odd = [e for e in whole.atoms(Function, Pow) if not (e.is_Pow and e.exp.is_Integer)]
-    if odd:
+    if odd := [e for e in whole.atoms(Function, Pow) if not (e.is_Pow and e.exp.is_Integer)]:
         raise ValueError(
             f"'{min(odd, key=str)}' is neither a polynomial nor a fraction of polynomials in p and the "
-            "parameters; give such a term a name and estimate that"
+            "signals, nor a function of parameters"
         )
     top, bottom = fraction(together(whole))
     factors = bottom.as_powers_dict().items()
@@ -179,6 +184,24 @@ def multiplied_out(
     scale = below[min(below, key=lambda m: (degree(m), m))]
     left = frozenset(n for m in below for n, _ in times(m, shift))
     return {times(m, shift): x / scale for m, x in terms(top).items()}, left
+
+
+def _functions_as_unknowns(whole: Expression, names: set[str]) -> Expression:
+    """Functions of these names as symbols of their text, but for fractional powers of products."""
+    from sympy import Symbol
+
+    inside = set(names)
+
+    def function(part: Expression) -> bool:
+        power = part.is_Pow and not part.exp.is_Integer
+        plain = power and part.exp.is_Rational and not part.base.is_Add
+        return (part.is_Function or (power and not plain)) and {s.name for s in part.free_symbols} <= inside
+
+    def as_unknown(part: Expression) -> Expression:
+        inside.add(str(part))  # which may stand in another
+        return Symbol(str(part))
+
+    return whole.replace(function, as_unknown)
 
 
 def _number(part: Expression, known: Mapping[str, Fraction]) -> Expression:

@@ -34,6 +34,7 @@ from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_le
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
 from rotorid.regression.robust import LOSSES
+from rotorid.regression.search import together
 from rotorid.regression.undetermined_combinations import FoundCombination
 
 REWEIGHTINGS, MOVED = 2, 0.01
@@ -175,12 +176,13 @@ def output_error(
 ) -> OutputError:
     """Fit predicted to measured amplitudes from a start (n,); ValueError as of `compare`."""
     comparison, point, stated = compare(model, experiments), begin, experiments.stated
-    known = prior_rows(model.parameters, prior or {}, ridge, begin, comparison.jacobian)
+    known = prior_rows(
+        model.parameters, prior or {}, ridge, begin, lambda theta: comparison.residuals(theta)[1]
+    )
     iterations, moved = 0, np.inf
     for left in reversed(range(REWEIGHTINGS + 1)):
         fit = nonlinear_least_squares(
-            comparison.residual,
-            comparison.jacobian,
+            *together(comparison.residuals),
             point,
             names=model.parameters,
             sigma_stated=stated,
@@ -198,7 +200,7 @@ def output_error(
         if not left or not fit.converged or moved < MOVED or same:
             break
         comparison = comparison.reweighted(point)
-    J = comparison.jacobian(point)
+    J = comparison.residuals(point)[1]
     did = effect(known, J, fit.estimate.residuals, point, stated=stated, at_bounds=fit.at_bounds)
     estimate = did.apart(fit.estimate, stated=stated) if did else fit.estimate
     message = f"converged in {counted(iterations, 'iteration')}" if fit.converged else fit.message
@@ -254,7 +256,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
         converged=converged,
         warnings=tuple(warnings),
         notes=(fit.message,),
-        normal_matrix=normal_matrix(model.parameters, comparison.jacobian(theta)),
+        normal_matrix=normal_matrix(model.parameters, comparison.residuals(theta)[1]),
         prior=prior,
     )
 
@@ -326,6 +328,11 @@ def _finished(answer: Identification, bounds: Bounds) -> Identification:
         words.append(
             "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
         )
+    words += [
+        f"{name} is estimated as one unknown: what stands in it is not solved for from it"
+        for name in model.parameters
+        if not name.isidentifier()
+    ]
     if answer.linear and answer.solutions and not answer.linear.recovery.solutions:
         words.append("the parameters were found by a search; there may be more solutions than shown")
     words += answer.warnings
