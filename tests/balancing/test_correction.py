@@ -126,7 +126,7 @@ def two_planes(ratio, seed=0):
 @pytest.mark.parametrize("ratio", [1.0, 0.6 + 0.5j])
 def test_what_two_planes_do_together_is_determined_and_told_first(ratio):
     told, inside = 0, 0
-    for seed in range(40):
+    for seed in range(50):
         trials, D = two_planes(ratio, seed)
         c = correct(estimate_influence(trials), refuse=False)
         if not c.combination:

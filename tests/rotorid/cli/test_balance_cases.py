@@ -136,7 +136,7 @@ def test_a_trim_that_cannot_be_one_of_pieces_says_why(cli):
     job = JOBS / "two_checks/job.toml"
     for options in ([], ["--split"]):
         said = first(cli("balance", job, *options))
-        assert "Trim: add 0.3644 g at 51.4° in plane 'L'" in said
+        assert "Trim: add 0.364 g at 51.4° in plane 'L'" in said
         assert "not as pieces: the holes in which weights of run 'check 2' stand are not named" in said
 
 
