@@ -25,8 +25,8 @@ from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, several
-from rotorid.identify.operator_model import HarmonicModel, passive_elements
+from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, passive_elements, several
+from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
