@@ -179,7 +179,7 @@ class HarmonicModel:
         table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
         for j, name in enumerate(self.inputs):
             table[:, j] = inputs[name]
-        amplitudes = self.forced(values, frequencies, table, varying)[0]
+        amplitudes = self.forced(values, frequencies, table, varying=varying)[0]
         return dict(zip(self.outputs, amplitudes.T, strict=True))
 
     def forced(
