@@ -319,9 +319,10 @@ class Comparison:
         data, varying, forced = self.experiments, self.experiments.varying, self.forced
         amplitudes = np.full((*self.measured.shape, 1 + len(theta)), np.nan, dtype=complex)
         frequencies = np.full(amplitudes[:, 0].shape, np.nan)
-        inputs, rows = data.table(self.model.inputs)[forced], {n: v[forced] for n, v in varying.items()}
-        Z, dZ = self.model.forced(theta, data.frequencies[forced], inputs, rows)
-        amplitudes[forced] = np.concatenate((Z[..., None], dZ), axis=-1)
+        if len(forced):
+            inputs, rows = data.table(self.model.inputs)[forced], {n: v[forced] for n, v in varying.items()}
+            Z, dZ = self.model.forced(theta, data.frequencies[forced], inputs, varying=rows)
+            amplitudes[forced] = np.concatenate((Z[..., None], dZ), axis=-1)
         for k, i in enumerate(self.free):
             if not k or varying:
                 A, dA = self.model.dynamic_stiffness(theta, {n: v[[i]] for n, v in varying.items()})

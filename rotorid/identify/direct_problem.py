@@ -39,8 +39,8 @@ def forced_vibration(
     for w in np.array(frequencies, dtype=float):
         try:
             with np.errstate(all="ignore"):
-                Z = model.forced(theta, np.array([w]), inputs, varying)[0][0]
-                off = model.forced(other, np.array([w * (1 + DUST)]), inputs, varying)[0][0] - Z
+                Z = model.forced(theta, np.array([w]), inputs, varying=varying)[0][0]
+                off = model.forced(other, np.array([w * (1 + DUST)]), inputs, varying=varying)[0][0] - Z
         except np.linalg.LinAlgError:
             off = Z = np.full(len(model.outputs), np.nan)
         if not np.abs(off).max() <= CHANGE * np.abs(Z).max():

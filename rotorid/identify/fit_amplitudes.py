@@ -25,8 +25,8 @@ from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, several
-from rotorid.identify.operator_model import HarmonicModel, passive_elements
+from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, passive_elements, several
+from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
@@ -46,8 +46,8 @@ WITHIN = 1e-6
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
 KINDS = ("spring", "damper", "mass")
-OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None]
-"""A fit, the comparison with the last weights, and what a prior did."""
+OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
+"""A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
 
 
 def identify(
@@ -145,14 +145,14 @@ def _identified(
         raise problem
     solutions = linear.recovery.solutions if linear else ()
     if predicts:
-        compare(model, data)  # which refuses readings that cannot be compared
+        comparison = compare(model, data)
         given = np.array([start.get(name, np.nan) for name in model.parameters])
         whole = bool(np.isfinite(given).all())
         ends = solutions[: 0 if whole and how["ridge"] else MOST_STARTS]
         begins = [given] * whole + [end if whole else np.where(np.isnan(given), end, given) for end in ends]
         for begin in begins or starting_values(model, data, start):
             try:
-                fits.append(output_error(model, data, begin, **how))
+                fits.append(output_error(comparison, begin, **how))
             except ValueError as error:  # one of several starts may have no answer
                 problem = error
         good = any(fit.converged and fit.estimate.full_rank for fit, *_ in fits)
@@ -165,8 +165,7 @@ def _identified(
 
 
 def output_error(
-    model: HarmonicModel,
-    experiments: Experiments,
+    comparison: Comparison,
     begin: FloatArray,
     *,
     bounds: Bounds | None = None,
@@ -174,18 +173,18 @@ def output_error(
     prior: Known | None = None,
     ridge: float = 0.0,
 ) -> OutputError:
-    """Fit predicted to measured amplitudes from a start (n,); ValueError as of `compare`."""
-    comparison, point, stated = compare(model, experiments), begin, experiments.stated
-    known = prior_rows(
-        model.parameters, prior or {}, ridge, begin, lambda theta: comparison.residuals(theta)[1]
-    )
+    """Fit predicted to measured amplitudes from a start (n,)."""
+    names, data, point = comparison.model.parameters, comparison.experiments, begin
+    residual, jacobian = together(comparison.residuals)
+    known = prior_rows(names, prior or {}, ridge, begin, jacobian)
     iterations, moved = 0, np.inf
     for left in reversed(range(REWEIGHTINGS + 1)):
         fit = nonlinear_least_squares(
-            *together(comparison.residuals),
+            residual,
+            jacobian,
             point,
-            names=model.parameters,
-            sigma_stated=stated,
+            names=names,
+            sigma_stated=data.stated,
             bounds=bounds or None,
             loss=loss,
             near=left < REWEIGHTINGS,
@@ -196,15 +195,16 @@ def output_error(
         if left < REWEIGHTINGS and (std > 0).any():
             moved = float((np.abs(fit.estimate.solution - point)[std > 0] / std[std > 0]).max())
         point = fit.estimate.solution
-        same = {*model.outputs} <= {*experiments.covariances}  # errors that no prediction changes
+        same = {*comparison.model.outputs} <= {*data.covariances}  # errors that no prediction changes
         if not left or not fit.converged or moved < MOVED or same:
             break
         comparison = comparison.reweighted(point)
-    J = comparison.residuals(point)[1]
-    did = effect(known, J, fit.estimate.residuals, point, stated=stated, at_bounds=fit.at_bounds)
-    estimate = did.apart(fit.estimate, stated=stated) if did else fit.estimate
+        residual, jacobian = together(comparison.residuals)
+    J = jacobian(point)
+    did = effect(known, J, fit.estimate.residuals, point, stated=data.stated, at_bounds=fit.at_bounds)
+    estimate = did.apart(fit.estimate, stated=data.stated) if did else fit.estimate
     message = f"converged in {counted(iterations, 'iteration')}" if fit.converged else fit.message
-    return replace(fit, estimate=estimate, message=message), comparison, did
+    return replace(fit, estimate=estimate, message=message), comparison, did, J
 
 
 def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, whole: bool) -> Identification:
@@ -219,7 +219,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
         near = any(np.allclose(here, other[0].estimate.solution, rtol=SAME, atol=0) for other in chosen)
         if one[0].estimate.full_rank and not near:
             chosen.append(one)
-    fit, comparison, prior = chosen[0]
+    fit, comparison, prior, J = chosen[0]
     model, data, converged = comparison.model, comparison.experiments, fit.converged
     estimate, theta, points = fit.estimate, fit.estimate.solution, [one.values for one, *_ in chosen]
     apart = several(points) & ~np.isnan(points).any(axis=0)
@@ -256,7 +256,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
         converged=converged,
         warnings=tuple(warnings),
         notes=(fit.message,),
-        normal_matrix=normal_matrix(model.parameters, comparison.residuals(theta)[1]),
+        normal_matrix=normal_matrix(model.parameters, J),
         prior=prior,
     )
 

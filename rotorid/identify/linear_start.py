@@ -421,3 +421,25 @@ def _misfit(system: System, theta: FloatArray) -> float:
     std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
     error = np.abs(system.combinations(theta)[0] - system.values)
     return float(np.nan_to_num(error / (1e-6 * size + 4 * std), nan=np.inf).max())
+
+
+def passive_elements(model: HarmonicModel) -> dict[str, int]:
+    """Parameters that stand as a mass (2), damper (1) or spring (0): the power of p.
+
+    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite.
+    """
+    e, kinds_of = len(model.equations), dict[str, int]()
+    for j, name in enumerate(model.parameters if len(model.outputs) == e else ()):
+        (m, *others) = np.flatnonzero(model.exponents[:, j])
+        used = np.flatnonzero(model.coefficients[:, m])
+        kinds = {*model.power[used].tolist()}
+        alone = not others and np.abs(model.exponents[m]).sum() == model.exponents[m, j] == 1
+        if not alone or len(kinds) > 1 or not kinds <= {0, 1, 2}:
+            continue
+        S = np.zeros((e, len(model.signals) + 1))
+        S[model.equation[used], model.column[used]] = model.coefficients[used, m]
+        S = S[:, :e]
+        passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
+        if passive and not any(model.features[f].varying for f in used):
+            (kinds_of[name],) = kinds
+    return kinds_of

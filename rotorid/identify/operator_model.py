@@ -28,10 +28,6 @@ from rotorid.identify.combinations import (
     monomials_of,
 )
 
-POWERS_OF_I = np.array([1, 1j, -1, -1j])
-MAC_SLACK = 0.02
-"""Modes whose MAC is this near to the best count as equally like; the nearest frequency decides."""
-
 
 @dataclass(frozen=True, eq=False)
 class HarmonicModel:
@@ -112,9 +108,10 @@ class HarmonicModel:
 
     @cached_property
     def _place(self) -> FloatArray:
-        """Where the features stand in the equations, (f, equations · (1 + signals))."""
-        columns = 1 + len(self.signals)
-        return np.asarray(np.eye(len(self.equations) * columns)[self.equation * columns + self.column])
+        """Where the features stand in the equations, (f, equations, 1 + signals)."""
+        place = np.zeros((len(self.features), len(self.equations), 1 + len(self.signals)))
+        place[np.arange(len(place)), self.equation, self.column] = 1.0
+        return place
 
     def multipliers(
         self, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
@@ -124,20 +121,18 @@ class HarmonicModel:
         if (k < 0).any() and (w == 0).any():
             raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
         # exact powers of i, so that a real row has no imaginary dust
-        factors = w[:, None] ** k * POWERS_OF_I[k % 4]
-        for j, feature in enumerate(self.features):
-            for name, exponent in feature.varying:
-                if name not in rows:
-                    raise ValueError(
-                        f"{name} stands as a factor in the equations and is neither known nor estimated: "
-                        f"the measurements must have its value in every row (a column {name})"
-                    )
-                if exponent < 0 and (rows[name] == 0).any():
-                    raise ValueError(
-                        f"an equation divides by {name}, which is 0 in a row of the measurements"
-                    )
-                factors[:, j] *= rows[name] ** float(exponent)
-        return np.asarray(factors)
+        factors = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
+        every = [(j, *part) for j, feature in enumerate(self.features) for part in feature.varying]
+        for j, name, exponent in every:
+            if name not in rows:
+                raise ValueError(
+                    f"{name} stands as a factor in the equations and is neither known nor estimated: "
+                    f"the measurements must have its value in every row (a column {name})"
+                )
+            if exponent < 0 and not np.all(rows[name]):
+                raise ValueError(f"an equation divides by {name}, which is 0 in a row of the measurements")
+            factors[:, j] *= rows[name] ** float(exponent)
+        return np.asarray(factors, dtype=complex)
 
     def polynomials(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values (f,) and derivatives (f, n) of the features' coefficients at parameters (n,)."""
@@ -159,7 +154,7 @@ class HarmonicModel:
             Known quantities (n,) that change from row to row, by name.
         """
         terms = self.multipliers(frequencies, varying) * self.polynomials(values)[0]
-        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
+        return np.asarray(np.tensordot(terms, self._place, 1))
 
     def predict(
         self,
@@ -179,7 +174,7 @@ class HarmonicModel:
         table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
         for j, name in enumerate(self.inputs):
             table[:, j] = inputs[name]
-        amplitudes = self.forced(values, frequencies, table, varying)[0]
+        amplitudes, _ = self.forced(values, frequencies, table, False, varying)
         return dict(zip(self.outputs, amplitudes.T, strict=True))
 
     def forced(
@@ -187,9 +182,10 @@ class HarmonicModel:
         values: FloatArray,
         frequencies: FloatArray,
         inputs: ComplexArray,
+        slopes: bool = True,
         varying: Mapping[str, FloatArray] | None = None,
     ) -> tuple[ComplexArray, ComplexArray]:
-        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters).
+        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters), if asked for.
 
         Parameters
         ----------
@@ -199,6 +195,8 @@ class HarmonicModel:
             ω, shape (n,).
         inputs
             Amplitudes of the inputs, (n, inputs).
+        slopes
+            False: without derivatives (an empty array).
         varying
             Known quantities (n,) that change from row to row, by name.
 
@@ -207,16 +205,18 @@ class HarmonicModel:
         numpy.linalg.LinAlgError
             At a resonance without damping.
         """
-        n, e = len(frequencies), len(self.outputs)
+        e, (P, dP) = len(self.outputs), self.polynomials(values)
         multipliers = self.multipliers(frequencies, varying)
-        P, dP = self.polynomials(values)
-        whole = (multipliers * P @ self._place).reshape(n, e, 1 + len(self.signals))
-        given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
+        whole = np.tensordot(multipliers * P, self._place, 1)
+        given = np.column_stack((inputs, np.ones(len(multipliers))))
         A = whole[:, :, :e]
         Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
-        load = multipliers * np.concatenate((Z, given), axis=1)[:, self.column]
-        G = [load[:, self.equation == i] @ dP[self.equation == i] for i in range(e)]
-        return Z, np.asarray(np.linalg.solve(A, -np.stack(G, axis=1)))
+        if not slopes:
+            return Z, np.zeros((*Z.shape, 0), dtype=complex)
+        load = multipliers * np.column_stack((Z, given))[:, self.column]
+        rows = [self.equation == i for i in range(e)]
+        G = -np.stack([load[:, f] @ dP[f] for f in rows], axis=1)
+        return Z, np.asarray(np.linalg.solve(A, G))
 
     def dynamic_stiffness(
         self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None
@@ -227,16 +227,15 @@ class HarmonicModel:
         quantities (1,) have the values of one row.
         """
         P, dP = self.polynomials(values)
-        row = np.real(self.multipliers(np.ones(1), varying)[0] / POWERS_OF_I[self.power % 4])
-        e = len(self.outputs)
-        use = np.flatnonzero((self.column < e) & (self.power % 2 == 0))
+        use = (self.column < len(self.outputs)) & (self.power % 2 == 0)
         # multiplied by p^−lowest: a compliance form written with 1/p² would have no polynomial
         k = (self.power[use] - min(self.power[use], default=0)) // 2
-        shape = max(k, default=0) + 1, e, e
-        A, dA = np.zeros(shape), np.zeros((*shape, len(values)))
-        at, sign = (k, self.equation[use], self.column[use]), (-1.0) ** k * row[use]
-        np.add.at(A, at, sign * P[use])
-        np.add.at(dA, at, sign[:, None] * dP[use])
+        row = self.multipliers(np.ones(1), varying)[0, use].real  # with the signs of p^k
+        A = np.zeros((max(k, default=0) + 1, len(self.outputs), len(self.outputs)))
+        dA = np.zeros((*A.shape, len(values)))
+        at = (k, self.equation[use], self.column[use])
+        np.add.at(A, at, row * P[use])
+        np.add.at(dA, at, row[:, None] * dP[use])
         return A, dA
 
     def check_square(self) -> None:
@@ -253,12 +252,10 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
     """Products Π θ^e (m,) of exponents (m, n), and their derivatives (m, n) by θ."""
     theta = np.asarray(values, dtype=float)
     products = np.prod(theta**exponents, axis=1)
-    slopes = products[:, None] * exponents / np.where(theta == 0, 1.0, theta)
-    for j in np.flatnonzero(theta == 0):
-        used = np.flatnonzero(exponents[:, j])
-        lower = exponents[used] - np.eye(len(theta))[j]
-        slopes[used, j] = exponents[used, j] * np.prod(theta**lower, axis=1)
-    return products, slopes
+    if theta.all():
+        return products, products[:, None] * exponents / theta
+    each = [exponents - np.outer(exponents[:, j] != 0, unit) for j, unit in enumerate(np.eye(len(theta)))]
+    return products, exponents * np.prod(theta ** np.array(each), axis=-1).T
 
 
 def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
@@ -266,14 +263,17 @@ def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     from scipy.linalg import eig
 
     degree, e = len(A) - 1, A.shape[1]
-    # companion form L y = z R y with y = (v, z v, …)
-    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
-    if not degree:
+    if degree < 1:
         return np.zeros(0, dtype=complex), np.zeros((e, 0), dtype=complex)
-    L[-e:], R[-e:, -e:] = -np.hstack([*A[:-1]]), A[-1]
+    # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
+    first, last = np.abs(A[[0, -1]]).max(axis=(1, 2))
+    unit = float(first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
+    scaled = A * unit ** np.arange(degree + 1)[:, None, None]
+    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
+    L[-e:], R[-e:, -e:] = -np.hstack([*scaled[:-1]]), scaled[-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        z, vectors = eig(L, R)
-    return np.asarray(z), np.asarray(vectors)
+        z, y = eig(L, R)
+    return np.asarray(z * unit), np.asarray(y)
 
 
 def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -302,14 +302,15 @@ def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
 def nearest_mode(
     z: FloatArray, v: FloatArray, frequency: float, shape: FloatArray
 ) -> tuple[float, FloatArray] | None:
-    """The mode most like a measured shape (NaN: not measured) by MAC; among equals the nearest frequency."""
+    """The mode most like a measured shape (NaN: not measured) by MAC; within 0.02 the nearest frequency."""
     if not len(z):
         return None
     seen = ~np.isnan(shape)
-    size = np.linalg.norm(v[seen], axis=0) * np.linalg.norm(shape[seen])
-    mac = np.divide(shape[seen] @ v[seen], size, out=np.zeros_like(z), where=size > 0) ** 2
+    u, w = shape[seen], v[seen]
+    size = (w * w).sum(axis=0) * float(u @ u)
+    mac = np.divide((u @ w) ** 2, size, out=np.zeros_like(z), where=size > 0)
     away = np.abs(np.log(np.sqrt(z) / frequency))
-    best = int(np.argmin(np.where(mac >= mac.max() - MAC_SLACK, away, np.inf)))
+    best = int(np.argmin(np.where(mac >= mac.max() - 0.02, away, np.inf)))
     return float(z[best]), np.asarray(v[:, best])
 
 
@@ -321,13 +322,15 @@ def mode_slopes(
     A and dA as of `dynamic_stiffness`, z and the shape v (e,) of a mode.
     """
     k, e = np.arange(len(A)), len(v)
-    bordered, right = np.zeros((e + 1, e + 1)), np.zeros((e + 1, dA.shape[-1]))
+    slope = np.tensordot(k[1:] * z ** k[:-1], A[1:], axes=1)
+    force = -np.einsum("k,keon,o->en", z**k, dA, v)
+    bordered = np.zeros((e + 1, e + 1))
     bordered[:e, :e] = np.tensordot(z**k, A, axes=1)
-    bordered[:e, e] = np.tensordot(k * z**k, A, axes=1) @ v  # unknown: relative change of z, of others' size
-    right[:e] = -np.einsum("k,keon,o->en", z**k, dA, v)
-    size = np.abs(bordered).max()
-    bordered[e, reference] = size
-    solved = np.linalg.solve(bordered / size, right / size)
+    bordered[:e, e] = slope @ v * z  # unknown: relative change of z, of the size of the others
+    bordered[e, reference] = 1.0
+    rows = np.abs(bordered).max(axis=1, keepdims=True)
+    rows[rows == 0] = 1.0
+    solved = np.linalg.solve(bordered / rows, np.vstack((force, np.zeros(force.shape[1]))) / rows)
     return solved[e] * z, solved[:e]
 
 
@@ -335,25 +338,3 @@ def reference_amplitude(shape: FloatArray) -> int:
     """The first measured amplitude that is no node of the mode."""
     size = np.nan_to_num(np.abs(shape))
     return int(np.flatnonzero(size >= 0.1 * size.max())[0])
-
-
-def passive_elements(model: HarmonicModel) -> dict[str, int]:
-    """Parameters that stand as a mass (2), damper (1) or spring (0): the power of p.
-
-    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite.
-    """
-    e, kinds_of = len(model.equations), dict[str, int]()
-    for j, name in enumerate(model.parameters if len(model.outputs) == e else ()):
-        (m, *others) = np.flatnonzero(model.exponents[:, j])
-        used = np.flatnonzero(model.coefficients[:, m])
-        kinds = {*model.power[used].tolist()}
-        alone = not others and np.abs(model.exponents[m]).sum() == model.exponents[m, j] == 1
-        if not alone or len(kinds) > 1 or not kinds <= {0, 1, 2}:
-            continue
-        S = np.zeros((e, len(model.signals) + 1))
-        S[model.equation[used], model.column[used]] = model.coefficients[used, m]
-        S = S[:, :e]
-        passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
-        if passive and not any(model.features[f].varying for f in used):
-            (kinds_of[name],) = kinds
-    return kinds_of

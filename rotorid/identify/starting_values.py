@@ -14,7 +14,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.combinations import CONSTANT
-from rotorid.identify.operator_model import HarmonicModel, passive_elements
+from rotorid.identify.linear_start import passive_elements
+from rotorid.identify.operator_model import HarmonicModel
 from rotorid.regression.search import search_from
 
 SEARCHES, AGAIN, BEST = 60, 6, 3

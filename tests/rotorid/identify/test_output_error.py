@@ -18,7 +18,7 @@ from rotorid.identify.fit_amplitudes import output_error as fit_from
 
 def output_error(model, data, start, bounds=None, loss="linear"):
     """The fit from one start."""
-    fit, comparison, _ = fit_from(model, data, np.array(start), bounds=bounds, loss=loss)
+    fit, comparison, *_ = fit_from(compare(model, data), np.array(start), bounds=bounds, loss=loss)
     return SimpleNamespace(fit=fit, comparison=comparison)
 
 

@@ -8,7 +8,7 @@ from repetitions import FULL
 
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.identify.operator_model import passive_elements
+from rotorid.identify.linear_start import passive_elements
 
 TWO = ["(m1*p**2 + b1*p)*X1 + k1*X1 + k2*(X1 - X2) = F", "(m2*p**2 + b2*p)*X2 + k2*(X2 - X1) = 0"]
 ONE = ["(m*p**2 + b*p + k)*X1 = F"]
