@@ -17,14 +17,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.arrays import FloatArray
 from rotorid.identify.ode import OdeModel
 
 SAME_STEP = 4e-15
 """Steps that differ by less than this share of the largest time are one step (rounded times)."""
 BATCH = 2**22
 """Numbers in one batch of matrix exponentials."""
-At = TypeVar("At", int, float)
+At = TypeVar("At", float, FloatArray)
 HEUN: dict[str, Callable[[int], list[list[int]]]] = {
     "heun": lambda n: [list(range(n))],
     "sequential-heun": lambda n: [[i] for i in range(n)],
@@ -49,9 +49,7 @@ class System:
         self, model: OdeModel, theta: FloatArray, t: FloatArray, u: FloatArray, sensitivities: bool
     ) -> None:
         self.model, self.theta, self.t, self.u = model, theta, t, u
-        self.nx = len(model.states)
-        self.np = len(theta) if sensitivities else 0
-        self._none = np.zeros(0)
+        self.nx, self.np = len(model.states), len(theta) if sensitivities else 0
         table = model.x0(theta)[:, : 1 + self.np]
         self.first = np.concatenate([table[:, 0], table[:, 1:].reshape(-1)])
         """States and sensitivities at the first time."""
@@ -60,28 +58,19 @@ class System:
 
     def inputs(self, time: float) -> FloatArray:
         """Inputs at a time, (n_u,)."""
-        if not self.model.inputs:
-            return self._none
-        i = min(max(int(np.searchsorted(self.t, time, side="right")) - 1, 0), len(self.t) - 2)
-        part = (time - self.t[i]) / (self.t[i + 1] - self.t[i])
-        return np.asarray((1 - part) * self.u[i] + part * self.u[i + 1])
+        return np.array([np.interp(time, self.t, column) for column in self.u.T])
 
     def __call__(self, time: float, z: FloatArray) -> FloatArray:
         """Rates, (size,)."""
-        rates = self.model.augmented if self.np else self.model.rate
-        return rates(time, z, self.theta, self.inputs(time))
+        return self.model.augmented(time, z, self.theta, self.inputs(time))
 
     def jacobian(self, time: float, z: FloatArray) -> FloatArray:
         """Derivatives of the rates without those of f_x and f_θ themselves (good enough for Newton steps)."""
-        f_x = self.model.f(time, z[: self.nx], self.theta, self.inputs(time))[:, 1 : 1 + self.nx]
+        n = self.nx
+        f_x = self.model.f(time, z[:n], self.theta, self.inputs(time))[:, 1 : 1 + n]
         out = np.zeros((len(z), len(z)))
-        out[: self.nx, : self.nx] = f_x
-        out[self.nx :, self.nx :] = np.kron(f_x, np.eye(self.np))
+        out[:n, :n], out[n:, n:] = f_x, np.kron(f_x, np.eye(self.np))
         return out
-
-    def rows(self, states: Sequence[int]) -> list[int]:
-        """Where these states and their rows of S stand."""
-        return [*states, *(self.nx + i * self.np + k for i in states for k in range(self.np))]
 
 
 def exact(system: System) -> FloatArray:
@@ -92,30 +81,33 @@ def exact(system: System) -> FloatArray:
             "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
             "or auto"
         )
-    nu = system.u.shape[1] if model.driven else 0
-    u = system.u[:, :nu]
+    u = system.u[:, : system.u.shape[1] * model.driven]
+    nu = u.shape[1]
     matrix = np.zeros((1 + k, n + 1 + 2 * nu, n + 1 + 2 * nu))
     matrix[:, :n, : n + 1 + nu] = model.matrices(system.theta)[: 1 + k, :, : n + 1 + nu]
     matrix[0, n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
+    moving = np.flatnonzero(matrix[1:].any(axis=(1, 2)))  # others act by the initial values alone
     steps = np.diff(t)
-    drive = np.column_stack([np.ones(len(t) - 1), u[:-1], np.diff(u, axis=0) / steps[:, None]])[..., None]
+    w = np.column_stack([np.ones(len(t) - 1), u[:-1], np.diff(u, axis=0) / steps[:, None]])[..., None]
     x, s = np.empty((len(t), n, 1)), np.empty((len(t), n, k))
     x[0, :, 0], s[0] = system.first[:n], system.first[n:].reshape(n, k)
-    moving = np.flatnonzero(matrix[1:].any(axis=(1, 2)))  # others act by the initial values alone
-    kinds, which = _distinct(steps, SAME_STEP * float(np.abs(t).max()))
+    # of steps that differ by rounding the mean is taken: an error of one would add up over the record
+    kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
+    _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
+    lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
     size = max(1, BATCH // ((1 + k) * matrix[0].size))
     for low in range(0, len(steps), size):
-        part, w = slice(low + 1, low + 1 + size), drive[low : low + size]
-        used, place = np.unique(which[low : low + size], return_inverse=True)
-        h = kinds[used][:, None, None]
+        high = min(low + size, len(steps))
+        used, place = np.unique(which[low:high], return_inverse=True)
+        h = lengths[used][:, None, None]
         P, D = expm_and_derivatives(h * matrix[0], h[:, None] * matrix[1 + moving])
         if len(h) > 1:
             P, D = P[place], D[place]
-        x[part] = recurrence(P[:, :n, :n], x[low], P[:, :n, n:] @ w)
-        z = np.concatenate([x[low : low + len(w)], w], axis=1)
-        bend = np.zeros((len(w), n, k))
+        x[low + 1 : high + 1] = recurrence(P[:, :n, :n], x[low], P[:, :n, n:] @ w[low:high])
+        z = np.concatenate([x[low:high], w[low:high]], axis=1)
+        bend = np.zeros((high - low, n, k))
         bend[:, :, moving] = (D[:, :, :n] @ z[:, None])[..., 0].swapaxes(1, 2)
-        s[part] = recurrence(P[:, :n, :n], s[low], bend)
+        s[low + 1 : high + 1] = recurrence(P[:, :n, :n], s[low], bend)
     return np.concatenate([x[:, :, 0], s.reshape(len(t), -1)], axis=1)
 
 
@@ -136,19 +128,17 @@ def expm_and_derivatives(matrix: FloatArray, direction: FloatArray) -> tuple[Flo
     """
     from scipy.linalg import expm
 
-    n = matrix.shape[-1]
-    A = matrix[..., None, :, :]
+    if not np.isfinite(direction).all() or not np.isfinite(matrix).all():
+        return np.full_like(matrix, np.nan), np.full_like(direction, np.nan)
+    if not direction.size:
+        return expm(matrix), direction
+    n, A = matrix.shape[-1], matrix[..., None, :, :]
     # E as large as A: a larger one would cost digits of e^A
-    size = np.linalg.norm(direction, axis=(-2, -1), keepdims=True)
-    scale = np.linalg.norm(A, axis=(-2, -1), keepdims=True) / np.where(size > 0, size, 1.0)
-    scale = np.where(scale > 0, scale, 1.0)
+    sizes = [np.linalg.norm(part, axis=(-2, -1), keepdims=True) for part in (A, direction)]
+    scale = np.where(sizes[0] * sizes[1] > 0, sizes[0] / np.maximum(sizes[1], 1e-300), 1.0)
     blocks = np.zeros((*direction.shape[:-2], 2 * n, 2 * n))
     blocks[..., :n, :n] = blocks[..., n:, n:] = A
     blocks[..., :n, n:] = scale * direction
-    if not np.isfinite(blocks).all() or not np.isfinite(matrix).all():
-        return np.full_like(matrix, np.nan), np.full_like(direction, np.nan)
-    if not blocks.size:
-        return expm(matrix), direction
     whole = expm(blocks)
     return whole[..., 0, :n, :n], whole[..., :n, n:] / scale
 
@@ -169,23 +159,12 @@ def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray
     return y
 
 
-def _distinct(steps: FloatArray, tolerance: float) -> tuple[FloatArray, IndexArray]:
-    """Steps that differ by more than the tolerance, and which of them each step is.
-
-    Of those that differ by rounding it is their mean: an error of one would add up over the record.
-    """
-    kinds = np.round((steps - steps[:1]) / tolerance)
-    _, first, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
-    one = steps[first]
-    return one + np.bincount(which, steps - one[which]) / count, which
-
-
 def heun_step(
     rate: Callable[[At, FloatArray], FloatArray],
     now: At,
     then: At,
     z: FloatArray,
-    h: float,
+    h: At,
     parts: Sequence[Sequence[int]],
 ) -> FloatArray:
     """Predict, then correct part by part: a part takes those before it as corrected, the rest as predicted.
@@ -193,34 +172,44 @@ def heun_step(
     Parameters
     ----------
     rate
-        Of the states (n, …), at `now` and at `then`: times, or numbers of samples.
+        Of the states (..., n, k), at `now` and at `then`: times, or whatever it takes for them.
     z, h
         States now, and the length of the step.
     parts
-        Of the rows of z.
+        Of the n rows of z.
     """
     k = rate(now, z)
     new: FloatArray = z + h * k
     for part in parts:
-        new[part] = (z + h / 2 * (k + rate(then, new)))[part]
+        new[..., part, :] = (z + h / 2 * (k + rate(then, new)))[..., part, :]
     return new
 
 
 def stepwise(system: System, name: str) -> FloatArray:
     """States and sensitivities (n, size) by one step from sample to sample: of `HEUN`, or "rk4" as [F]."""
-    parts = [system.rows(states) for states in HEUN[name](system.nx)] if name in HEUN else []
-    table = np.full((len(system.t), len(system.first)), np.nan)
-    table[0] = z = system.first
+    n, size = system.nx, len(system.first)
+    order = np.arange(size)
+    rows = np.column_stack([order[:n], order[n:].reshape(n, -1)])
+    """Where a state and its sensitivities stand."""
+
+    def rate(time: float, z: FloatArray) -> FloatArray:
+        flat = np.empty(size)
+        flat[rows] = z
+        return system(time, flat)[rows]
+
+    table = np.full((len(system.t), size), np.nan)
+    z = system.first[rows]
+    table[0] = system.first
     for i, (now, then) in enumerate(pairwise(system.t.tolist()), start=1):
         h = then - now
-        if parts:
-            z = heun_step(system, now, then, z, h, parts)
+        if name in HEUN:
+            z = heun_step(rate, now, then, z, h, HEUN[name](n))
         else:
-            k1 = h * system(now, z)
-            k2 = h * system(now + h / 2, z + k1 / 2)
-            k3 = h * system(now + h / 2, z + k2 / 2)
-            z = z + (k1 + 2 * k2 + 2 * k3 + h * system(then, z + k3)) / 6
-        table[i] = z
+            k1 = h * rate(now, z)
+            k2 = h * rate(now + h / 2, z + k1 / 2)
+            k3 = h * rate(now + h / 2, z + k2 / 2)
+            z = z + (k1 + 2 * k2 + 2 * k3 + h * rate(then, z + k3)) / 6
+        table[i][rows] = z
         if not np.isfinite(z).all():
             break
     return table

@@ -55,7 +55,7 @@ def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
     curves = []
     for model, record, run in zip(result.models, result.records, result.simulations, strict=False):
         if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
-            finer = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
+            finer, _ = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
             theta = result.estimate.solution
             run = simulate(model, theta, finer, sensitivities=False)
         curves.append(run)

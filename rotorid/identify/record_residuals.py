@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -95,23 +94,30 @@ class Problem:
         self.model = self.models[0]
         self.prior = prior or prior_rows(self.model.parameters, {})
         self.inputs = [inputs_of(model, record) for record in self.records]
-        self.measured, deviations = zip(*map(self._table, self.records), strict=True)
-        self.masks = [~np.isnan(data.T) for data in self.measured]
-        stated = {s is not None for each in deviations for s in each if s is not False}
-        if len(stated) > 1:
+        self.measured, deviations = zip(*map(self._tables, self.records), strict=True)
+        self.masks = [~np.isnan(data) for data in self.measured]
+        known = np.concatenate([~np.isnan(s[m]) for s, m in zip(deviations, self.masks, strict=True)])
+        self.stated = bool(known.any())
+        if self.stated and not known.all():
             raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        self.stated = stated == {True}
         sizes = [self.errors.get(name, 1.0) for name in self.model.outputs]
-        self.weights = []
-        for data, each, mask in zip(self.measured, deviations, self.masks, strict=True):
-            mask[self.model.fixed_at_first, :1] = False
-            known = [size if s is None or s is False else s for s, size in zip(each, sizes, strict=True)]
-            sigma = np.stack([np.broadcast_to(s, len(data)) for s in known], axis=-1)
-            self.weights.append(1.0 / np.where(np.isnan(data), 1.0, sigma))
-        self.data = self.vector(self.measured)
-        """Measured values as weighted rows."""
-        if not len(self.data):
+        self.weights = [1.0 / np.where(np.isnan(sigma), sizes, sigma) for sigma in deviations]
+        self.series: list[tuple[str, str, slice]] = []
+        """Of each output of a record its name, words for it, and its rows."""
+        low, several = 0, len(self.records) > 1
+        for record, mask in zip(self.records, self.masks, strict=True):
+            mask[:1, self.model.fixed_at_first] = False
+            for name, count in zip(self.model.outputs, mask.sum(axis=0).tolist(), strict=True):
+                if count:
+                    words = f"{name} in {record.name}" if several else name
+                    self.series.append((name, words, slice(low, low + count)))
+                low += count
+        if not low:
             raise ValueError("the records have no samples of an output beside those that known values fix")
+        self.data, self.scale = (
+            self.vector([x(y) for y in self.measured]) for x in (np.asarray, np.ones_like)
+        )
+        """Measured values and 1 as weighted rows."""
         most = np.abs(self.data).max()
         if most > LARGEST or 0 < most < 1 / LARGEST:
             raise ValueError(
@@ -129,45 +135,17 @@ class Problem:
         """Whether a residual of 1 is one standard deviation, stated or estimated: a prior counts on it."""
         return self.stated or (len(self.prior) > 0 and not self.prior.ridge)
 
-    def again(self, integrator: str, rtol: float) -> Problem:
-        """The same problem, integrated otherwise."""
-        return Problem(self.given, self.records, integrator, rtol, self.errors, self.prior)
-
-    def weighed(self, errors: Mapping[str, float]) -> Problem:
-        """The same problem with estimated errors to weigh by."""
-        return Problem(self.given, self.records, self.integrator, self.rtol, errors, self.prior)
-
-    @cached_property
-    def series(self) -> dict[tuple[int, str], int]:
-        """Number of samples of each series (an output of a record), in the order of the rows."""
-        return {
-            (k, name): int(count)
-            for k, mask in enumerate(self.masks)
-            for name, count in zip(self.model.outputs, mask.sum(axis=1), strict=True)
-            if count
-        }
-
-    @cached_property
-    def series_names(self) -> list[str]:
-        """Of each series."""
-        several = len(self.records) > 1
-        return [f"{name} in {self.records[k].name}" if several else name for k, name in self.series]
-
-    def split(self, rows: FloatArray) -> list[FloatArray]:
-        """Rows by series."""
-        return np.split(rows, np.cumsum([*self.series.values()])[:-1])
-
-    def plain(self, r: FloatArray) -> FloatArray:
-        """Weighted rows in the unit of the outputs."""
-        return np.asarray(r / self.vector([np.ones_like(data) for data in self.measured]))
+    def again(self, integrator: str, rtol: float, errors: Mapping[str, float]) -> Problem:
+        """The same problem, integrated or weighed otherwise."""
+        return Problem(self.given, self.records, integrator, rtol, errors, self.prior)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
         parts = [
-            np.swapaxes(table * weight.reshape(weight.shape + (1,) * (table.ndim - 2)), 0, 1)[mask]
+            np.swapaxes(table * weight.reshape(weight.shape + (1,) * (table.ndim - 2)), 0, 1)[mask.T]
             for table, mask, weight in zip(tables, self.masks, self.weights, strict=True)
         ]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return np.concatenate(parts)
 
     def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals (m,) and derivatives (m, n).
@@ -177,8 +155,7 @@ class Problem:
         SimulationError
             The states diverge.
         """
-        key = theta.tobytes()
-        if self._last is None or self._last[0] != key:
+        if self._last is None or self._last[0] != theta.tobytes():
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
             runs, r, J = self._evaluated(theta)
@@ -190,14 +167,14 @@ class Problem:
                     runs, r, J = again
                 else:
                     self.quick = "dop853"
-            self._last, self.runs = (key, r, J), tuple(runs)
-        return self._last[1], self._last[2]
+            self._last, self.runs = (theta.tobytes(), r, J), runs
+        return self._last[1:]
 
-    def _evaluated(self, theta: FloatArray) -> tuple[list[Trajectory], FloatArray, FloatArray]:
-        runs = [
+    def _evaluated(self, theta: FloatArray) -> tuple[tuple[Trajectory, ...], FloatArray, FloatArray]:
+        runs = tuple(
             simulate(model, theta, record, integrator=self.quick, rtol=self.rtol)
             for model, record in zip(self.models, self.records, strict=True)
-        ]
+        )
         r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
         J = self.vector([run.y_theta for run in runs])
         if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
@@ -227,21 +204,21 @@ class Problem:
         step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
         return replace(step, residuals=step.residuals[: len(Y)])
 
-    def _table(self, record: Record) -> tuple[FloatArray, list[float | FloatArray | bool | None]]:
-        """Measured values (n, n_y), and of each output its deviation: None unknown, False not measured."""
-        outputs = self.model.outputs
-        if unknown := [name for name in record.outputs if name not in outputs]:
+    def _tables(self, record: Record) -> tuple[FloatArray, FloatArray]:
+        """Measured values and their deviations, (n, n_y) each, NaN where there are none."""
+        outputs = ", ".join(self.model.outputs)
+        if unknown := [name for name in record.outputs if name not in self.model.outputs]:
             raise ValueError(
-                f"{record.name}: {', '.join(unknown)} is no output of the model; outputs are "
-                f"{', '.join(outputs)}"
+                f"{record.name}: {', '.join(unknown)} is no output of the model; outputs are {outputs}"
             )
         if not record.outputs:
-            raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
-        nothing = np.full(len(record), np.nan)
-        data = np.stack([record.outputs.get(name, nothing) for name in outputs], axis=-1)
-        missing = np.isnan(data).all(axis=0)
-        sigma = record.sigma or {}
-        return data, [False if lost else sigma.get(n) for n, lost in zip(outputs, missing, strict=True)]
+            raise ValueError(f"{record.name} has no column of an output: {outputs}")
+
+        def table(columns: Mapping[str, float | FloatArray]) -> FloatArray:
+            full = [np.broadcast_to(columns.get(n, np.nan), len(record)) for n in self.model.outputs]
+            return np.stack(full, axis=-1)
+
+        return table(record.outputs), table(record.sigma or {})
 
 
 def at(step: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.unit_words import Shown
 from rotorid.identify.ode import OdeModel
 
@@ -120,11 +120,19 @@ def from_t0(model: OdeModel, record: Record) -> Record:
     return replace(record, t=np.append(model.t0, record.t), outputs=outputs, inputs=inputs, sigma=sigma)
 
 
-def refined(record: Record, every: int) -> Record:
-    """The times of a record and others between them, with its inputs."""
-    t = np.interp(np.arange(every * (len(record) - 1) + 1) / every, np.arange(len(record)), record.t)
+def refined(record: Record, every: int) -> tuple[Record, IntArray]:
+    """The times of a record and others between them, with its inputs, and where its own stand.
+
+    Samples are usually so many steps apart, and further ones in proportion.
+    """
+    if len(record) == 1:
+        return record, np.arange(1)
+    gaps = np.diff(record.t)
+    steps = np.ceil((every - 1e-6) * np.clip(gaps / np.median(gaps), 1.0 / every, 1e3)).astype(int)
+    at = np.append(0, np.cumsum(steps))
+    t = np.interp(np.arange(at[-1] + 1), at, record.t)
     inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
-    return Record(t, {}, inputs, None, record.name)
+    return Record(t, {}, inputs, None, record.name), at
 
 
 def inputs_of(model: OdeModel, record: Record) -> FloatArray:

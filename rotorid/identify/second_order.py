@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import signs
 from rotorid.identify.expressions import names as names_in
-from rotorid.identify.ode import OdeModel, Reader, ode_model
+from rotorid.identify.ode import OdeModel, ode_model, read_expression
 
 if TYPE_CHECKING:
     from fem import StateSpace
@@ -119,12 +119,12 @@ def second_order(  # noqa: PLR0913
         bounds=bounds,
         per_record=per_record,
     )
-    read = Reader(plain.known)
     cells = [[sympy.Integer(i == j) for j in range(2 * n)] for i in range(2 * n)]
     for i, row in enumerate(m):
-        cells[2 * i + 1][1::2] = [read(cell, f"mass matrix, row {i + 1}", set(estimate)) for cell in row]
+        where = f"mass matrix, row {i + 1}"
+        cells[2 * i + 1][1::2] = [read_expression(cell, where, estimate, plain.known) for cell in row]
     model = replace(plain, inertia=tuple(cell for row in cells for cell in row))
-    model.rate(0.0, np.zeros(2 * n), model.start, np.zeros(len(model.inputs)))  # a singular mass matrix
+    model.augmented(0.0, np.zeros(2 * n), model.start, np.zeros(len(model.inputs)))  # a singular mass matrix
     return model
 
 
