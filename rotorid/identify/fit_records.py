@@ -171,7 +171,7 @@ def fit(  # noqa: PLR0913
     if len(minima) > 1:
         warnings.append(f"{len(minima)} different minima were found; the best is given, see minima")
     theta = path.estimate.solution
-    outside = ((theta < limits[:, 0]) | (theta > limits[:, 1])).any()
+    outside = bool(((theta < limits[:, 0]) | (theta > limits[:, 1])).any())
     warnings += [f"{method} knows no bounds, and the result lies outside those of the model"] * outside
     runs = problem.runs if np.isfinite(problem.residual(theta)).all() else ()
     return Fit(
