@@ -135,7 +135,7 @@ class OdeModel:
     @cached_property
     def linear_driven(self) -> bool:
         """Whether dx/dt = A x + b + B u with constant A, b and B: no explicit time."""
-        by = [s for s in self._symbols if s.name in {*self.states, *self.inputs}]
+        by = [s for s in self.symbols if s.name in {*self.states, *self.inputs}]
         # such as sign(v): its derivative is 0, but it is not constant
         parts = [part for e in self.rates for part in (*map(e.diff, by), *signs(e))]
         varying = {"t", *self.states, *self.inputs}
@@ -154,7 +154,7 @@ class OdeModel:
     @cached_property
     def fixed_at_first(self) -> list[int]:
         """Outputs that known initial values fix at the first time: no parameter stands in them there."""
-        put = dict(zip(self._symbols[1:], self.initial, strict=False))
+        put = dict(zip(self.symbols[1:], self.initial, strict=False))
         first = [expressions.names(e.subs(put)) & {*self.parameters} for e in self.observed]
         return [i for i, free in enumerate(first) if self.states and not free]
 
@@ -168,7 +168,7 @@ class OdeModel:
         """The model with its initial states as further parameters, behind the others."""
         import sympy
 
-        names, taken = [f"{name}_at_node" for name in self.states], {s.name for s in self._symbols}
+        names, taken = [f"{name}_at_node" for name in self.states], {s.name for s in self.symbols}
         while taken & {*names}:
             names = [f"{name}_" for name in names]
         return replace(
@@ -183,7 +183,7 @@ class OdeModel:
     # -- expressions and their functions, made when needed
 
     @cached_property
-    def _symbols(self) -> list[Any]:
+    def symbols(self) -> list[Any]:
         """Of the time, the states, the parameters and the inputs."""
         import sympy
 
@@ -204,7 +204,7 @@ class OdeModel:
 
     def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
         """With the derivatives by states and parameters, at one point quickly, or at times (*B,)."""
-        table = self._compiled(what, self._symbols, self._symbols[1 : 1 + len(self.states) + len(self.start)])
+        table = self._compiled(what, self.symbols, self.symbols[1 : 1 + len(self.states) + len(self.start)])
         if np.ndim(t) == 0:
             return table.one([float(v) for part in (t, x, theta, u) for v in np.ravel(part).tolist()])
         batch = np.shape(t)
@@ -215,7 +215,7 @@ class OdeModel:
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
         """Of expressions of the parameters alone, with the derivatives by these."""
-        parameters = self._symbols[1 + len(self.states) :][: len(self.start)]
+        parameters = self.symbols[1 + len(self.states) :][: len(self.start)]
         return self._compiled(what, parameters, parameters).one(np.asarray(theta, float).tolist())
 
     def _quick(self, whole: bool) -> Compiled | None:
@@ -226,7 +226,7 @@ class OdeModel:
             made: Compiled | None = self._made[whole]
             return made
         n, k = len(self.states), len(self.parameters) if whole else 0
-        states, parameters = self._symbols[1 : 1 + n], self._symbols[1 + n : 1 + n + k]
+        states, parameters = self.symbols[1 : 1 + n], self.symbols[1 + n : 1 + n + k]
         rows = [[rate.diff(x) for x in states] for rate in self.rates] if whole else []
         S = [[sympy.Dummy() for _ in parameters] for _ in states]
         products = [
@@ -235,7 +235,7 @@ class OdeModel:
             for j, p in enumerate(parameters)
         ]
         many = k * sum(e != 0 for row in rows for e in row) > UNROLLED
-        symbols = [*self._symbols[: 1 + n], *(s for row in S for s in row), *self._symbols[1 + n :]]
+        symbols = [*self.symbols[: 1 + n], *(s for row in S for s in row), *self.symbols[1 + n :]]
         exprs = [*self.rates, *products]
         fits = not (many or (whole and self.inertia))
         self._made[whole] = Compiled(symbols, exprs, (len(exprs),)) if fits else None

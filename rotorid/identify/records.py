@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,35 +52,31 @@ class Record:
     axis: Shown = SECONDS
 
     def __post_init__(self) -> None:
-        t = _column(self.t, f"{self.name}: the times")
-        _check_times(t, self.name)
+        name, t = self.name, _column(self.t, f"{self.name}: the times")
+        _check_times(t, name)
         object.__setattr__(self, "t", t)
         for kind in ("outputs", "inputs"):
-            columns = {key: self._samples(value, key) for key, value in getattr(self, kind).items()}
+            columns = {key: _column(x, f"{name}: {key}") for key, x in getattr(self, kind).items()}
             object.__setattr__(self, kind, columns)
-        for key, value in self.inputs.items():
-            if np.isnan(value).any():
-                raise ValueError(
-                    f"{self.name}: the input {key} is missing at t = {t[np.isnan(value)][0]:g}; an input "
-                    "needs a value at every time"
-                )
+            for key, column in columns.items():
+                if len(column) != len(t):
+                    raise ValueError(f"{name}: {key} has {len(column)} values, but there are {len(t)} times")
+                if (bad := np.flatnonzero(np.isinf(column))).size:
+                    raise ValueError(
+                        f"{name}: {key} is infinite in row {bad[0] + 1}; leave missing samples empty"
+                    )
+                if kind == "inputs" and np.isnan(column).any():
+                    raise ValueError(
+                        f"{name}: the input {key} is missing at t = {t[np.isnan(column)][0]:g}; an input "
+                        "needs a value at every time"
+                    )
         if self.sigma is not None:
-            sigma = {key: self._deviation(value, key) for key, value in self.sigma.items()}
-            object.__setattr__(self, "sigma", sigma)
+            object.__setattr__(self, "sigma", {key: self._deviation(key, x) for key, x in self.sigma.items()})
 
     def __len__(self) -> int:
         return len(self.t)
 
-    def _samples(self, value: ArrayLike, key: str) -> FloatArray:
-        column = _column(value, f"{self.name}: {key}")
-        if len(column) != len(self):
-            raise ValueError(f"{self.name}: {key} has {len(column)} values, but there are {len(self)} times")
-        if np.isinf(column).any():
-            at = np.flatnonzero(np.isinf(column))[0]
-            raise ValueError(f"{self.name}: {key} is infinite in row {at + 1}; leave missing samples empty")
-        return column
-
-    def _deviation(self, value: float | FloatArray, key: str) -> float | FloatArray:
+    def _deviation(self, key: str, value: float | FloatArray) -> float | FloatArray:
         if key not in self.outputs:
             raise ValueError(f"{self.name}: a standard deviation is given for {key}, which is no output")
         array = np.array(value, dtype=float)
@@ -179,22 +174,17 @@ def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
     import sympy
 
     copies = _copies(model, count)
-    place = [model.parameters.index(name) for name in model.parameters for _ in copies[name]]
-    one_for_all = replace(
-        model,
-        parameters=tuple(copy for name in model.parameters for copy in copies[name]),
-        start=model.start[place],
-        bounds=model.bounds[place],
-        per_record=(),
-    )
+    place = [model.parameters.index(name) for name, each in copies.items() for _ in each]
     models = []
     for i in range(count):
         put = {sympy.Symbol(name): sympy.Symbol(copies[name][i]) for name in model.per_record}
-        rates, initial, observed, inertia = (
-            tuple(e.subs(put) for e in part)
-            for part in (model.rates, model.initial, model.observed, model.inertia)
-        )
-        models.append(replace(one_for_all, rates=rates, initial=initial, observed=observed, inertia=inertia))
+        parts: dict[str, Any] = {
+            kind: tuple(e.subs(put) for e in getattr(model, kind))
+            for kind in ("rates", "initial", "observed", "inertia")
+        }
+        names = tuple(copy for each in copies.values() for copy in each)
+        start, bounds = model.start[place], model.bounds[place]
+        models.append(replace(model, parameters=names, start=start, bounds=bounds, per_record=(), **parts))
     return tuple(models)
 
 
@@ -215,13 +205,12 @@ def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, flo
     copies, starts = _copies(model, len(records)), {}
     for name, output in model.recorded.items():
         for copy, record in zip(copies[name], records, strict=True):
-            first = float(record.outputs[output][0]) if output in record.outputs else math.nan
-            if math.isnan(first):
+            starts[copy] = float(record.outputs.get(output, np.full(1, np.nan))[0])
+            if np.isnan(starts[copy]):
                 raise ValueError(
                     f"{record.name}: {output} has no sample at the first time, t = {record.t[0]:g} s, where "
                     f"[initial] takes it from the record; give a number there, or a parameter"
                 )
-            starts[copy] = first
     return starts
 
 
@@ -234,17 +223,12 @@ def for_copies(model: OdeModel, count: int, given: Mapping[str, T]) -> dict[str,
 def _copies(model: OdeModel, count: int) -> dict[str, tuple[str, ...]]:
     """Copies of each parameter."""
     taken = {*model.parameters, *model.states, *model.inputs}
-
-    def numbered(name: str, gap: str) -> Iterable[str]:
-        return (f"{name}{gap}{i + 1}" for i in range(count))
-
-    copies: dict[str, tuple[str, ...]] = {}
-    for name in model.parameters:
-        gap = "_"
-        while taken & {*numbered(name, gap)}:
-            gap += "_"
-        own = name in model.per_record and count > 1
-        copies[name] = tuple(numbered(name, gap)) if own else (name,)
+    copies: dict[str, tuple[str, ...]] = {name: (name,) for name in model.parameters}
+    for name in model.per_record if count > 1 else ():
+        base = f"{name}_"
+        while taken & {f"{base}{i + 1}" for i in range(count)}:
+            base += "_"
+        copies[name] = tuple(f"{base}{i + 1}" for i in range(count))
     return copies
 
 
@@ -263,8 +247,7 @@ def _check_times(t: FloatArray, name: str) -> None:
         raise ValueError(f"{name} has no samples")
     if (bad := np.flatnonzero(~np.isfinite(t))).size:
         raise ValueError(f"{name}: the time in row {bad[0] + 1} is missing or infinite")
-    if (back := np.flatnonzero(np.diff(t) <= 0)).size:
-        i = int(back[0])
+    for i in np.flatnonzero(np.diff(t) <= 0)[:1]:
         if t[i] == t[i + 1]:
             raise ValueError(
                 f"{name}: the time {t[i]:g} is repeated in row {i + 2}; merge these samples, or use one "
