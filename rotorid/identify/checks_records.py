@@ -261,28 +261,35 @@ def _hum(
 
 
 def _initial_values(problem: Problem, theta: FloatArray) -> Iterator[Candidate]:
-    """Known initial values, each of every record by itself."""
-    n = len(theta)
-    for number, (model, record) in enumerate(zip(problem.models, problem.records, strict=True)):
-        start, free = np.concatenate([theta, model.x0(theta)[:, 0]]), model.with_free_start
-        if not model.known_initial:
-            continue
-        try:
-            run = simulate(free, start, record, integrator=problem.integrator, rtol=problem.rtol)
-        except SimulationError:
-            continue
-        where = f" of {record.name}" if len(problem.records) > 1 else ""
+    """Known initial values, each of every record by itself, by differences."""
+    runs = problem.runs
+    for number, (model, record, run) in enumerate(zip(problem.models, problem.records, runs, strict=True)):
+        where = f" of {record.name}" if len(runs) > 1 else ""
         for i in model.known_initial:
+            step = 1e-4 * (float(np.abs(run.x[:, i]).max()) or 1.0)
+            begin = (*model.initial[:i], model.initial[i] + step, *model.initial[i + 1 :])
             tables = [np.zeros_like(data) for data in problem.measured]
-            tables[number] = run.y_theta[:, :, n + i]
-            column, name, value = problem.vector(tables)[:, None], model.states[i], start[n + i]
-            words = (
-                f"the residuals contradict the initial value {value:.4g} of {name}{where}, about "
-                f"{value:.6g} + ({{0:.3g}}) would suit them (estimate it: [initial] {name} = "
-                f'"{name}_0", with {name}_0 in [estimate])'
-            )
+            try:
+                moved = simulate(
+                    replace(model, initial=begin),
+                    theta,
+                    record,
+                    integrator=problem.integrator,
+                    rtol=problem.rtol,
+                    sensitivities=False,
+                )
+            except SimulationError:
+                continue
+            tables[number] = (moved.y - run.y) / step
+            column, name, value = problem.vector(tables)[:, None], model.states[i], float(model.initial[i])
             if column.any():
-                yield column, words, False
+                yield (
+                    column,
+                    f"the residuals contradict the initial value {value:.4g} of {name}{where}, about "
+                    f"{value:.6g} + ({{0:.3g}}) would suit them (estimate it: [initial] {name} = "
+                    f'"{name}_0", with {name}_0 in [estimate])',
+                    False,
+                )
 
 
 # -- errors of the outputs, of the integration and of the times

@@ -13,7 +13,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -162,23 +162,6 @@ class OdeModel:
     def known_initial(self) -> list[int]:
         """States whose initial values hold no parameter."""
         return [i for i, e in enumerate(self.initial) if not expressions.names(e) & {*self.parameters}]
-
-    @cached_property
-    def with_free_start(self) -> OdeModel:
-        """The model with its initial states as further parameters, behind the others."""
-        import sympy
-
-        names, taken = [f"{name}_at_node" for name in self.states], {s.name for s in self.symbols}
-        while taken & {*names}:
-            names = [f"{name}_" for name in names]
-        return replace(
-            self,
-            parameters=(*self.parameters, *names),
-            start=np.append(self.start, np.zeros(len(names))),
-            bounds=np.vstack((self.bounds, np.tile([-np.inf, np.inf], (len(names), 1)))),
-            initial=tuple(map(sympy.Symbol, names)),
-            t0=None,
-        )
 
     # -- expressions and their functions, made when needed
 

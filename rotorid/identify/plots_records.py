@@ -43,9 +43,7 @@ def figure_fit(result: Fit) -> Figure:
         _finish(ax, f"input {name}")
     axes[-1].set_xlabel(result.records[0].axis.word)
     figure.align_ylabels(axes)
-    stated = result.errors or any(record.sigma for record in result.records)
-    words = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
-    _legend(result, above, words)
+    _legend(result, above)
     draw_parameters(result, below.subplots())
     return figure
 
@@ -56,8 +54,7 @@ def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
     for model, record, run in zip(result.models, result.records, result.simulations, strict=False):
         if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
             finer, _ = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
-            theta = result.estimate.solution
-            run = simulate(model, theta, finer, sensitivities=False)
+            run = simulate(model, result.estimate.solution, finer, sensitivities=False)
         curves.append(run)
     return tuple(curves)
 
@@ -76,20 +73,18 @@ def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory]
 def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     """Model minus measured over time, in a band of ± 2σ: as stated, or twice the rms of this output."""
     j = result.model.outputs.index(name)
-    residuals = {
-        k: run.y[:, j] - record.outputs[name]
-        for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False))
-        if not np.isnan(record.outputs.get(name, np.nan)).all()
-    }
-    if not residuals:
-        words = "nothing measured" if result.simulations else "the states diverge: no residuals"
+    runs = enumerate(zip(result.records, result.simulations, strict=False))
+    residuals = {k: run.y[:, j] - record.outputs.get(name, np.nan) for k, (record, run) in runs}
+    seen = np.concatenate([[0.0], *residuals.values()])
+    if np.isnan(seen[1:]).all():
+        words = "nothing measured" if residuals else "the states diverge: no residuals"
         axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes, fontsize=TEXT)
+        residuals = {}
     for k, r in residuals.items():
-        record = result.records[k]
-        rms = np.sqrt(np.nanmean(np.concatenate([*residuals.values()]) ** 2))
-        sigma = (record.sigma or result.errors or {}).get(name, rms)
-        t, size = record.axis.scale * record.t, np.broadcast_to(2 * np.asarray(sigma), record.t.shape)
-        axes.fill_between(t, -size, size, color=BAND, lw=0, zorder=0.5)
+        record, rms = result.records[k], np.sqrt(np.nanmean(seen[1:] ** 2))
+        sigma = np.broadcast_to((record.sigma or result.errors or {}).get(name, rms), len(record))
+        t = record.axis.scale * record.t
+        axes.fill_between(t, -2 * sigma, 2 * sigma, color=BAND, lw=0, zorder=0.5)
         axes.plot(t, r, **_mark(result, k))
     axes.axhline(0.0, color=QUIET, lw=0.8)
     _finish(axes, "residual")
@@ -97,27 +92,29 @@ def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
 
 def draw_parameters(result: Fit, axes: Axes) -> None:
     """Parameters with their 95 % intervals, below how the search ended."""
-    estimate = result.estimate
-    std = np.full(len(result.parameters), np.nan) if estimate.std is None else estimate.std
-    half = (estimate.coverage_factor or np.nan) * std
-    words = ["no interval" if np.isfinite(value) else "not determined" for value in result.values]
-    draw_intervals(axes, [*zip(result.parameters, result.values.tolist(), half.tolist(), words, strict=True)])
+    values, ends = result.values.tolist(), result.ci95
+    half = np.full(len(values), np.nan) if ends is None else np.diff(ends)[:, 0] / 2
+    words = ["not determined" if np.isnan(value) else "no interval" for value in values]
+    draw_intervals(axes, [*zip(result.parameters, values, half.tolist(), words, strict=True)])
     state = "converged" if result.converged else "not converged"
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
 
 
-def _legend(result: Fit, above: Any, title: str) -> None:  # noqa: ANN401 - a part of a figure
+def _legend(result: Fit, above: Any) -> None:  # noqa: ANN401 - a part of a figure
     """Records by their marks and lines, above all axes."""
     from matplotlib.lines import Line2D
 
     names = record_names([record.name for record in result.records])
+    shown = names[:MANY] + [f"and {len(names) - MANY} more records"] * (len(names) > MANY)
     keys = [
-        Line2D([], [], label=name, **{**_mark(result, k), **_line(result, k, 2)})
-        for k, name in enumerate(names[:MANY])
+        Line2D(
+            [], [], label=name, **({**_mark(result, k), **_line(result, k, 2)} if k < MANY else {"ls": ""})
+        )
+        for k, name in enumerate(shown)
     ]
-    if len(names) > MANY:
-        keys.append(Line2D([], [], ls="", label=f"and {len(names) - MANY} more records"))
-    columns = max(1, min(4, 150 // (10 + max(len(str(key.get_label())) for key in keys))))
+    stated = result.errors or any(record.sigma for record in result.records)
+    title = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
+    columns = max(1, min(4, 150 // (10 + max(map(len, shown)))))
     style = {"frameon": False, "fontsize": TEXT, "title_fontsize": TEXT}
     above.legend(loc="outside upper center", ncols=columns, handles=keys, title=title, **style)
 
