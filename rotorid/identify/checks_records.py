@@ -262,21 +262,16 @@ def _hum(
 
 def _initial_values(problem: Problem, theta: FloatArray) -> Iterator[Candidate]:
     """Known initial values, each of every record by itself, by differences."""
-    runs = problem.runs
-    for number, (model, record, run) in enumerate(zip(problem.models, problem.records, runs, strict=True)):
-        where = f" of {record.name}" if len(runs) > 1 else ""
+    for number, (model, record) in enumerate(zip(problem.models, problem.records, strict=True)):
+        where = f" of {record.name}" if len(problem.records) > 1 else ""
         for i in model.known_initial:
-            step = 1e-4 * (float(np.abs(run.x[:, i]).max()) or 1.0)
-            begin = (*model.initial[:i], model.initial[i] + step, *model.initial[i + 1 :])
             tables = [np.zeros_like(data) for data in problem.measured]
+            step = 1e-4 * (float(np.abs(problem.runs[number].x[:, i]).max()) or 1.0)
+            begin = (*model.initial[:i], model.initial[i] + step, *model.initial[i + 1 :])
             try:
-                moved = simulate(
-                    replace(model, initial=begin),
-                    theta,
-                    record,
-                    integrator=problem.integrator,
-                    rtol=problem.rtol,
-                    sensitivities=False,
+                run, moved = (
+                    simulate(one, theta, record, sensitivities=False)
+                    for one in (model, replace(model, initial=begin))
                 )
             except SimulationError:
                 continue

@@ -172,7 +172,7 @@ def heun_step(
     Parameters
     ----------
     rate
-        Of the states (..., n, k), at `now` and at `then`: times, or whatever it takes for them.
+        Of the states (n, …), at `now` and at `then`: times, or whatever it takes for them.
     z, h
         States now, and the length of the step.
     parts
@@ -181,35 +181,30 @@ def heun_step(
     k = rate(now, z)
     new: FloatArray = z + h * k
     for part in parts:
-        new[..., part, :] = (z + h / 2 * (k + rate(then, new)))[..., part, :]
+        new[part] = (z + h / 2 * (k + rate(then, new)))[part]
     return new
 
 
 def stepwise(system: System, name: str) -> FloatArray:
     """States and sensitivities (n, size) by one step from sample to sample: of `HEUN`, or "rk4" as [F]."""
-    n, size = system.nx, len(system.first)
-    order = np.arange(size)
-    rows = np.column_stack([order[:n], order[n:].reshape(n, -1)])
-    """Where a state and its sensitivities stand."""
-
-    def rate(time: float, z: FloatArray) -> FloatArray:
-        flat = np.empty(size)
-        flat[rows] = z
-        return system(time, flat)[rows]
-
-    table = np.full((len(system.t), size), np.nan)
-    z = system.first[rows]
-    table[0] = system.first
+    n, k = system.nx, system.np
+    # of each part the states, and their sensitivities
+    parts = [
+        [*part, *(n + k * i + j for i in part for j in range(k))]
+        for part in (HEUN[name](n) if name in HEUN else [])
+    ]
+    table = np.full((len(system.t), len(system.first)), np.nan)
+    table[0] = z = system.first
     for i, (now, then) in enumerate(pairwise(system.t.tolist()), start=1):
         h = then - now
-        if name in HEUN:
-            z = heun_step(rate, now, then, z, h, HEUN[name](n))
+        if parts:
+            z = heun_step(system, now, then, z, h, parts)
         else:
-            k1 = h * rate(now, z)
-            k2 = h * rate(now + h / 2, z + k1 / 2)
-            k3 = h * rate(now + h / 2, z + k2 / 2)
-            z = z + (k1 + 2 * k2 + 2 * k3 + h * rate(then, z + k3)) / 6
-        table[i][rows] = z
+            k1 = h * system(now, z)
+            k2 = h * system(now + h / 2, z + k1 / 2)
+            k3 = h * system(now + h / 2, z + k2 / 2)
+            z = z + (k1 + 2 * k2 + 2 * k3 + h * system(then, z + k3)) / 6
+        table[i] = z
         if not np.isfinite(z).all():
             break
     return table

@@ -188,13 +188,9 @@ class OdeModel:
     def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
         """With the derivatives by states and parameters, at one point quickly, or at times (*B,)."""
         table = self._compiled(what, self.symbols, self.symbols[1 : 1 + len(self.states) + len(self.start)])
-        if np.ndim(t) == 0:
-            return table.one([float(v) for part in (t, x, theta, u) for v in np.ravel(part).tolist()])
-        batch = np.shape(t)
-        columns = [np.moveaxis(np.broadcast_to(part, (*batch, np.shape(part)[-1])), -1, 0) for part in (x, u)]
-        return table.many(
-            batch, [np.asarray(t, float), *columns[0], *np.asarray(theta).tolist(), *columns[1]]
-        )
+        columns = [np.moveaxis(np.asarray(part, dtype=float), -1, 0) for part in (x, theta, u)]
+        values = [t, *(value for part in columns for value in part)]
+        return table.one([*map(float, values)]) if np.ndim(t) == 0 else table.many(np.shape(t), values)
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
         """Of expressions of the parameters alone, with the derivatives by these."""

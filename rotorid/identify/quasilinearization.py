@@ -119,7 +119,11 @@ def linear_solutions(
     h, table = np.diff(t)[:, None, None], linear(t, x, u)
     z = np.broadcast_to(np.eye(n, n + first.shape[1]), table[1:].shape)
     if integrator in HEUN:
-        end = heun_step(rate, table[:-1], table[1:], z, h, HEUN[integrator](n))
+        # with the states first, as it takes them
+        turned = lambda table, z: np.moveaxis(rate(table, np.moveaxis(z, 0, 1)), 1, 0)  # noqa: E731
+        z = np.moveaxis(z, 1, 0)
+        z = heun_step(turned, table[:-1], table[1:], z, h[..., 0], HEUN[integrator](n))
+        end = np.moveaxis(z, 0, 1)
     else:
         curve, rates = CubicHermiteSpline(t, x, slopes), np.zeros((12, *z.shape))
         for j, (weights, c) in enumerate(zip(DOP853.A, DOP853.C, strict=True)):
