@@ -64,14 +64,6 @@ class System:
         """Rates, (size,)."""
         return self.model.augmented(time, z, self.theta, self.inputs(time))
 
-    def jacobian(self, time: float, z: FloatArray) -> FloatArray:
-        """Derivatives of the rates without those of f_x and f_θ themselves (good enough for Newton steps)."""
-        n = self.nx
-        f_x = self.model.f(time, z[:n], self.theta, self.inputs(time))[:, 1 : 1 + n]
-        out = np.zeros((len(z), len(z)))
-        out[:n, :n], out[n:, n:] = f_x, np.kron(f_x, np.eye(self.np))
-        return out
-
 
 def exact(system: System) -> FloatArray:
     """States and sensitivities (n, size) of a linear model; not finite where they overflow."""

@@ -27,7 +27,7 @@ from rotorid.identify.expression_functions import Compiled, Expression, jacobian
 BIG = 2.0**60
 """So large a state or input that nothing of its slope is lost beside constants."""
 UNROLLED = 300
-"""Products in f_x S up to which they are written out: quicker than matrices of this size."""
+"""Products in f_x S below which they are written out."""
 
 
 class SimulationError(ValueError):
@@ -122,15 +122,14 @@ class OdeModel:
         return np.moveaxis(columns, (0, 2), (2, 0))
 
     def augmented(self, t: float, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
-        """Rates of the states, and of S = ∂x/∂θ where it stands behind them, row by row, quickly, (size,)."""
-        n, whole = len(self.states), len(z) > len(self.states)
-        made = self._quick(whole)
-        if made is not None:
-            values = made.one([t, *z.tolist(), *theta.tolist(), *u.tolist()])
-            return np.asarray(self._inverse(theta)[0] @ values) if self.inertia else values
+        """Rates of the states, and of S = ∂x/∂θ where it stands behind them, row by row, (size,)."""
+        n, size = len(self.states), len(z)
+        if n * size < UNROLLED and not self.inertia:
+            made = self.memory.get(size) or self.memory.setdefault(size, self._unrolled(size > n))
+            return np.asarray(made.one([t, *z.tolist(), *theta.tolist(), *u.tolist()]))
         table = self.f(t, z[:n], theta, u)
-        slopes = table[:, 1 : 1 + n] @ z[n:].reshape(n, -1) + table[:, 1 + n :]
-        return np.concatenate([table[:, 0], slopes.reshape(-1)])
+        slopes = table[:, 1 : 1 + n] @ z[n:].reshape(n, -1) + (table[:, 1 + n :] if size > n else 0.0)
+        return np.concatenate([table[:, 0], slopes.ravel()])
 
     @cached_property
     def linear_driven(self) -> bool:
@@ -173,63 +172,50 @@ class OdeModel:
         return [*map(sympy.Symbol, ("t", *self.states, *self.parameters, *self.inputs))]
 
     @cached_property
-    def _made(self) -> dict[Any, Any]:
-        """Functions by what they compute."""
+    def memory(self) -> dict[Any, Any]:
+        """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
         return {}
 
-    def _compiled(self, what: str, symbols: list[Any], by: list[Any]) -> Compiled:
-        """Expressions and their derivatives."""
-        if what not in self._made:
-            exprs = getattr(self, what)
-            self._made[what] = Compiled(symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
-        made: Compiled = self._made[what]
-        return made
-
-    def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
-        """With the derivatives by states and parameters, at one point quickly, or at times (*B,)."""
-        table = self._compiled(what, self.symbols, self.symbols[1 : 1 + len(self.states) + len(self.start)])
-        columns = [np.moveaxis(np.asarray(part, dtype=float), -1, 0) for part in (x, theta, u)]
-        values = [t, *(value for part in columns for value in part)]
-        return table.one([*map(float, values)]) if np.ndim(t) == 0 else table.many(np.shape(t), values)
-
-    def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
-        """Of expressions of the parameters alone, with the derivatives by these."""
-        parameters = self.symbols[1 + len(self.states) :][: len(self.start)]
-        return self._compiled(what, parameters, parameters).one(np.asarray(theta, float).tolist())
-
-    def _quick(self, whole: bool) -> Compiled | None:
-        """Rates in one function, where the products f_x S are few written out; else None."""
+    def _unrolled(self, whole: bool) -> Compiled:
+        """Rates of x, and of S if wanted, with the products of f_x S written out: quicker if they are few."""
         import sympy
 
-        if whole in self._made:
-            made: Compiled | None = self._made[whole]
-            return made
-        n, k = len(self.states), len(self.parameters) if whole else 0
-        states, parameters = self.symbols[1 : 1 + n], self.symbols[1 + n : 1 + n + k]
-        rows = [[rate.diff(x) for x in states] for rate in self.rates] if whole else []
-        S = [[sympy.Dummy() for _ in parameters] for _ in states]
-        products = [
-            rate.diff(p) + sum(e * S[m][j] for m, e in enumerate(row) if e != 0)
-            for rate, row in zip(self.rates, rows, strict=False)
-            for j, p in enumerate(parameters)
-        ]
-        many = k * sum(e != 0 for row in rows for e in row) > UNROLLED
-        symbols = [*self.symbols[: 1 + n], *(s for row in S for s in row), *self.symbols[1 + n :]]
-        exprs = [*self.rates, *products]
-        fits = not (many or (whole and self.inertia))
-        self._made[whole] = Compiled(symbols, exprs, (len(exprs),)) if fits else None
-        return self._quick(whole)
+        n, rates = len(self.states), sympy.Matrix(self.rates)
+        first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
+        S = sympy.Matrix(n, len(p), [sympy.Dummy() for _ in range(n * len(p))]) if whole else []
+        slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if whole else []
+        exprs = [*rates, *slopes]
+        return Compiled([*first, *x, *S, *p, *u], exprs, (len(exprs),))
+
+    def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
+        """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""
+        if what not in self.memory:
+            exprs, by = getattr(self, what), self.symbols[1 : 1 + len(self.states) + len(self.start)]
+            self.memory[what] = Compiled(self.symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
+        table: Compiled = self.memory[what]
+        parts = [np.asarray(part, dtype=float) for part in (x, theta, u)]
+        if np.ndim(t) == 0:
+            return table.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
+        return table.many(
+            np.shape(t), [t, *(column for part in parts for column in np.moveaxis(part, -1, 0))]
+        )
+
+    def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
+        """Expressions of the parameters alone, with the derivatives by these."""
+        n = len(self.states)
+        table = self._values(what, 0.0, np.zeros(n), theta, np.zeros(len(self.inputs)))
+        return np.delete(table, np.s_[1 : 1 + n], axis=1)
 
     def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""
         values, n = np.asarray(theta, dtype=float), len(self.states)
-        last: tuple[bytes, FloatArray, FloatArray] = self._made.get("inverse", (b"none", values, values))
+        last: tuple[bytes, FloatArray, FloatArray] = self.memory.get("inverse", (b"none", values, values))
         if last[0] != values.tobytes():
             table = np.moveaxis(self._alone("inertia", values).reshape(n, n, -1), -1, 0)
             if not np.isfinite(table).all() or np.linalg.cond(table[0]) > 1e14:
                 shown = ", ".join(f"{n} = {v:.4g}" for n, v in zip(self.parameters, values, strict=True))
                 raise SimulationError(f"the mass matrix is singular at {shown or 'the known values'}")
-            last = self._made["inverse"] = values.tobytes(), np.linalg.inv(table[0]), table[1:]
+            last = self.memory["inverse"] = values.tobytes(), np.linalg.inv(table[0]), table[1:]
         return last[1:]
 
 
