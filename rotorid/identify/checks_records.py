@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,9 +29,9 @@ from rotorid.regression.search import RCOND
 
 FEWEST, LAGS = 20, 10
 """Samples below which nothing can be said of correlations; neighbours that are looked at."""
-UNEXPLAINED, FEW_UNEXPLAINED, LINE, MISFIT = 0.05, 0.2, 0.5, 4.0
-"""Shares of a series' variance in residuals that are not white, in too few of them to tell, and of these in a
-line of the spectrum, and χ² per degree of freedom, above which a record is not described."""
+UNEXPLAINED, MISFIT = 0.05, 4.0
+"""Share of a series' variance in residuals that are not white, and χ² per degree of freedom, above which a
+record is not described."""
 CHANCE = 1e-6
 """Probability below which residuals or what takes a share of them are no noise."""
 SHARE, FAR = 0.3, 5.0
@@ -40,29 +40,15 @@ HINT = (
     "a local minimum or an unsuitable model; try other starting values, bounds or several "
     "starts. No intervals are given"
 )
+Correlation = tuple[float, float, float]
+"""Of neighbours; the probability of such correlations up to the tenth neighbour in white residuals (Box and
+Pierce 1970); and how many times too narrow intervals are, with correlations that fade as the first."""
 Candidate = tuple[FloatArray, str, bool]
 """Columns (m, q), what to do ({0}: size of the first), and whether only noise may be left."""
 
 
-class Correlation(NamedTuple):
-    """Of residuals with those some samples later.
-
-    Of neighbours, the probability of such correlations up to the tenth neighbour in white residuals (Box and
-    Pierce 1970), how many times too narrow intervals are, with correlations that fade as the first, and by
-    what they are multiplied: by 1 where the residuals may be white, or it does not matter.
-    """
-
-    neighbours: float
-    probability: float
-    factor: float
-    widening: float
-
-
-def judge(problem: Problem, path: Iterations, loss: str, poor: str | None = None) -> dict[str, Any]:
-    """The estimate of a fit, without intervals where these would mislead, and all else that `Fit` says of it.
-
-    `poor` is its `misfit`, if that is known.
-    """
+def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
+    """The estimate of a fit, without intervals where these would mislead, and what else `Fit` says of it."""
     estimate, theta, linear = path.estimate, path.estimate.solution, loss == "linear"
     words = ["" if path.converged else f"{path.message}; no intervals are given"]
     judged: dict[str, Any] = dict.fromkeys(
@@ -79,8 +65,11 @@ def judge(problem: Problem, path: Iterations, loss: str, poor: str | None = None
             alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=RCOND), theta, r)
             prior = replace(prior, alone=combined(problem, alone)[0].describe_rank())
         estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
-    seen = None if len(r) < FEWEST or rounding_only(problem, r) else _correlation(problem, r)
-    poor = misfit(problem, estimate.dof, r, loss) if poor is None or prior else poor
+    seen, factor = None, 1.0
+    if len(r) >= FEWEST and not _rounding_only(problem, r):
+        seen = _correlation(problem, r)
+        factor = seen[2] if seen[1] < 1e-4 and seen[2] > 1.2 else 1.0
+    poor = misfit(problem, estimate.dof, r, loss)
     cause, wrong = causes(problem, theta, J, r, seen) if seen and path.converged and linear else ("", False)
     change, integration = _integration(problem, estimate, J)
     words += [integration, poor, cause, path.bound_warning]
@@ -88,18 +77,22 @@ def judge(problem: Problem, path: Iterations, loss: str, poor: str | None = None
         estimate, local = combined(problem, estimate)
         words += [local, "" if estimate.full_rank or poor else estimate.describe_rank()]
     words += [] if prior is None else prior.warnings
-    words += [] if poor else _errors_words(problem, estimate, r, seen, linear)
-    words += _times_words(problem, theta)
+    words += [] if poor else _errors_words(problem, estimate, r, linear)
+    if seen and seen[1] < 1e-4 and not poor:
+        words.append(
+            "the residuals are not random: those of neighbouring samples are correlated "
+            f"({seen[0]:.2f}, Durbin–Watson {2 - 2 * seen[0]:.2f})"
+            + (f": intervals were made {factor:.2g} times as wide" if factor > 1 else "")
+            + ". Either the noise is, or the model does not quite describe the record, or this is a local "
+            "minimum (try several starts)"
+        )
     sound = path.converged and not poor and not wrong and not problem.prior.ridge
-    widening = 1.0 if seen is None else seen.widening
-    if not sound or widening > 1:
-        estimate = _widened(estimate, widening if sound else None)
     return judged | {
-        "estimate": estimate,
-        "reliable": sound and widening == 1,
-        "warnings": words,
+        "estimate": _widened(estimate, factor if sound else None),
+        "reliable": sound and factor == 1,
+        "warnings": [*words, *_times_words(problem, theta)],
         "integration_change": change,
-        "autocorrelation": seen and seen.neighbours,
+        "autocorrelation": seen and seen[0],
         "prior": prior,
         "normal_matrix": normal_matrix(estimate.names, path.regression[0] if path.regression else J),
     }
@@ -109,13 +102,13 @@ def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
     """Words where the model does not describe the record: intervals would be wrong."""
     if not problem.data.any():
         return "the record is zero throughout: a sensor without a signal?"
-    if dof <= 0 or rounding_only(problem, r):
+    if dof <= 0 or _rounding_only(problem, r):
         return ""
     if problem.stated:
         ratio = float(r @ r) / dof
-        if loss == "linear" and ratio > MISFIT and _chance(float(r @ r), dof) < CHANCE:
-            return f"residuals are {np.sqrt(ratio):.2g} times as large as the stated errors explain: {HINT}"
-        return ""
+        if loss != "linear" or ratio <= MISFIT or _chance(float(r @ r), dof) >= CHANCE:
+            return ""
+        return f"residuals are {np.sqrt(ratio):.2g} times as large as the stated errors explain: {HINT}"
     for _, name, rows in problem.series:
         data, part = problem.data[rows], r[rows]
         if loss != "linear":  # without outliers
@@ -124,18 +117,18 @@ def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
         share = float(part @ part) / max(float(np.sum((data - data.mean()) ** 2)), 1e-300)
         left = f"the model leaves {100 * share:.2g} % of the variance of {name}"
         if len(part) < FEWEST:
-            if share > FEW_UNEXPLAINED and len(part) > 2 and np.ptp(data) > 0:
+            if share > 4 * UNEXPLAINED and len(part) > 2 and np.ptp(data) > 0:
                 return f"{left}, in too few samples to tell whether that is noise; if not, {HINT}"
-        elif _correlated([part]).probability < CHANCE:
-            if share > UNEXPLAINED:
-                return f"{left}, and not as noise: {HINT}"
+        elif _correlated([part])[1] < CHANCE:
             power = np.abs(np.fft.rfft(part - part.mean())[1:]) ** 2
-            if np.convolve(power, np.ones(3), "same").max() > LINE * power.sum():
-                return f"{left}, most of it at one frequency: {HINT}; state the errors if it is interference"
+            line = np.convolve(power, np.ones(3), "same").max() > 0.5 * power.sum()
+            if share > UNEXPLAINED or line:
+                how = "most of it at one frequency" if line else "and not as noise"
+                return f"{left}, {how}: {HINT}; state the errors if it is interference"
     return ""
 
 
-def rounding_only(problem: Problem, r: FloatArray) -> bool:
+def _rounding_only(problem: Problem, r: FloatArray) -> bool:
     """Whether nothing but rounding is left."""
     return bool(np.linalg.norm(r) <= 1e-7 * np.linalg.norm(problem.data))
 
@@ -147,12 +140,11 @@ def _correlation(problem: Problem, r: FloatArray) -> Correlation:
 
 def _correlated(series: list[FloatArray]) -> Correlation:
     parts = [part / (float(np.sqrt(np.mean(part**2))) or 1.0) for part in series]
-    total, size = sum(float(part @ part) for part in parts), sum(map(len, parts))
-    lags = range(1, 1 + min(LAGS, max(1, min(len(part) for part in parts) // 5)))
-    rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) for k in lags]) / (total or 1.0)
-    first, probability = float(rho[0]), _chance(size * float(rho @ rho), len(rho))
-    factor = float(np.sqrt((1 + first) / (1 - first))) if 0 < first < 1 else 1.0
-    return Correlation(first, probability, factor, factor if probability < 1e-4 and factor > 1.2 else 1.0)
+    size = sum(map(len, parts))
+    lags = range(1, 1 + min(LAGS, max(1, min(map(len, parts)) // 5)))
+    rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) for k in lags]) / size
+    factor = np.sqrt((1 + rho[0]) / (1 - rho[0])) if 0 < rho[0] < 1 else 1.0
+    return float(rho[0]), _chance(size * float(rho @ rho), len(rho)), float(factor)
 
 
 def _chance(chi_square: float, dof: int) -> float:
@@ -177,19 +169,21 @@ def causes(
     J, r, seen
         Sensitivities (m, n) and residuals (m,) there, and their correlation.
     """
-    from scipy.special import chdtrc, fdtrc
+    from scipy.special import fdtrc
 
-    t = problem.vector([np.tile(x.t[:, None], len(problem.model.outputs)) for x in problem.records])
-    t, series = (t / problem.scale)[:, None], np.zeros((len(r), len(problem.series)))
+    t, series = (
+        problem.by_time([record.t for record in problem.records]),
+        np.zeros((len(r), len(problem.series))),
+    )
     for j, (*_, rows) in enumerate(problem.series):
         series[rows, j] = problem.scale[rows]
-    candidates = [*_hum(problem, t[:, 0], series, J, r)]
-    if seen.probability < 1e-2:
+    candidates = _hum(problem, t, series, J, r)
+    if seen[1] < 1e-2:
         candidates += [
             (series, "the residuals have an offset (estimate it: [nuisance] offset = true)", False),
-            (series * t, "the residuals drift (estimate it: [nuisance] drift = true)", False),
+            (series * t[:, None], "the residuals drift (estimate it: [nuisance] drift = true)", False),
+            *_initial_values(problem, theta),
         ]
-        candidates += _initial_values(problem, theta)
     G = gain(J, rcond=RCOND) if candidates else J.T  # what the parameters take of y is J G y
     named: list[tuple[float, float, str]] = []
     for columns, words, alone in candidates:
@@ -197,67 +191,67 @@ def causes(
         C = columns / size
         outside, q = C - J @ (G @ C), C.shape[1]
         free = len(r) - round(float(np.sum(G.T * J))) - q
-        if free < 3 or np.linalg.norm(outside, axis=0).min() < 1e-6 or np.linalg.cond(outside) > 1e8:
+        if free < 3 or np.linalg.matrix_rank(outside, tol=1e-6) < q:
             continue
         amount = solution(outside, -r)
         rest = r + outside @ amount
         taken, left = float(r @ r - rest @ rest), float(rest @ rest) / free
-        white = rounding_only(problem, rest)
-        after = Correlation(0.0, 1.0, 1.0, 1.0) if white else _correlation(problem, rest)
-        spread = max(left * after.factor**2, 1.0 if problem.stated else 1e-300)
-        probability = chdtrc(q, taken / spread) if problem.stated else fdtrc(q, free, taken / spread / q)
-        move, error = G @ (C @ amount), np.sqrt(spread * (G**2).sum(axis=1))
-        shift = float(np.max(np.abs(move) / np.maximum(error, 1e-300)))
+        _, white, factor = (0.0, 1.0, 1.0) if _rounding_only(problem, rest) else _correlation(problem, rest)
+        spread = max(left * factor**2, 1.0 if problem.stated else 1e-300)
+        error = np.maximum(np.sqrt(spread * (G**2).sum(axis=1)), 1e-300)
+        shift = float(np.max(np.abs(G @ (C @ amount)) / error))
         # a line beside others is rather a vibration that the model does not describe
-        noise = not alone or after.probability >= CHANCE
-        if probability < CHANCE and noise and (taken >= SHARE * float(r @ r) or shift >= FAR):
+        noise = white >= CHANCE or not alone
+        much = taken >= SHARE * float(r @ r) or shift >= FAR
+        if noise and much and fdtrc(q, free, taken / spread / q) < CHANCE:
             named.append((taken, shift, words.format(amount[0] / size[0])))
-    named = [
-        one for one in sorted(named, reverse=True) if one[0] > 0.9 * max(named)[0]
-    ]  # as good as the best
     if not named:
         return "", False
-    wrong, moved = all(shift > FAR for _, shift, _ in named), max(shift for _, shift, _ in named)
-    which, share = "; or ".join(words for *_, words in named), 100 * named[0][0] / float(r @ r)
-    off = f", and move a parameter by {moved:.2g} standard deviations" if moved > 1 else ""
+    # those as good as the best
+    most, shifts, texts = zip(
+        *sorted((one for one in named if one[0] > 0.9 * max(named)[0]), reverse=True), strict=True
+    )
+    wrong, share = min(shifts) > FAR, 100 * most[0] / float(r @ r)
+    off = f", and move a parameter by {max(shifts):.2g} standard deviations" if max(shifts) > 1 else ""
     end = ". No intervals are given" if wrong else ""
-    return f"{which}: that would take {share:.2g} % of the residuals' variance{off}{end}", wrong
+    return f"{'; or '.join(texts)}: that would take {share:.2g} % of the residuals' variance{off}{end}", wrong
 
 
 def _hum(
     problem: Problem, t: FloatArray, series: FloatArray, J: FloatArray, r: FloatArray
-) -> Iterator[Candidate]:
-    """The frequency of a sinusoid that takes most of a series' residuals, with all parameters free."""
+) -> list[Candidate]:
+    """The frequency of a sinusoid that takes most of a series' residuals, with all parameters free.
+
+    Of A, the transforms of an orthonormal basis of J, P = (n − Σ|A|²)/2 and Z = ΣA²/2: a sinusoid outside
+    them takes (P|w|² + Re Z* w²)/(P² − |Z|²) of residuals with the transform w.
+    """
     Q = np.linalg.svd(J, full_matrices=False)[0]
     best, frequency, span = 0.0, 0.0, 1.0
     for *_, rows in problem.series:
-        times, size = t[rows], problem.scale[rows]
-        n = len(times)
+        times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
             continue
         even = np.linspace(times[0], times[-1], n)
         parts = np.column_stack([r, Q])[rows] * size[:, None]
-        waves = np.fft.rfft([np.interp(even, times, part) for part in parts.T], 4 * n)[:, 4:]
-        c, s, a, b = waves[0].real, waves[0].imag, waves[1:].real, waves[1:].imag
+        w, *A = np.fft.rfft([np.interp(even, times, part) for part in parts.T], 4 * n)[:, 4:]
         half = float(size @ size) / 2
-        cc, ss, cs = half - (a * a).sum(axis=0), half - (b * b).sum(axis=0), -(a * b).sum(axis=0)
-        det = cc * ss - cs**2
-        power = np.where(det > 1e-3 * half**2, (ss * c**2 - 2 * cs * c * s + cc * s**2) / det, 0.0)
+        P, Z = half - np.sum(np.abs(A) ** 2, axis=0) / 2, np.sum(np.square(A), axis=0) / 2
+        det = P**2 - np.abs(Z) ** 2
+        power = (P * np.abs(w) ** 2 + (Z.conj() * w**2).real) / np.where(det > 1e-3 * half**2, det, np.inf)
         if power.max() > best:
             best, span = float(power.max()), float(times[-1] - times[0])
             frequency = (4 + int(np.argmax(power))) / (4 * n) * (n - 1) / span
     if best < 20.0 * float(r @ r) / len(r):  # of noise (c⊥ᵀr)² over the mean square is χ² of two
-        return
+        return []
     for mains in (50.0, 60.0):
         whole = mains * max(1, round(frequency / mains))
         frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
-    phase = 2 * np.pi * frequency * t[:, None]
-    yield (
-        np.hstack([series * np.cos(phase), series * np.sin(phase)]),
+    wave = np.exp(2j * np.pi * frequency * t)[:, None]
+    words = (
         f"the residuals hum with {frequency:.5g} Hz (if that is interference, estimate it: "
-        f"[nuisance] hum_Hz = {frequency:.5g})",
-        True,
+        f"[nuisance] hum_Hz = {frequency:.5g})"
     )
+    return [(np.hstack([series * wave.real, series * wave.imag]), words, True)]
 
 
 def _initial_values(problem: Problem, theta: FloatArray) -> Iterator[Candidate]:
@@ -268,23 +262,19 @@ def _initial_values(problem: Problem, theta: FloatArray) -> Iterator[Candidate]:
             tables = [np.zeros_like(data) for data in problem.measured]
             step = 1e-4 * (float(np.abs(problem.runs[number].x[:, i]).max()) or 1.0)
             begin = (*model.initial[:i], model.initial[i] + step, *model.initial[i + 1 :])
+            both = (model, replace(model, initial=begin))
             try:
-                run, moved = (
-                    simulate(one, theta, record, sensitivities=False)
-                    for one in (model, replace(model, initial=begin))
-                )
+                y, moved = (simulate(one, theta, record, sensitivities=False).y for one in both)
             except SimulationError:
                 continue
-            tables[number] = (moved.y - run.y) / step
+            tables[number] = (moved - y) / step
             column, name, value = problem.vector(tables)[:, None], model.states[i], float(model.initial[i])
-            if column.any():
-                yield (
-                    column,
-                    f"the residuals contradict the initial value {value:.4g} of {name}{where}, about "
-                    f"{value:.6g} + ({{0:.3g}}) would suit them (estimate it: [initial] {name} = "
-                    f'"{name}_0", with {name}_0 in [estimate])',
-                    False,
-                )
+            words = (
+                f"the residuals contradict the initial value {value:.4g} of {name}{where}, about "
+                f"{value:.6g} + ({{0:.3g}}) would suit them (estimate it: [initial] {name} = "
+                f'"{name}_0", with {name}_0 in [estimate])'
+            )
+            yield column, words, False
 
 
 # -- errors of the outputs, of the integration and of the times
@@ -292,39 +282,29 @@ def _initial_values(problem: Problem, theta: FloatArray) -> Iterator[Candidate]:
 
 def output_errors(problem: Problem, r: FloatArray, n_parameters: int) -> dict[str, float]:
     """Standard deviation of each output from its residuals; none where only rounding is left."""
-    if rounding_only(problem, r):
+    if _rounding_only(problem, r):
         return {}
-    squares, share = (r / problem.scale) ** 2, 1 - min(n_parameters / len(r), 0.9)
     rows: dict[str, list[FloatArray]] = {}
     for name, _, part in problem.series:
-        rows.setdefault(name, []).append(squares[part])
-    errors = {name: float(np.sqrt(np.concatenate(parts).mean() / share)) for name, parts in rows.items()}
+        rows.setdefault(name, []).append(r[part] / problem.scale[part])
+    share = 1 - min(n_parameters / len(r), 0.9)
+    errors = {name: float(np.sqrt(np.mean(np.concatenate(x) ** 2) / share)) for name, x in rows.items()}
     least = 1e-6 * max(errors.values())  # an output that is met exactly would count for everything
     return {name: max(size, least) for name, size in errors.items()}
 
 
-def _errors_words(
-    problem: Problem, estimate: Estimate, r: FloatArray, seen: Correlation | None, linear: bool
-) -> Iterator[str]:
-    """Where errors are unequal, correlated, or not as stated."""
+def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: bool) -> Iterator[str]:
+    """Where errors are unequal, or not as stated."""
     sizes = {
         words: np.sqrt(np.mean((r[rows] / problem.scale[rows]) ** 2))
         for _, words, rows in problem.series
         if rows.stop - rows.start >= FEWEST
     }
-    alike = problem.stated or problem.errors or rounding_only(problem, r) or not sizes
+    alike = problem.stated or problem.errors or _rounding_only(problem, r) or not sizes
     if linear and not alike and max(sizes.values()) >= 2 * min(sizes.values()):
         yield (
             f"the outputs have different errors ({', '.join(f'{n} {s:.2g}' for n, s in sizes.items())}), "
             "but the intervals hold for equal ones. With --sigma auto precise outputs count for more"
-        )
-    if seen and seen.probability < 1e-4:
-        wide = f": intervals were made {seen.widening:.2g} times as wide" if seen.widening > 1 else ""
-        yield (
-            "the residuals are not random: those of neighbouring samples are correlated "
-            f"({seen.neighbours:.2f}, Durbin–Watson {2 - 2 * seen.neighbours:.2f}){wide}. Either the noise "
-            "is, or the model does not quite describe the record, or this is a local minimum (try several "
-            "starts)"
         )
     if estimate.chi_square is not None and estimate.dof > 0:
         ratio = np.sqrt(estimate.chi_square / estimate.dof)
@@ -339,20 +319,16 @@ def _integration(problem: Problem, estimate: Estimate, J: FloatArray) -> tuple[F
     theta, integrator = estimate.solution, problem.runs[0].integrator
     if integrator in ("expm", "taylor", "none"):
         return None, ""
-    finer = ("auto", RTOL)
-    if integrator not in STEPWISE:
-        finer = problem.integrator, max(problem.rtol / 100, 1e-13)
+    finer = problem.integrator, max(problem.rtol / 100, 1e-13)
+    if integrator in STEPWISE:
+        finer = "auto", RTOL
     missed = problem.residual(theta) - problem.again(*finer, problem.errors).residual(theta)
-    change = np.zeros(len(theta))
-    if np.linalg.norm(missed) > 1e-14 * np.linalg.norm(problem.data):
-        K = problem.prior.below(J)
-        change = solution(K, np.append(missed, np.zeros(len(K) - len(J))), rcond=RCOND)
+    change = solution(problem.prior.below(J), np.append(missed, np.zeros(len(problem.prior))), rcond=RCOND)
     std = np.full(len(change), np.nan) if estimate.std is None else estimate.std
-    limit = np.maximum(1e-8 * np.abs(theta), 0.1 * np.nan_to_num(std))
     words = [
         f"{name} by about {c:.2g}" + ("" if np.isnan(s) else f" (standard deviation {s:.2g})")
-        for name, c, s, most in zip(estimate.names, change, std, limit, strict=True)
-        if abs(c) > most
+        for name, x, c, s in zip(estimate.names, theta, change, std, strict=True)
+        if abs(c) > max(1e-8 * abs(x), 0.1 * np.nan_to_num(s))
     ]
     return change, f"a more accurate integration would change {', '.join(words)}" if words else ""
 

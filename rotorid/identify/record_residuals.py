@@ -147,6 +147,11 @@ class Problem:
         ]
         return np.concatenate(parts)
 
+    def by_time(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """What belongs to the times of each record, (n,), as rows without weights."""
+        tables = [np.tile(column[:, None], len(self.model.outputs)) for column in columns]
+        return self.vector(tables) / self.scale
+
     def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals (m,) and derivatives (m, n).
 

@@ -56,8 +56,7 @@ def iterate(
     """Go on until step 5 of [F] ends it, or without ε a short step at a minimum, in so many steps at most."""
     widths = [np.diff(record.t, prepend=record.t[0]) for record in problem.records]
     # the squares of residuals in the units of the outputs, each times the step before it
-    width = problem.vector([np.tile(h[:, None], len(problem.model.outputs)) for h in widths])
-    width /= problem.scale**3
+    width = problem.by_time(widths) / problem.scale**2
     history: list[FloatArray] = []
     costs, integrals = [], []
     converged, message, by, last = False, f"not converged in {counted(most, 'iteration')}", None, None
