@@ -7,7 +7,7 @@ record. The methods of [Q] and [F] stand beside it as they are printed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,31 +17,21 @@ from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.quasilinearization import grid, quasilinearization
+from rotorid.identify.quasilinearization import first_states, quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
-from rotorid.identify.records import Record, for_copies, inputs_of, recorded_starts
+from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit, Minimum
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
-from rotorid.identify.simulation import simulate
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
 
-WEIGHINGS = 20
-"""Fits at most with weights from the residuals of the last one."""
-OTHERS, LONG = 7, 20
-"""Starts besides, where the first minimum does not describe the record, or the end of a search so long."""
-BETTER = 1.5
-"""Ratio of the sums of squares from which on another minimum is the better one."""
 MOST_STARTS = 10_000
-SAME = 1e-3
-"""Relative difference of parameters below which two minima are one."""
 METHODS: tuple[Method[None], ...] = (
     Method("levenberg-marquardt", "safeguarded, with bounds and robust losses", None),
     Method("gauss-newton", "whole steps without safeguards, as [F]", None),
     Method("quasilinearization", "linear fits about the last trajectory, as [Q]", None),
 )
-Trajectories = Mapping[str, ArrayLike]
 Searching = Callable[[Problem, FloatArray], Iterations]
 
 
@@ -55,7 +45,7 @@ def fit(  # noqa: PLR0913
     start: Mapping[str, float] | None = None,
     loss: str = "linear",
     starts: int | None = None,
-    trajectory: Trajectories | None = None,
+    trajectory: Mapping[str, ArrayLike] | None = None,
     max_iterations: int = 100,
     tolerance: float | None = None,
     rtol: float = RTOL,
@@ -122,8 +112,8 @@ def fit(  # noqa: PLR0913
         raise ValueError(f"the tolerance is a number above 0, not {tolerance:g}")
     _check(model, several, method, integrator, loss, weigh)
     problem = Problem(model, several, integrator, rtol)
-    limits, names = problem.model.bounds, problem.model.parameters
-    begin = inside(_start(problem, start or {}), limits[:, 0], limits[:, 1])
+    (low, high), names = problem.model.bounds.T, problem.model.parameters
+    begin = inside(_start(problem, start or {}), low, high)
     prior = prior_rows(names, for_copies(model, len(several), model.prior), ridge, begin, problem.jacobian)
     if ridge or not weigh:
         problem.prior = prior
@@ -134,7 +124,7 @@ def fit(  # noqa: PLR0913
             steps = sensitivity_steps(problem, theta, near)
             return iterate(problem, "Gauss–Newton", steps, max_iterations, tolerance)
         if method == "quasilinearization":
-            first = [_trajectory(problem, theta, k, trajectory) for k in range(len(several))]
+            first = first_states(problem, theta, trajectory)
             return quasilinearization(problem, theta, first, near, max_iterations, tolerance)
         problem.evaluate(theta)  # says why, where the states diverge
         reached = nonlinear_least_squares(
@@ -143,7 +133,7 @@ def fit(  # noqa: PLR0913
             theta,
             names=names,
             sigma_stated=problem.scaled,
-            bounds=dict(zip(names, map(tuple, limits.tolist()), strict=True)),
+            bounds={name: (a, b) for name, a, b in zip(names, low, high, strict=True)},
             loss=loss,
             max_iterations=max_iterations,
             near=loss == "linear",
@@ -151,12 +141,14 @@ def fit(  # noqa: PLR0913
         )
         return Iterations(**vars(reached))
 
-    begins = spread_starts(begin, limits, count, seed)
+    begins = spread_starts(begin, problem.model.bounds, count, seed)
     paths, more = _searched(search, problem, begins), ""
-    path = min(paths, key=partial(_cost, problem))
-    ended = path.converged or path.iterations > LONG
+    path = min(paths, key=_cost)
+    ended = path.converged or path.iterations > 20
     if starts is None and method == "levenberg-marquardt" and ended:
-        path, more = _from_elsewhere(search, problem, path, begin, loss, seed)
+        path, more = _from_elsewhere(
+            search, problem, path, spread_starts(begin, problem.model.bounds, 7, seed), loss
+        )
     if weigh:
         problem, path = _weighed(search, problem, path)
     if weigh and len(prior):
@@ -164,14 +156,13 @@ def fit(  # noqa: PLR0913
             raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
         problem.prior = prior
         paths = _searched(search, problem, [path.estimate.solution, *begins[1:]])
-        path = min(paths, key=partial(_cost, problem)).after(path.history)
-    minima = _merged(problem, paths) if len(begins) > 1 else ()
-    judged = judge(problem, path, loss)
+        path = min(paths, key=_cost).after(path.history)
+    minima = _merged(paths) if len(begins) > 1 else ()
+    judged, theta = judge(problem, path, loss), path.estimate.solution
     warnings = [*judged.pop("warnings"), more]
     if len(minima) > 1:
         warnings.append(f"{len(minima)} different minima were found; the best is given, see minima")
-    theta = path.estimate.solution
-    outside = bool(((theta < limits[:, 0]) | (theta > limits[:, 1])).any())
+    outside = bool(((theta < low) | (theta > high)).any())
     warnings += [f"{method} knows no bounds, and the result lies outside those of the model"] * outside
     runs = problem.runs if np.isfinite(problem.residual(theta)).all() else ()
     return Fit(
@@ -221,27 +212,25 @@ def _searched(
     search: Searching, problem: Problem, begins: Sequence[FloatArray], paths: Sequence[Iterations] = ()
 ) -> list[Iterations]:
     """Further searches; one from which the states diverge is left out, if there is another."""
-    done, failure = list(paths), None
-    for begin in begins:
+    done = [*paths]
+    for i, begin in enumerate(begins):
         try:
             done.append(search(problem, begin))
-        except SimulationError as error:
-            failure = failure or error
-    if failure and not done:
-        raise failure
+        except SimulationError:
+            if not done and i == len(begins) - 1:
+                raise
     return done
 
 
 def _from_elsewhere(
-    search: Searching, problem: Problem, path: Iterations, begin: FloatArray, loss: str, seed: int
+    search: Searching, problem: Problem, path: Iterations, begins: Sequence[FloatArray], loss: str
 ) -> tuple[Iterations, str]:
     """A better minimum from other starts and words, where the first does not describe the record."""
     if not misfit(problem, path.estimate.dof, path.estimate.residuals, loss):
         return path, ""
-    others = spread_starts(begin, problem.model.bounds, OTHERS, seed)[1:]
-    paths = _searched(search, problem, others, [path])
-    best = min(paths, key=partial(_cost, problem))
-    if _cost(problem, path) <= BETTER * _cost(problem, best):
+    paths = _searched(search, problem, begins, [path])
+    best = min(paths, key=_cost)
+    if _cost(path) <= 1.5 * _cost(best):
         return path, ""
     return best, (
         "from the starting values the search ends where the model does not describe the record; this is from "
@@ -249,29 +238,9 @@ def _from_elsewhere(
     )
 
 
-def _trajectory(
-    problem: Problem, theta: FloatArray, number: int, given: Trajectories | None
-) -> tuple[FloatArray, FloatArray]:
-    """States to begin quasilinearization with, at the times of `refined`, and their slopes."""
-    model, record = problem.models[number], problem.records[number]
-    finer, _ = grid(problem, record)
-    if given is None:
-        x = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False).x
-        return x, model.f(finer.t, x, theta, inputs_of(model, finer))[..., 0]
-    if set(given) != set(model.states):
-        raise ValueError(
-            f"a starting trajectory needs every state ({', '.join(model.states)}); got {', '.join(given)}"
-        )
-    x = np.zeros((len(finer), len(model.states)))
-    for i, name in enumerate(model.states):
-        samples = np.broadcast_to(np.asarray(given[name], dtype=float), record.t.shape)
-        x[:, i] = np.interp(finer.t, record.t, samples)
-    return x, np.gradient(x, finer.t, axis=0) if len(finer) > 1 else np.zeros_like(x)
-
-
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
-    """Weights from the residuals of the last fit, until they stay."""
-    for _ in range(WEIGHINGS if path.converged else 0):
+    """Weights from the residuals of the last fit, until they stay, or 20 times."""
+    for _ in range(20 if path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, path.estimate.rank)
         last = problem.errors
         if all(abs(size - last.get(name, np.inf)) <= 0.002 * size for name, size in errors.items()):
@@ -281,31 +250,32 @@ def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Pro
     return problem, path
 
 
-def _cost(problem: Problem, path: Iterations) -> float:
-    return problem.cost(path.estimate.residuals, path.estimate.solution)
+def _cost(path: Iterations) -> float:
+    return float(path.costs[-1])
 
 
-def _merged(problem: Problem, paths: Sequence[Iterations]) -> tuple[Minimum, ...]:
+def _merged(paths: Sequence[Iterations]) -> tuple[Minimum, ...]:
     """Different minima, the best first."""
-    kept: list[tuple[FloatArray, float, int]] = []
-    for path in sorted((p for p in paths if p.converged), key=partial(_cost, problem)):
-        cost, theta = _cost(problem, path), path.estimate.solution
-        for i, (other, least, count) in enumerate(kept):
+    kept: list[Minimum] = []
+    for path in sorted((p for p in paths if p.converged), key=_cost):
+        theta, cost = path.estimate.solution, _cost(path)
+        for i, one in enumerate(kept):
+            other = np.array([*one.values.values()])
             # parameters that are not determined may differ at the same cost
-            near = np.abs(theta - other) <= SAME * np.maximum(np.abs(theta), np.abs(other)) + 1e-12
-            if near.all() or (not path.estimate.full_rank and abs(cost - least) <= 1e-6 * least):
-                kept[i] = other, least, count + 1
+            alike = not path.estimate.full_rank and cost - one.cost <= 1e-6 * one.cost
+            if alike or np.allclose(theta, other, rtol=1e-3, atol=1e-12):
+                kept[i] = replace(one, starts=one.starts + 1)
                 break
         else:
-            kept.append((theta, cost, 1))
-    names = problem.model.parameters
-    return tuple(Minimum(dict(zip(names, x.tolist(), strict=True)), cost, count) for x, cost, count in kept)
+            kept.append(Minimum(dict(zip(path.names, theta.tolist(), strict=True)), cost, 1))
+    return tuple(kept)
 
 
 def _start(problem: Problem, given: Mapping[str, float]) -> FloatArray:
     """Starting values (n,): those given, else what the records say, else the model's."""
     model, values = problem.given, dict(zip(problem.model.parameters, problem.model.start, strict=True))
-    given = recorded_starts(model, problem.records) | for_copies(model, len(problem.records), given)
+    values |= recorded_starts(model, problem.records)
+    given = for_copies(model, len(problem.records), given)
     if unknown := [name for name in given if name not in values]:
         raise ValueError(f"start: {unknown[0]} is no parameter; parameters are {', '.join(values)}")
     theta = np.array([*(values | given).values()], dtype=float)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -157,18 +157,18 @@ def heun_step(
     then: At,
     z: FloatArray,
     h: At,
-    parts: Sequence[Sequence[int]],
+    parts: Sequence[Any],
 ) -> FloatArray:
     """Predict, then correct part by part: a part takes those before it as corrected, the rest as predicted.
 
     Parameters
     ----------
     rate
-        Of the states (n, …), at `now` and at `then`: times, or whatever it takes for them.
+        Of the states, at `now` and at `then`: times, or whatever it takes for them.
     z, h
         States now, and the length of the step.
     parts
-        Of the n rows of z.
+        Places in z.
     """
     k = rate(now, z)
     new: FloatArray = z + h * k

@@ -11,10 +11,11 @@ need not solve the equations until the end. D + G θ_s is integrated in place of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.integrators import HEUN, heun_step, recurrence
@@ -22,14 +23,13 @@ from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negligible
 from rotorid.identify.records import Record, inputs_of, refined
 from rotorid.identify.sensitivity_steps import Step, iterate
-
-FINER = 2  # steps of DOP853 from sample to sample; of the schemes of `HEUN` one
+from rotorid.identify.simulation import simulate
 
 
 def quasilinearization(
     problem: Problem,
     theta: FloatArray,
-    trajectories: Sequence[tuple[FloatArray, FloatArray]],
+    states: Sequence[FloatArray],
     near: tuple[float, float],
     most: int,
     epsilon: float | None,
@@ -40,11 +40,11 @@ def quasilinearization(
     ----------
     problem
         Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
-        [Q] does; with any other the linear equations are solved by a step of DOP853 from point to point.
+        [Q] does; with any other the linear equations are solved by two steps of DOP853 from sample to sample.
     theta
         First parameters (n,).
-    trajectories
-        First states (n, n_x) of each record at the times of `refined`, and their slopes.
+    states
+        Of each record the first trajectory, see `first_states`.
     near, most, epsilon
         As in `sensitivity_steps` and `iterate`.
 
@@ -53,88 +53,102 @@ def quasilinearization(
     SimulationError
         The linear equations have no finite solution with the starting values.
     """
-    grids = [grid(problem, record) for record in problem.records]
-    samples = [tuple(x[at] for (x, _), (_, at) in zip(trajectories, grids, strict=True))]
+    grids = [_grid(problem, record) for record in problem.records]
+    samples = [tuple(x[at] for x, (_, at) in zip(states, grids, strict=True))]
     rows: list[tuple[FloatArray, FloatArray]] = []
 
-    def steps(theta: FloatArray, states: Sequence[tuple[FloatArray, FloatArray]]) -> Iterator[Step]:
-        last = np.inf
+    def steps(theta: FloatArray, states: Sequence[FloatArray]) -> Iterator[Step]:
+        last = 1e-300
         yield theta, problem.residual(theta), None, theta, False, False
         while True:
             tables = [
-                linear_solutions(model, theta, record, *x, problem.integrator)
+                linear_solutions(model, theta, record, x, problem.integrator)
                 for model, (record, _), x in zip(problem.models, grids, states, strict=True)
             ]
-            there = [W[at] for (W, _), (_, at) in zip(tables, grids, strict=True)]
+            there = [W[at] for W, (_, at) in zip(tables, grids, strict=True)]
             K, Y = linear_rows(problem, theta, samples[-1], there)
             fitted = problem.linear_fit(K, Y, theta)
             step = fitted.solution
             rows[:], theta = [(K, Y + K @ theta)], theta + step
-            states = [(W @ np.append(1.0, step), rates @ np.append(1.0, step)) for W, rates in tables]
-            samples.append(tuple(W @ np.append(1.0, step) for W in there))
+            states = [W @ np.append(1.0, step) for W in tables]
+            samples.append(tuple(x[at] for x, (_, at) in zip(states, grids, strict=True)))
             pairs = zip(*samples[-2:], strict=True)
             still = all(np.abs(b - a).max(initial=0) < 1e-3 * np.abs(b).max(initial=1e-300) for a, b in pairs)
             # quadratic convergence: the next step is smaller than this one by more than this than the last
             size = max(float(np.abs(step).max()), 1e-300)
-            following, last = step * min(1.0, size / last if np.isfinite(last) else 1.0), size
+            following, last = step * min(1.0, size / last), size
             short, settled = (negligible(following, theta, fitted, x) for x in ((1e-9, 1e-5), near))
             yield theta, fitted.residuals, fitted, step, short, still and settled
 
-    done = iterate(problem, "quasilinearization", steps(theta, trajectories), most, epsilon)
+    done = iterate(problem, "quasilinearization", steps(theta, states), most, epsilon)
     return replace(done, trajectories=tuple(samples), regression=rows[0])
 
 
-def grid(problem: Problem, record: Record) -> tuple[Record, IntArray]:
+def _grid(problem: Problem, record: Record) -> tuple[Record, IntArray]:
     """The times of a trajectory, and where those of the record stand among them."""
-    return refined(record, FINER) if problem.integrator not in HEUN else (record, np.arange(len(record)))
+    return (record, np.arange(len(record))) if problem.integrator in HEUN else refined(record, 2)
+
+
+def first_states(
+    problem: Problem, theta: FloatArray, given: Mapping[str, ArrayLike] | None
+) -> list[FloatArray]:
+    """States (n, n_x) to begin with: the model's solution, or as given at the times of each record."""
+    made = []
+    for model, record in zip(problem.models, problem.records, strict=True):
+        finer, at = _grid(problem, record)
+        if given is None:
+            run = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False)
+            made.append(run.x)
+            continue
+        if {*given} != {*model.states}:
+            names = ", ".join(model.states)
+            raise ValueError(f"a starting trajectory needs every state ({names}); got {', '.join(given)}")
+        columns = [np.broadcast_to(np.asarray(given[n], dtype=float), record.t.shape) for n in model.states]
+        made.append(np.array([np.interp(finer.t, finer.t[at], x) for x in columns]).T)
+    return made
 
 
 def linear_solutions(
-    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, slopes: FloatArray, integrator: str
-) -> tuple[FloatArray, FloatArray]:
-    """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), and dW/dt.
+    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, integrator: str
+) -> FloatArray:
+    """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), about θ_s and states (n, n_x).
 
-    About θ_s and states (n, n_x) with slopes. All steps are taken at once: W is P W + q of the last.
+    All steps are taken at once: W is P W + q of the last.
     """
     from scipy.integrate import DOP853
-    from scipy.interpolate import CubicHermiteSpline
+    from scipy.interpolate import CubicSpline
 
     t, n, u, first = record.t, len(model.states), inputs_of(model, record), model.x0(theta)
     if not n or len(t) == 1:
-        W = np.broadcast_to(first, (len(t), *first.shape))
-        return W, np.zeros_like(W)
+        return np.broadcast_to(first, (len(t), *first.shape))
 
     def linear(t: FloatArray, x: FloatArray, u: FloatArray) -> FloatArray:
         """[A B] of dW/dt = A W + B."""
         table = model.f(t, x, theta, u)
         A, B = table[..., 1 : 1 + n], table[..., 1 + n :]
-        constant = table[..., 0] - (A @ x[..., None])[..., 0]
-        return np.concatenate([A, constant[..., None], B], axis=-1)
+        return np.concatenate([A, table[..., :1] - A @ x[..., None], B], axis=-1)
 
     def rate(table: FloatArray, z: FloatArray) -> FloatArray:
-        rates = table[..., :n] @ z
+        rates: FloatArray = table[..., :n] @ z
         rates[..., n:] += table[..., n:]
         return rates
 
     h, table = np.diff(t)[:, None, None], linear(t, x, u)
     z = np.broadcast_to(np.eye(n, n + first.shape[1]), table[1:].shape)
     if integrator in HEUN:
-        # with the states first, as it takes them
-        turned = lambda table, z: np.moveaxis(rate(table, np.moveaxis(z, 0, 1)), 1, 0)  # noqa: E731
-        z = np.moveaxis(z, 1, 0)
-        z = heun_step(turned, table[:-1], table[1:], z, h[..., 0], HEUN[integrator](n))
-        end = np.moveaxis(z, 0, 1)
+        parts = [np.s_[:, part] for part in HEUN[integrator](n)]
+        z = heun_step(rate, table[:-1], table[1:], z, h, parts)
     else:
-        curve, rates = CubicHermiteSpline(t, x, slopes), np.zeros((12, *z.shape))
+        curve, rates = CubicSpline(t, x), np.zeros((12, *z.shape))
         for j, (weights, c) in enumerate(zip(DOP853.A, DOP853.C, strict=True)):
             times = t[:-1] + c * h[:, 0, 0]
             between = linear(times, curve(times), u[:-1] + c * np.diff(u, axis=0)) if j else table[:-1]
             rates[j] = rate(between, z + h * np.tensordot(weights[:j], rates[:j], 1))
-        end = z + h * np.tensordot(DOP853.B, rates, 1)
-    W = np.concatenate([first[None], recurrence(end[..., :n], first, end[..., n:])])
+        z = z + h * np.tensordot(DOP853.B, rates, 1)
+    W = np.concatenate([first[None], recurrence(z[..., :n], first, z[..., n:])])
     if not np.isfinite(W).all():
         raise SimulationError("the linearised equations have no finite solution; start from another place")
-    return W, table[..., :n] @ W + table[..., n:]
+    return W
 
 
 def linear_rows(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,36 +88,42 @@ class Problem:
     ) -> None:
         self.given, self.records = model, tuple(from_t0(model, record) for record in records)
         self.integrator, self.rtol, self.errors = integrator, rtol, dict(errors or {})
-        if not self.records:
+        if not records:
             raise ValueError("a fit needs at least one record")
-        self.models = models_of(model, len(self.records))
+        self.models = models_of(model, len(records))
         """One per record, all with the same parameters."""
-        self.model = self.models[0]
+        self.model, outputs = self.models[0], self.models[0].outputs
         self.prior = prior or prior_rows(self.model.parameters, {})
         self.inputs = [inputs_of(model, record) for record in self.records]
-        self.measured, deviations = zip(*map(self._tables, self.records), strict=True)
+        for record in self.records:
+            unknown = ", ".join(name for name in record.outputs if name not in outputs)
+            if unknown:
+                raise ValueError(
+                    f"{record.name}: {unknown} is no output of the model; outputs are {', '.join(outputs)}"
+                )
+            if not record.outputs:
+                raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
+        self.measured = [_table(record.outputs, outputs, len(record)) for record in self.records]
+        stated = [_table(record.sigma or {}, outputs, len(record)) for record in self.records]
         self.masks = [~np.isnan(data) for data in self.measured]
-        known = np.concatenate([~np.isnan(s[m]) for s, m in zip(deviations, self.masks, strict=True)])
+        known = np.concatenate([~np.isnan(s[m]) for s, m in zip(stated, self.masks, strict=True)])
         self.stated = bool(known.any())
         if self.stated and not known.all():
             raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        sizes = [self.errors.get(name, 1.0) for name in self.model.outputs]
-        self.weights = [1.0 / np.where(np.isnan(sigma), sizes, sigma) for sigma in deviations]
+        sizes = [self.errors.get(name, 1.0) for name in outputs]
+        self.weights = [1.0 / np.where(np.isnan(sigma), sizes, sigma) for sigma in stated]
         self.series: list[tuple[str, str, slice]] = []
         """Of each output of a record its name, words for it, and its rows."""
-        low, several = 0, len(self.records) > 1
+        low = 0
         for record, mask in zip(self.records, self.masks, strict=True):
             mask[:1, self.model.fixed_at_first] = False
-            for name, count in zip(self.model.outputs, mask.sum(axis=0).tolist(), strict=True):
-                if count:
-                    words = f"{name} in {record.name}" if several else name
-                    self.series.append((name, words, slice(low, low + count)))
+            for name, count in zip(outputs, mask.sum(axis=0).tolist(), strict=True):
+                words = f"{name} in {record.name}" if len(records) > 1 else name
+                self.series += [(name, words, slice(low, low + count))] * (count > 0)
                 low += count
         if not low:
             raise ValueError("the records have no samples of an output beside those that known values fix")
-        self.data, self.scale = (
-            self.vector([x(y) for y in self.measured]) for x in (np.asarray, np.ones_like)
-        )
+        self.data, self.scale = self.vector(self.measured), self.vector([*map(np.ones_like, self.measured)])
         """Measured values and 1 as weighted rows."""
         most = np.abs(self.data).max()
         if most > LARGEST or 0 < most < 1 / LARGEST:
@@ -128,7 +135,7 @@ class Problem:
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
         self.quick = integrator
-        """That of the evaluations: after the first one "taylor" where that is worth compiling."""
+        """That of the evaluations: for "auto" that which is quick for this model and these times."""
 
     @property
     def scaled(self) -> bool:
@@ -163,28 +170,33 @@ class Problem:
         if self._last is None or self._last[0] != theta.tobytes():
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
-            runs, r, J = self._evaluated(theta)
-            steps = sum(run.steps for run in runs) if self._last is None and self.quick == "auto" else 0
-            if len({*self.models}) == 1 and worth_compiling(self.model, steps):
-                self.quick = "taylor"
-                again = self._evaluated(theta)
-                if np.abs(again[1] - r).max() <= 1e-7 * (np.abs(r) + np.abs(self.data)).max():
-                    runs, r, J = again
-                else:
-                    self.quick = "dop853"
-            self._last, self.runs = (theta.tobytes(), r, J), runs
+            if self._last is None and self.quick == "auto" and len({*self.models}) == 1:
+                self.quick = self._quickest(theta)
+            runs = self._simulated(theta, self.quick)
+            r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
+            J = self.vector([run.y_theta for run in runs])
+            if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
+                raise SimulationError(
+                    "the outputs of the model, or their sensitivities, are beyond all bounds"
+                )
+            self._last, self.runs = (theta.tobytes(), r, J), tuple(runs)
         return self._last[1:]
 
-    def _evaluated(self, theta: FloatArray) -> tuple[tuple[Trajectory, ...], FloatArray, FloatArray]:
-        runs = tuple(
-            simulate(model, theta, record, integrator=self.quick, rtol=self.rtol)
-            for model, record in zip(self.models, self.records, strict=True)
-        )
-        r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
-        J = self.vector([run.y_theta for run in runs])
-        if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
-            raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
-        return runs, r, J
+    def _simulated(self, theta: FloatArray, integrator: str, **options: Any) -> list[Trajectory]:  # noqa: ANN401
+        options = {"rtol": self.rtol} | options
+        pairs = zip(self.models, self.records, strict=True)
+        return [simulate(m, theta, record, integrator=integrator, **options) for m, record in pairs]
+
+    def _quickest(self, theta: FloatArray) -> str:
+        """Taylor series where compiling is worth it and they find what a rough integration finds."""
+        if self.model.linear_driven:
+            return "auto"
+        rough = self._simulated(theta, "auto", rtol=1e-6, sensitivities=False)
+        if not worth_compiling(self.model, (1 if self.model.timed else 4) * sum(run.steps for run in rough)):
+            return "auto"
+        pairs = zip(rough, self._simulated(theta, "taylor"), strict=True)
+        same = all(np.abs(a.y - b.y).max() <= 1e-4 * np.abs(a.y).max() for a, b in pairs)
+        return "taylor" if same else "auto"
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""
@@ -209,21 +221,10 @@ class Problem:
         step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
         return replace(step, residuals=step.residuals[: len(Y)])
 
-    def _tables(self, record: Record) -> tuple[FloatArray, FloatArray]:
-        """Measured values and their deviations, (n, n_y) each, NaN where there are none."""
-        outputs = ", ".join(self.model.outputs)
-        if unknown := [name for name in record.outputs if name not in self.model.outputs]:
-            raise ValueError(
-                f"{record.name}: {', '.join(unknown)} is no output of the model; outputs are {outputs}"
-            )
-        if not record.outputs:
-            raise ValueError(f"{record.name} has no column of an output: {outputs}")
 
-        def table(columns: Mapping[str, float | FloatArray]) -> FloatArray:
-            full = [np.broadcast_to(columns.get(n, np.nan), len(record)) for n in self.model.outputs]
-            return np.stack(full, axis=-1)
-
-        return table(record.outputs), table(record.sigma or {})
+def _table(columns: Mapping[str, float | FloatArray], outputs: Sequence[str], samples: int) -> FloatArray:
+    """Columns of the outputs, (samples, n_y), NaN where there are none."""
+    return np.stack([np.broadcast_to(columns.get(n, np.nan), samples) for n in outputs], axis=-1)
 
 
 def at(step: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
