@@ -124,7 +124,7 @@ def _solve(system: System, name: str, rtol: float, most: int) -> tuple[FloatArra
                     table[row:upto] = solver.dense_output()(t[row:upto]).T
                 row, now = upto, np.abs(solver.y)
                 if (now > sizes).any():
-                    sizes = np.maximum(1.5 * now, sizes)
+                    sizes = np.maximum(now, sizes)
                     solver.atol = _tolerances(system, sizes, rtol)
     return table, float(t[-1])
 

@@ -122,9 +122,10 @@ def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
         elif _correlated([part])[1] < CHANCE:
             power = np.abs(np.fft.rfft(part - part.mean())[1:]) ** 2
             line = np.convolve(power, np.ones(3), "same").max() > 0.5 * power.sum()
-            if share > UNEXPLAINED or line:
-                how = "most of it at one frequency" if line else "and not as noise"
-                return f"{left}, {how}: {HINT}; state the errors if it is interference"
+            if share > UNEXPLAINED:
+                return f"{left}, and not as noise: {HINT}"
+            if line:
+                return f"{left}, most of it at one frequency: {HINT}; state the errors if it is interference"
     return ""
 
 

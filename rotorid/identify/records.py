@@ -135,8 +135,7 @@ def inputs_of(model: OdeModel, record: Record) -> FloatArray:
     if missing := [name for name in model.inputs if name not in record.inputs]:
         have = ", ".join(record.inputs) or "none"
         raise ValueError(f"{record.name}: the input {missing[0]} is missing; inputs are: {have}")
-    columns = [record.inputs[name] for name in model.inputs]
-    return np.array(columns).reshape(len(columns), len(record)).T
+    return np.array([record.inputs[name] for name in model.inputs]).reshape(-1, len(record)).T
 
 
 def record_names(names: Sequence[str]) -> list[str]:
@@ -152,11 +151,8 @@ def record_names(names: Sequence[str]) -> list[str]:
     if len(set(names)) < len(names):
         return [f"record {k + 1}" for k in range(len(names))]
     parts = [PurePath(name).parts or (name,) for name in names]
-    for depth in range(1, max(len(part) for part in parts) + 1):
-        short = ["/".join(part[-depth:]) for part in parts]
-        if len(set(short)) == len(short):
-            return short
-    return list(names)
+    every = (["/".join(part[-depth:]) for part in parts] for depth in range(1, max(map(len, parts)) + 1))
+    return next((short for short in every if len({*short}) == len(names)), list(names))
 
 
 def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
@@ -174,17 +170,15 @@ def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
     import sympy
 
     copies = _copies(model, count)
-    place = [model.parameters.index(name) for name, each in copies.items() for _ in each]
+    place = [i for i, each in enumerate(copies.values()) for _ in each]
+    new: dict[str, Any] = {"parameters": sum(copies.values(), ()), "per_record": ()}
+    new |= {"start": model.start[place], "bounds": model.bounds[place]}
     models = []
     for i in range(count):
         put = {sympy.Symbol(name): sympy.Symbol(copies[name][i]) for name in model.per_record}
-        parts: dict[str, Any] = {
-            kind: tuple(e.subs(put) for e in getattr(model, kind))
-            for kind in ("rates", "initial", "observed", "inertia")
-        }
-        names = tuple(copy for each in copies.values() for copy in each)
-        start, bounds = model.start[place], model.bounds[place]
-        models.append(replace(model, parameters=names, start=start, bounds=bounds, per_record=(), **parts))
+        for kind in ("rates", "initial", "observed", "inertia"):
+            new[kind] = tuple(e.subs(put) for e in getattr(model, kind))
+        models.append(replace(model, **new))
     return tuple(models)
 
 
