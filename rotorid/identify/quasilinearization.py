@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,7 +55,12 @@ def quasilinearization(
         The linear equations have no finite solution with the starting values.
     """
     grids = [_grid(problem, record) for record in problem.records]
-    samples = [tuple(x[at] for x, (_, at) in zip(states, grids, strict=True))]
+
+    def seen(states: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+        """At the times of the records."""
+        return tuple(x[at] for x, (_, at) in zip(states, grids, strict=True))
+
+    samples = [seen(states)]
     rows: list[tuple[FloatArray, FloatArray]] = []
 
     def steps(theta: FloatArray, states: Sequence[FloatArray]) -> Iterator[Step]:
@@ -65,13 +71,12 @@ def quasilinearization(
                 linear_solutions(model, theta, record, x, problem.integrator)
                 for model, (record, _), x in zip(problem.models, grids, states, strict=True)
             ]
-            there = [W[at] for W, (_, at) in zip(tables, grids, strict=True)]
-            K, Y = linear_rows(problem, theta, samples[-1], there)
+            K, Y = linear_rows(problem, theta, samples[-1], seen(tables))
             fitted = problem.linear_fit(K, Y, theta)
             step = fitted.solution
             rows[:], theta = [(K, Y + K @ theta)], theta + step
             states = [W @ np.append(1.0, step) for W in tables]
-            samples.append(tuple(x[at] for x, (_, at) in zip(states, grids, strict=True)))
+            samples.append(seen(states))
             pairs = zip(*samples[-2:], strict=True)
             still = all(np.abs(b - a).max(initial=0) < 1e-3 * np.abs(b).max(initial=1e-300) for a, b in pairs)
             # quadratic convergence: the next step is smaller than this one by more than this than the last
@@ -93,18 +98,18 @@ def first_states(
     problem: Problem, theta: FloatArray, given: Mapping[str, ArrayLike] | None
 ) -> list[FloatArray]:
     """States (n, n_x) to begin with: the model's solution, or as given at the times of each record."""
-    made = []
-    for model, record in zip(problem.models, problem.records, strict=True):
-        finer, at = _grid(problem, record)
+    made, states = [], problem.model.states
+    if given is not None and {*given} != {*states}:
+        raise ValueError(
+            f"a starting trajectory needs every state ({', '.join(states)}); got {', '.join(given)}"
+        )
+    for model, (finer, at) in zip(problem.models, map(partial(_grid, problem), problem.records), strict=True):
         if given is None:
-            run = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False)
-            made.append(run.x)
-            continue
-        if {*given} != {*model.states}:
-            names = ", ".join(model.states)
-            raise ValueError(f"a starting trajectory needs every state ({names}); got {', '.join(given)}")
-        columns = [np.broadcast_to(np.asarray(given[n], dtype=float), record.t.shape) for n in model.states]
-        made.append(np.array([np.interp(finer.t, finer.t[at], x) for x in columns]).T)
+            integrator = problem.integrator
+            made.append(simulate(model, theta, finer, integrator=integrator, sensitivities=False).x)
+        else:
+            columns = [np.broadcast_to(np.asarray(given[n], dtype=float), len(at)) for n in states]
+            made.append(np.transpose([np.interp(finer.t, finer.t[at], x) for x in columns]))
     return made
 
 

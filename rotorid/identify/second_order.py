@@ -94,14 +94,11 @@ def second_order(  # noqa: PLR0913
         raise ValueError(f"{n} names of displacements are needed, not {len(dofs)}")
     if extra := [name for name in force if name not in dofs]:
         raise ValueError(f"force: {extra[0]} is no displacement; displacements are {', '.join(dofs)}")
+    rates = [f"v_{dof}" for dof in dofs]
     states: dict[str, str] = {}
-    for dof, *rows in zip(dofs, c, k, strict=True):
-        products = [
-            f"({value})*{rate}{other}"
-            for row, rate in zip(rows, ("v_", ""), strict=True)
-            for value, other in zip(row, dofs, strict=True)
-            if value != "0"
-        ]
+    for dof, *row in zip(dofs, c, k, strict=True):
+        terms = zip([*row[0], *row[1]], [*rates, *dofs], strict=True)
+        products = [f"({value})*{name}" for value, name in terms if value != "0"]
         states |= {dof: f"v_{dof}", f"v_{dof}": " - ".join([f"({force.get(dof, 0)})", *products])}
     plain = ode_model(
         states,
@@ -155,9 +152,9 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
     if not model.states:
         raise ValueError("a model without states has no state space")
     varying = [s for s in model.symbols if s.name in {*model.states, *model.inputs}]
-    parts = {f"the rate of {x}": e for x, e in zip(model.states, model.rates, strict=True)}
-    parts |= {f"the output {y}": e for y, e in zip(model.outputs, model.observed, strict=True)}
-    for what, e in parts.items():
+    parts = [(f"the rate of {x}", e) for x, e in zip(model.states, model.rates, strict=True)]
+    parts += [(f"the output {y}", e) for y, e in zip(model.outputs, model.observed, strict=True)]
+    for what, e in parts:
         if "t" in names_in(e):
             raise ValueError(
                 f"{what} depends on the time itself: a state space does not; make what varies an input"
@@ -169,12 +166,11 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
     values = model.start if theta is None else np.asarray(theta, dtype=float)
     if values.shape != model.start.shape or not np.isfinite(values).all():
         raise ValueError(f"{len(model.parameters)} parameter values are needed, finite numbers")
-    n, m = len(model.states), len(model.inputs)
-    A, _, B = np.split(model.matrices(values)[0], (n, n + 1), axis=1)
-    # linear, and 0 without inputs: the outputs of unit inputs are the columns of D
-    table = model.h(np.zeros(m), np.zeros((m, n)), values, np.eye(m))
-    C = model.h(0.0, np.zeros(n), values, np.zeros(m))[:, 1 : 1 + n]
-    return StateSpace(A, B, C, table[..., 0].T.copy(), model.states, model.inputs, model.outputs)
+    A, _, B = np.split(model.matrices(values)[0], np.add(len(model.states), (0, 1)), axis=1)
+    # linear, and 0 without states and inputs: outputs of unit states and inputs are the columns of C and D
+    n, both = len(A), np.eye(len(varying))
+    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
+    return StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)
 
 
 def _entries(matrix: Matrix, what: str) -> list[list[str]]:
