@@ -4,9 +4,12 @@ Differentiating dx/dt = f(t, x, θ, u) by θ and exchanging the derivatives give
 
     dS/dt = f_x S + f_θ,    S(t0) = ∂x0/∂θ                                      [F] (3.6)
 
-A linear model with constant coefficients is solved exactly. With z = (x, w), where w are 1, the
-inputs and their slopes, dz/dt = M z; from sample to sample z' = e^{Mh} z, and S' = e^{Mh} S + (∂e^{Mh}/∂θ) z.
-The derivative of e^A in the direction E is the upper right block of the exponential of [[A, E], [0, A]].
+A linear model with constant coefficients is solved exactly: its states, their sensitivities by the parameters
+of A, b and B, and what drives them, w = (1, the inputs, their slopes), are one linear system
+
+    dx/dt = A x + B w,    ds_j/dt = A s_j + A_j x + B_j w,    dw/dt = N w,
+
+so that a matrix exponential leads from sample to sample. Other parameters act by the initial values alone.
 """
 
 from __future__ import annotations
@@ -73,66 +76,38 @@ def exact(system: System) -> FloatArray:
             "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
             "or auto"
         )
-    u = system.u[:, : system.u.shape[1] * model.driven]
-    nu = u.shape[1]
-    matrix = np.zeros((1 + k, n + 1 + 2 * nu, n + 1 + 2 * nu))
-    matrix[:, :n, : n + 1 + nu] = model.matrices(system.theta)[: 1 + k, :, : n + 1 + nu]
-    matrix[0, n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
-    moving = np.flatnonzero(matrix[1:].any(axis=(1, 2)))  # others act by the initial values alone
+    from scipy.linalg import expm
+
+    tables, nu = model.matrices(system.theta)[: 1 + k], system.u.shape[1]
+    sizes = np.abs(tables).max(axis=(1, 2))
+    moving = 1 + np.flatnonzero(sizes[1:])
+    scale = sizes[0] / sizes[moving]  # A_j as large as A: larger ones would cost digits
+    scale[scale == 0] = 1.0
+    m = n * (1 + len(moving))
+    M = np.zeros((m + 1 + 2 * nu, m + 1 + 2 * nu))
+    M[:m, :m] = np.kron(np.eye(1 + len(moving)), tables[0, :, :n])
+    parts = np.concatenate([tables[:1], tables[moving] * scale[:, None, None]]).reshape(m, -1)
+    M[n:m, :n], M[:m, m : m + 1 + nu] = parts[n:, :n], parts[:, n:]
+    M[m + 1 : m + 1 + nu, m + 1 + nu :] = np.eye(nu)
     steps = np.diff(t)
-    w = np.column_stack([np.ones(len(t) - 1), u[:-1], np.diff(u, axis=0) / steps[:, None]])[..., None]
-    x, s = np.empty((len(t), n, 1)), np.empty((len(t), n, k))
-    x[0, :, 0], s[0] = system.first[:n], system.first[n:].reshape(n, k)
+    w = np.column_stack([np.ones(len(steps)), system.u[:-1], np.diff(system.u, axis=0) / steps[:, None]])
     # of steps that differ by rounding the mean is taken: an error of one would add up over the record
     kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
     _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
     lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
-    size = max(1, BATCH // ((1 + k) * matrix[0].size))
+    S = system.first[n:].reshape(n, k)
+    z, s = np.zeros((len(t), m, 1)), np.zeros((len(t), n, k))
+    z[0, :, 0], s[0] = np.append(system.first[:n], S[:, moving - 1].T * scale[:, None]), S
+    size = max(1, BATCH // M.size)
     for low in range(0, len(steps), size):
-        high = min(low + size, len(steps))
-        used, place = np.unique(which[low:high], return_inverse=True)
-        h = lengths[used][:, None, None]
-        P, D = expm_and_derivatives(h * matrix[0], h[:, None] * matrix[1 + moving])
-        if len(h) > 1:
-            P, D = P[place], D[place]
-        x[low + 1 : high + 1] = recurrence(P[:, :n, :n], x[low], P[:, :n, n:] @ w[low:high])
-        z = np.concatenate([x[low:high], w[low:high]], axis=1)
-        bend = np.zeros((high - low, n, k))
-        bend[:, :, moving] = (D[:, :, :n] @ z[:, None])[..., 0].swapaxes(1, 2)
-        s[low + 1 : high + 1] = recurrence(P[:, :n, :n], s[low], bend)
-    return np.concatenate([x[:, :, 0], s.reshape(len(t), -1)], axis=1)
-
-
-def expm_and_derivatives(matrix: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """e^A and its derivatives in directions E: blocks of the exponential of [[A, E], [0, A]].
-
-    Parameters
-    ----------
-    matrix
-        A, shape (..., n, n).
-    direction
-        E, shape (..., k, n, n): k directions for each matrix.
-
-    Returns
-    -------
-    tuple
-        e^A (..., n, n) and d/dε e^{A + ε E} at ε = 0, (..., k, n, n); not finite where they overflow.
-    """
-    from scipy.linalg import expm
-
-    if not np.isfinite(direction).all() or not np.isfinite(matrix).all():
-        return np.full_like(matrix, np.nan), np.full_like(direction, np.nan)
-    if not direction.size:
-        return expm(matrix), direction
-    n, A = matrix.shape[-1], matrix[..., None, :, :]
-    # E as large as A: a larger one would cost digits of e^A
-    sizes = [np.linalg.norm(part, axis=(-2, -1), keepdims=True) for part in (A, direction)]
-    scale = np.where(sizes[0] * sizes[1] > 0, sizes[0] / np.maximum(sizes[1], 1e-300), 1.0)
-    blocks = np.zeros((*direction.shape[:-2], 2 * n, 2 * n))
-    blocks[..., :n, :n] = blocks[..., n:, n:] = A
-    blocks[..., :n, n:] = scale * direction
-    whole = expm(blocks)
-    return whole[..., 0, :n, :n], whole[..., :n, n:] / scale
+        rows = slice(low + 1, min(low + size, len(steps)) + 1)
+        used, place = np.unique(which[low : rows.stop - 1], return_inverse=True)
+        P = expm(lengths[used][:, None, None] * M)
+        P = P[place] if len(P) > 1 else P
+        z[rows] = recurrence(P[:, :m, :m], z[low], P[:, :m, m:] @ w[low : rows.stop - 1, :, None])
+        s[rows] = recurrence(P[:, :n, :n], s[low], np.zeros((len(place), n, k)))
+    s[..., moving - 1] = (z[:, n:, 0] / np.repeat(scale, n)).reshape(len(t), -1, n).swapaxes(1, 2)
+    return np.concatenate([z[:, :n, 0], s.reshape(len(t), -1)], axis=1)
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
