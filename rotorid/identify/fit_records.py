@@ -16,7 +16,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
-from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.quasilinearization import first_states, quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
 from rotorid.identify.records import Record, for_copies, recorded_starts
@@ -276,8 +276,7 @@ def _start(problem: Problem, given: Mapping[str, float]) -> FloatArray:
     model, values = problem.given, dict(zip(problem.model.parameters, problem.model.start, strict=True))
     values |= recorded_starts(model, problem.records)
     given = for_copies(model, len(problem.records), given)
-    if unknown := [name for name in given if name not in values]:
-        raise ValueError(f"start: {unknown[0]} is no parameter; parameters are {', '.join(values)}")
+    check_known("start", given, "parameter", values)
     theta = np.array([*(values | given).values()], dtype=float)
     if not np.isfinite(theta).all():
         raise ValueError("starting values must be finite numbers")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -278,10 +278,8 @@ def ode_model(
     _check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs}, outputs)
     if missing := [name for name in states if name not in initial]:
         raise ValueError(f"initial: the value of the state {missing[0]} is missing")
-    if extra := [name for name in initial if name not in states]:
-        raise ValueError(f"initial: {extra[0]} is no state; states are {', '.join(states) or 'none'}")
-    if lost := [name for name in per_record if name not in estimate]:
-        raise ValueError(f"per_record: {lost[0]} is no parameter; parameters are {', '.join(estimate)}")
+    check_known("initial", initial, "state", states)
+    check_known("per_record", per_record, "parameter", estimate)
     _check_numbers("parameter", "starting value", estimate)
     _check_numbers("known value", "value", known)
     names = ["t", *states, *estimate, *inputs]
@@ -341,6 +339,15 @@ def read_expression(
     if value.has(sympy.zoo, sympy.nan, sympy.oo, sympy.I):
         raise ValueError(f"{where}: {expressions.quote(text)} has no finite real value with known values")
     return value
+
+
+def check_known(where: str, names: Iterable[str], kind: str, known: Collection[str]) -> None:
+    """Refuse names that are none of a model."""
+    for name in names:
+        if name not in known:
+            raise ValueError(
+                f"{where}: {name} is no {kind}; {kind.split()[0]}s are {', '.join(known) or 'none'}"
+            )
 
 
 def _measuring(state: str, outputs: Mapping[str, str]) -> str:
@@ -414,9 +421,8 @@ def _limits(
     bounds: Mapping[str, tuple[float, float]], estimate: Mapping[str, float], more: int
 ) -> FloatArray:
     """Bounds of all parameters, (n_p, 2), without any for those that the records begin with."""
+    check_known("bounds", bounds, "parameter", estimate)
     for name, (low, high) in bounds.items():
-        if name not in estimate:
-            raise ValueError(f"bounds: {name} is no parameter; parameters are {', '.join(estimate)}")
         if not low < high:
             raise ValueError(f"bounds of {name}: the lower one, {low:g}, must be below the upper, {high:g}")
         if not low <= estimate[name] <= high:

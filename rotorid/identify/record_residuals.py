@@ -10,7 +10,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.adaptive_steps import worth_compiling
-from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.records import Record, from_t0, inputs_of, models_of
 from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
@@ -96,11 +96,7 @@ class Problem:
         self.prior = prior or prior_rows(self.model.parameters, {})
         self.inputs = [inputs_of(model, record) for record in self.records]
         for record in self.records:
-            unknown = ", ".join(name for name in record.outputs if name not in outputs)
-            if unknown:
-                raise ValueError(
-                    f"{record.name}: {unknown} is no output of the model; outputs are {', '.join(outputs)}"
-                )
+            check_known(record.name, record.outputs, "output of the model", outputs)
             if not record.outputs:
                 raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
         self.measured = [_table(record.outputs, outputs, len(record)) for record in self.records]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import signs
 from rotorid.identify.expressions import names as names_in
-from rotorid.identify.ode import OdeModel, ode_model, read_expression
+from rotorid.identify.ode import OdeModel, check_known, ode_model, read_expression
 
 if TYPE_CHECKING:
     from fem import StateSpace
@@ -92,8 +92,7 @@ def second_order(  # noqa: PLR0913
     dofs = tuple(names or (f"y{i + 1}" for i in range(n)))
     if len(dofs) != n:
         raise ValueError(f"{n} names of displacements are needed, not {len(dofs)}")
-    if extra := [name for name in force if name not in dofs]:
-        raise ValueError(f"force: {extra[0]} is no displacement; displacements are {', '.join(dofs)}")
+    check_known("force", force, "displacement", dofs)
     rates = [f"v_{dof}" for dof in dofs]
     states: dict[str, str] = {}
     for dof, *row in zip(dofs, c, k, strict=True):
