@@ -200,17 +200,13 @@ class _Parser:
 
     def sides(self) -> list[Any]:
         """The expressions between the signs =."""
-        nodes = [node for _, node in self.chain(self.sum, "=")]
+        sides = [self.sum().expr]
+        while self.next.text == "=":
+            self.take()
+            sides.append(self.sum().expr)
         if self.next.kind != "end":
             raise self.unexpected()
-        return [node.expr for node in nodes]
-
-    def chain(self, operand: Callable[[], _Node], *signs: str) -> list[tuple[_Token, _Node]]:
-        """Operands with the sign before each."""
-        parts = [(self.next, operand())]
-        while self.next.text in signs:
-            parts.append((self.take(), operand()))
-        return parts
+        return sides
 
     def unexpected(self) -> ExpressionError:
         token = self.next
@@ -221,31 +217,34 @@ class _Parser:
     def sum(self) -> _Node:
         import sympy
 
-        (_, first), *more = self.chain(self.product, "+", "-")
-        if not more:
-            return first
-        nodes = [first, *(node for _, node in more)]
-        signed = [-node.expr if sign.text == "-" else node.expr for sign, node in more]
-        size = sum(node.bits for node in nodes), sum(node.terms for node in nodes)
-        return self.node(more[0][0].at, lambda: sympy.Add(first.expr, *signed), *size)
+        return self.chain(self.product, ("+", "-"), sympy.Add, sum)
 
     def product(self) -> _Node:
         import sympy
 
-        (_, first), *more = self.chain(self.unary, "*", "/")
-        if not more:
-            return first
-        for sign, node in more:
+        return self.chain(self.unary, ("*", "/"), sympy.Mul, math.prod)
+
+    def chain(
+        self,
+        operand: Callable[[], _Node],
+        signs: tuple[str, str],
+        join: Callable[..., Any],
+        count: Callable[..., int],
+    ) -> _Node:
+        nodes, at = [operand()], self.next.at
+        while self.next.text in signs:
+            sign, node = self.take(), operand()
             if sign.text == "/" and node.number == 0:  # such as x/(y - y)
                 raise self.error(sign.at, "division by zero")
-        bits = first.bits + sum(node.bits for _, node in more)
-        # what stands in a denominator counts once: it is never multiplied out as a sum
-        terms = math.prod([first.terms, *(node.terms for sign, node in more if sign.text == "*")])
-
-        def build() -> Any:  # noqa: ANN401
-            return sympy.Mul(first.expr, *(n.expr if s.text == "*" else 1 / n.expr for s, n in more))
-
-        return self.node(more[0][0].at, build, bits, terms)
+            if sign.text == "-":
+                node = node._replace(expr=-node.expr)
+            if sign.text == "/":  # a denominator is never multiplied out
+                node = node._replace(expr=1 / node.expr, terms=1)
+            nodes.append(node)
+        if len(nodes) == 1:
+            return nodes[0]
+        exprs, bits, terms = zip(*nodes, strict=True)
+        return self.node(at, lambda: join(*exprs), sum(bits), count(terms))
 
     def unary(self) -> _Node:
         if self.next.text not in ("+", "-"):
@@ -320,11 +319,14 @@ class _Parser:
         return node
 
     def number(self, token: _Token) -> _Node:
-        if len(token.text) > 400 or float(token.text) > LARGEST:
-            raise self.error(token.at, f"a number is at most {LARGEST:g}")
-        if re.search(r"[eE]-[0-9]{4,}", token.text):
-            raise self.error(token.at, f"a number above 0 is at least {1 / LARGEST:g}")
+        size, above = float(token.text), re.search("[1-9]", re.split("[eE]", token.text)[0])
+        if len(token.text) > 400 or size > LARGEST or (above and size < 1 / LARGEST):
+            raise self.unsized(token.at)
         return self.constant(Fraction(token.text), token.at)
+
+    def unsized(self, at: int) -> ExpressionError:
+        least = f"{1 / LARGEST:g} or 0"
+        return self.error(at, f"a number is at most {LARGEST:g} in size, and at least {least}")
 
     def function(self, name: str, argument: _Node, at: int) -> _Node:
         import sympy
@@ -352,9 +354,7 @@ class _Parser:
         import sympy
 
         if number and not 1 / Fraction(LARGEST) <= abs(number) <= Fraction(LARGEST):
-            raise self.error(
-                at, f"a number is at most {LARGEST:g} in size, and at least {1 / LARGEST:g} or 0"
-            )
+            raise self.unsized(at)
         bits = number.numerator.bit_length() + number.denominator.bit_length()
         return _Node(sympy.Rational(number.numerator, number.denominator), bits)
 

@@ -208,15 +208,15 @@ class OdeModel:
 
     def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""
-        values, n = np.asarray(theta, dtype=float), len(self.states)
-        last: tuple[bytes, FloatArray, FloatArray] = self.memory.get("inverse", (b"none", values, values))
-        if last[0] != values.tobytes():
+        values, n, memory = np.asarray(theta, dtype=float), len(self.states), self.memory
+        if memory.get("inverse at") != values.tobytes():
             table = np.moveaxis(self._alone("inertia", values).reshape(n, n, -1), -1, 0)
             if not np.isfinite(table).all() or np.linalg.cond(table[0]) > 1e14:
                 shown = ", ".join(f"{n} = {v:.4g}" for n, v in zip(self.parameters, values, strict=True))
                 raise SimulationError(f"the mass matrix is singular at {shown or 'the known values'}")
-            last = self.memory["inverse"] = values.tobytes(), np.linalg.inv(table[0]), table[1:]
-        return last[1:]
+            memory |= {"inverse at": values.tobytes(), "inverse": (np.linalg.inv(table[0]), table[1:])}
+        inverse: tuple[FloatArray, FloatArray] = memory["inverse"]
+        return inverse
 
 
 def ode_model(
