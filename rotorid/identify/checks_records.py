@@ -6,19 +6,25 @@ output of one record; each is judged by itself, as outputs may have other units.
 beside noise is a column c beside the sensitivities J: its part outside them, c⊥, takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the
 sum of squares. So hum is looked for in a periodogram that gives back what the parameters have taken of a
 sinusoid, beside a resonance most of it.
+
+Where records do not determine every parameter: the outputs depend on them by the coefficients of the
+equations alone, in dx/dt = −(a + b) x + g h u by a + b and g h. A coefficient, or a product or quotient of
+two, is determined where its gradient stands in the row space of the sensitivities, here and at values 20 %
+of the parameters away, so that it is no chance of the place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.identify.combinations_records import combined
-from rotorid.identify.ode import SimulationError
+from rotorid.identify.expression_functions import Compiled, jacobian, usual
+from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem, at
 from rotorid.identify.simulation import STEPWISE, simulate
 from rotorid.regression import gain, least_squares, solution
@@ -26,6 +32,7 @@ from rotorid.regression.estimate import Estimate
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import effect
 from rotorid.regression.search import RCOND
+from rotorid.regression.undetermined_combinations import Combination
 
 FEWEST, LAGS = 20, 10
 """Samples below which nothing can be said of correlations; neighbours that are looked at."""
@@ -367,3 +374,74 @@ def _widened(estimate: Estimate, factor: float | None) -> Estimate:
         solution_covariance=wider(estimate.solution_covariance, 2),
         curved=estimate.curved and tuple(replace(one, std=wider(one.std)) for one in estimate.curved),
     )
+
+
+# -- what records determine
+
+
+def combined(problem: Problem, estimate: Estimate) -> tuple[Estimate, str]:
+    """The estimate with combinations that hold for the nonlinear model, and a warning or nothing."""
+    if estimate.full_rank:
+        return estimate, ""
+    theta, names = estimate.solution, np.array(estimate.names)
+    scale = np.where(theta == 0, 1.0, np.abs(theta))
+    other = theta + 0.2 * scale * np.linspace(1.0, -0.7, len(theta))
+    points, spaces = [theta], [estimate.row_space]
+    if np.isfinite(problem.residual(other)).all():
+        points.append(other)
+        spaces.append(least_squares(problem.jacobian(other), problem.data, rcond=RCOND).row_space)
+    problem.residual(theta)  # the problem keeps the runs of the last point
+    # tangents, without standard deviations
+    near = [replace(c, words=f"(near these values) {c.words}", std=None) for c in estimate.combinations]
+    tangents = replace(estimate, curved=tuple(near))
+    if len(spaces[-1]) > len(spaces[0]):
+        return tangents, (
+            f"the record's sensitivity to {', '.join(estimate.undetermined)} (or to a combination) vanishes "
+            "at the values found, but not beside them: it may be determined after all; start elsewhere"
+        )
+    null = [np.linalg.svd(rows * scale)[2][len(rows) :] for rows in spaces]
+    rows = [scale * (names == name) for name in names if name not in estimate.undetermined]
+    chosen: list[Combination] = []
+    by = problem.model.symbols[1 + len(problem.model.states) :][: len(theta)]
+    for expression in _candidates(problem.model, by):
+        if len(rows) == estimate.rank:
+            break
+        compiled = Compiled(by, jacobian([expression], by), (1 + len(by),))
+        tables = [compiled.one(point.tolist()) for point in points]
+        gradients = [table[1:] * scale for table in tables]
+        sizes = [float(np.linalg.norm(g)) for g in gradients]
+        if not all(
+            0 < size < np.inf and np.linalg.norm(N @ g) <= 1e-5 * size
+            for N, g, size in zip(null, gradients, sizes, strict=True)
+        ):
+            continue
+        if np.linalg.matrix_rank(np.array([*rows, gradients[0]]), tol=1e-6 * sizes[0]) > len(rows):
+            rows.append(gradients[0])
+            cov, value, slope = estimate.solution_covariance, tables[0][0], tables[0][1:]
+            std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
+            words = str(usual(expression)).replace("**", "^").replace("*", "·")  # such as a·b^2/c
+            chosen.append(Combination(words, float(value), std, slope))
+    return (replace(estimate, curved=tuple(chosen)) if len(rows) == estimate.rank else tangents), ""
+
+
+def _candidates(model: OdeModel, parameters: list[Any]) -> Iterator[Any]:
+    """Coefficients of the equations, the simple ones first, then products and quotients of two."""
+    import sympy
+
+    varying = {*model.symbols} - {*parameters}
+    parts: dict[Any, None] = {}
+    for expression in (*model.rates, *model.observed, *model.initial, *model.inertia):
+        terms: dict[Any, Any] = {}
+        """Coefficient of what varies."""
+        for term in sympy.Add.make_args(sympy.expand(expression)):
+            coefficient, rest = term.as_independent(*varying, as_Add=False)
+            terms[rest] = terms.get(rest, 0) + coefficient
+        for rest, coefficient in terms.items():
+            inside = (part for part in sympy.preorder_traversal(rest) if part.args)
+            for part in (sympy.factor_terms(sympy.together(coefficient)), *inside):
+                if part.free_symbols and not part.free_symbols & varying:
+                    parts[sympy.Mul(*(f for f in sympy.Mul.make_args(part) if not f.is_number))] = None
+    single = sorted(parts, key=lambda e: (sympy.count_ops(e), str(e)))
+    yield from single
+    for a, b in combinations(single[:24], 2):
+        yield from (a * b, a / b)

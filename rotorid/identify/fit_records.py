@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +18,12 @@ from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
-from rotorid.identify.quasilinearization import first_states, quasilinearization
+from rotorid.identify.quasilinearization import grid, quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
 from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit, Minimum
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
+from rotorid.identify.simulation import simulate
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
@@ -124,7 +126,7 @@ def fit(  # noqa: PLR0913
             steps = sensitivity_steps(problem, theta, near)
             return iterate(problem, "Gauss–Newton", steps, max_iterations, tolerance)
         if method == "quasilinearization":
-            first = first_states(problem, theta, trajectory)
+            first = _first_states(problem, theta, trajectory)
             return quasilinearization(problem, theta, first, near, max_iterations, tolerance)
         problem.evaluate(theta)  # says why, where the states diverge
         reached = nonlinear_least_squares(
@@ -146,9 +148,8 @@ def fit(  # noqa: PLR0913
     path = min(paths, key=_cost)
     ended = path.converged or path.iterations > 20
     if starts is None and method == "levenberg-marquardt" and ended:
-        path, more = _from_elsewhere(
-            search, problem, path, spread_starts(begin, problem.model.bounds, 7, seed), loss
-        )
+        others = spread_starts(begin, problem.model.bounds, 7, seed)[1:]
+        path, more = _from_elsewhere(search, problem, path, others, loss)
     if weigh:
         problem, path = _weighed(search, problem, path)
     if weigh and len(prior):
@@ -236,6 +237,25 @@ def _from_elsewhere(
         "from the starting values the search ends where the model does not describe the record; this is from "
         f"another of {counted(len(paths), 'start')} (--start names better ones)"
     )
+
+
+def _first_states(
+    problem: Problem, theta: FloatArray, given: Mapping[str, ArrayLike] | None
+) -> list[FloatArray]:
+    """States (n, n_x) to begin with: the model's solution, or as given at the times of each record."""
+    made, states = [], problem.model.states
+    if given is not None and {*given} != {*states}:
+        raise ValueError(
+            f"a starting trajectory needs every state ({', '.join(states)}); got {', '.join(given)}"
+        )
+    for model, (finer, at) in zip(problem.models, map(partial(grid, problem), problem.records), strict=True):
+        if given is None:
+            integrator = problem.integrator
+            made.append(simulate(model, theta, finer, integrator=integrator, sensitivities=False).x)
+        else:
+            columns = [np.broadcast_to(np.asarray(given[n], dtype=float), len(at)) for n in states]
+            made.append(np.transpose([np.interp(finer.t, finer.t[at], x) for x in columns]))
+    return made
 
 
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:

@@ -81,8 +81,8 @@ def exact(system: System) -> FloatArray:
     tables, nu = model.matrices(system.theta)[: 1 + k], system.u.shape[1]
     sizes = np.abs(tables).max(axis=(1, 2))
     moving = 1 + np.flatnonzero(sizes[1:])
-    scale = sizes[0] / sizes[moving]  # A_j as large as A: larger ones would cost digits
-    scale[scale == 0] = 1.0
+    # A_j as large as A: larger ones would cost digits
+    scale = 2.0 ** np.round(np.log2(np.maximum(sizes[0], 1e-300) / sizes[moving]))
     m = n * (1 + len(moving))
     M = np.zeros((m + 1 + 2 * nu, m + 1 + 2 * nu))
     M[:m, :m] = np.kron(np.eye(1 + len(moving)), tables[0, :, :n])

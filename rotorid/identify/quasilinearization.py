@@ -11,12 +11,10 @@ need not solve the equations until the end. D + G θ_s is integrated in place of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.integrators import HEUN, heun_step, recurrence
@@ -24,7 +22,6 @@ from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negligible
 from rotorid.identify.records import Record, inputs_of, refined
 from rotorid.identify.sensitivity_steps import Step, iterate
-from rotorid.identify.simulation import simulate
 
 
 def quasilinearization(
@@ -45,7 +42,7 @@ def quasilinearization(
     theta
         First parameters (n,).
     states
-        Of each record the first trajectory, see `first_states`.
+        Of each record the first trajectory, (n, n_x) at the times of `grid`.
     near, most, epsilon
         As in `sensitivity_steps` and `iterate`.
 
@@ -54,7 +51,7 @@ def quasilinearization(
     SimulationError
         The linear equations have no finite solution with the starting values.
     """
-    grids = [_grid(problem, record) for record in problem.records]
+    grids = [grid(problem, record) for record in problem.records]
 
     def seen(states: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
         """At the times of the records."""
@@ -89,28 +86,9 @@ def quasilinearization(
     return replace(done, trajectories=tuple(samples), regression=rows[0])
 
 
-def _grid(problem: Problem, record: Record) -> tuple[Record, IntArray]:
+def grid(problem: Problem, record: Record) -> tuple[Record, IntArray]:
     """The times of a trajectory, and where those of the record stand among them."""
     return (record, np.arange(len(record))) if problem.integrator in HEUN else refined(record, 2)
-
-
-def first_states(
-    problem: Problem, theta: FloatArray, given: Mapping[str, ArrayLike] | None
-) -> list[FloatArray]:
-    """States (n, n_x) to begin with: the model's solution, or as given at the times of each record."""
-    made, states = [], problem.model.states
-    if given is not None and {*given} != {*states}:
-        raise ValueError(
-            f"a starting trajectory needs every state ({', '.join(states)}); got {', '.join(given)}"
-        )
-    for model, (finer, at) in zip(problem.models, map(partial(_grid, problem), problem.records), strict=True):
-        if given is None:
-            integrator = problem.integrator
-            made.append(simulate(model, theta, finer, integrator=integrator, sensitivities=False).x)
-        else:
-            columns = [np.broadcast_to(np.asarray(given[n], dtype=float), len(at)) for n in states]
-            made.append(np.transpose([np.interp(finer.t, finer.t[at], x) for x in columns]))
-    return made
 
 
 def linear_solutions(
@@ -141,8 +119,7 @@ def linear_solutions(
     h, table = np.diff(t)[:, None, None], linear(t, x, u)
     z = np.broadcast_to(np.eye(n, n + first.shape[1]), table[1:].shape)
     if integrator in HEUN:
-        parts = [np.s_[:, part] for part in HEUN[integrator](n)]
-        z = heun_step(rate, table[:-1], table[1:], z, h, parts)
+        z = heun_step(rate, table[:-1], table[1:], z, h, [np.s_[:, i] for i in HEUN[integrator](n)])
     else:
         curve, rates = CubicSpline(t, x), np.zeros((12, *z.shape))
         for j, (weights, c) in enumerate(zip(DOP853.A, DOP853.C, strict=True)):
