@@ -95,19 +95,20 @@ def exact(system: System) -> FloatArray:
     kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
     _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
     lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
-    S = system.first[n:].reshape(n, k)
-    z, s = np.zeros((len(t), m, 1)), np.zeros((len(t), n, k))
-    z[0, :, 0], s[0] = np.append(system.first[:n], S[:, moving - 1].T * scale[:, None]), S
+    x, s = np.zeros((len(t), n, 1)), np.zeros((len(t), n, k))
+    x[0, :, 0], s[0] = system.first[:n], system.first[n:].reshape(n, k)
     size = max(1, BATCH // M.size)
     for low in range(0, len(steps), size):
-        rows = slice(low + 1, min(low + size, len(steps)) + 1)
-        used, place = np.unique(which[low : rows.stop - 1], return_inverse=True)
+        rows, back = slice(low + 1, low + size + 1), slice(low, min(low + size, len(steps)))
+        used, place = np.unique(which[back], return_inverse=True)
         P = expm(lengths[used][:, None, None] * M)
         P = P[place] if len(P) > 1 else P
-        z[rows] = recurrence(P[:, :m, :m], z[low], P[:, :m, m:] @ w[low : rows.stop - 1, :, None])
-        s[rows] = recurrence(P[:, :n, :n], s[low], np.zeros((len(place), n, k)))
-    s[..., moving - 1] = (z[:, n:, 0] / np.repeat(scale, n)).reshape(len(t), -1, n).swapaxes(1, 2)
-    return np.concatenate([z[:, :n, 0], s.reshape(len(t), -1)], axis=1)
+        driven = P[:, :m, m:] @ w[back, :, None]
+        x[rows] = recurrence(P[:, :n, :n], x[low], driven[:, :n])
+        bent = (P[:, n:m, :n] @ x[back] + driven[:, n:]).reshape(len(place), -1, n)
+        s[rows, :, moving - 1] = (bent / scale[:, None]).swapaxes(1, 2)
+        s[rows] = recurrence(P[:, :n, :n], s[low], s[rows])
+    return np.concatenate([x[:, :, 0], s.reshape(len(t), -1)], axis=1)
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
