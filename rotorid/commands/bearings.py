@@ -11,7 +11,7 @@ from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
-from rotorid.base.text import capital, counted, figures
+from rotorid.base.text import counted, figures, sentence
 from rotorid.commands.moving import moving
 from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Speeds, degrees, rising_speeds
@@ -89,9 +89,7 @@ class BearingEquilibria(Delivered):
         every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
         shown = [*self.found[:-1:every], self.found[-1]]
         return Answer(
-            capital(self.stability.sentence()) + "."
-            if self.stability
-            else "One speed: no threshold is sought.",
+            sentence(self.stability.sentence()) if self.stability else "One speed: no threshold is sought.",
             text(self._columns(shown), width=COLUMNS),
             self.warnings,
             tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),

@@ -126,6 +126,7 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
         linear, slope = 0.0, 0.0
         for j in range(n):
             linear -= damping[i, j] * v[j] + stiffness[i, j] * q[j]
+        for j in range(n if slopes or gain != 0.0 else 0):
             slope -= damping_slope[i, j] * v[j] + stiffness_slope[i, j] * q[j]
         force = u[i] * (speed * speed - 1j * alpha) + b[i]
         f[i] += weight[i] + linear + gain * slope + (force * turned).real
@@ -155,30 +156,26 @@ def attempt(
     inverse = np.linalg.inv(M / (GAMMA * h) - state[5 + n :] - GAMMA * h * J_q)
     for stage in range(8):
         for i in range(n):
-            now[0, i], now[1, i], now[2, i], slip[i], pull[i] = (
-                state[0, i],
-                state[1, i],
-                state[2, i],
-                0.0,
-                0.0,
-            )
+            x, y, by_p, by_w = state[0, i], state[1, i], 0.0, 0.0
             for k in range(stage):
-                now[0, i] += A[stage, k] * p[k, i]
-                now[1, i] += A[stage, k] * w[k, i]
-                slip[i] += C[stage, k] / h * p[k, i]
-                pull[i] += C[stage, k] / h * w[k, i]
-            slip[i] += now[1, i]
+                x += A[stage, k] * p[k, i]
+                y += A[stage, k] * w[k, i]
+                by_p += C[stage, k] * p[k, i]
+                by_w += C[stage, k] * w[k, i]
+            now[0, i], now[1, i], now[2, i] = x, y, state[2, i]
+            slip[i], pull[i] = GAMMA * (by_p + h * y), by_w / h
         if stage:
             evaluate(equations, turning, t + ALPHA[stage] * h, now, False)
         for i in range(n):
-            right[i] = now[2, i] + h * D[stage] * state[4, i]
+            push = now[2, i] + h * D[stage] * state[4, i]
             for j in range(n):
-                right[i] += M[i, j] * pull[j] + GAMMA * h * J_q[i, j] * slip[j]
+                push += M[i, j] * pull[j] + J_q[i, j] * slip[j]
+            right[i] = push
         for i in range(n):
-            w[stage, i] = 0.0
+            rate = 0.0
             for j in range(n):
-                w[stage, i] += inverse[i, j] * right[j]
-            p[stage, i] = GAMMA * h * (slip[i] + w[stage, i])
+                rate += inverse[i, j] * right[j]
+            p[stage, i], w[stage, i] = slip[i] + GAMMA * h * rate, rate
     now[:2] += stages[:, 7]
     evaluate(equations, turning, t + h, now, True)
     return bool(np.isfinite(now[2]).all())
@@ -264,8 +261,8 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
             bend = bend[0] + part * (bend[1] + part * bend[2])
             out[written] = (1.0 - part) * state[0] + part * (now[0] + (1.0 - part) * bend)
             written += 1
-        state[:] = now
-        q[:], v[:], largest[:] = now[0], now[1], ways
+        state, now = now, state
+        q[:], v[:], largest[:] = state[0], state[1], ways
         t = then
         done += 1
         h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 import fem
-from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm
+from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
 from rotorid.workflows import BearingsOptions, bearings
@@ -87,7 +88,8 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     [
         ([JournalBearing(1, "DE", **BEARING)], "nothing holds the rotor, its position is not determined"),
         ([CubicSpring(1, "", 1e6), CubicSpring(5, "", 1e6)], "the rotor has no [[journal_bearing]]"),
-        ([SqueezeFilm(1, "", **BEARING), JournalBearing(5, "", **BEARING)], "a squeeze film its centring spring"),
+        ([SqueezeFilm(1, "", **BEARING), JournalBearing(5, "", **BEARING)],
+         "a squeeze film its centring spring"),
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=1e5), JournalBearing(5, "", **BEARING)],
          "% of its clearance at the squeeze film at node 1"),
     ],
@@ -159,3 +161,13 @@ def test_a_rigid_rotor_in_two_films_is_a_small_model(cli, tmp_path):
     assert found["stability"]["whirl_ratio"] == pytest.approx(0.51, abs=0.01)
     orbit = cli("motion", output, "--speed", "300", "--time", "0.3", "--displaced", "1=1um", "--json").json
     assert orbit["steady"] is False
+
+
+def test_a_shaft_that_rests_on_its_stop_is_told(cli, tmp_path):
+    """The film's spring lets it drop by 0.2 mm, the ring is 0.15 mm away."""
+    film = SqueezeFilm(1, "", **BEARING | {"clearance": 1e-3}, centring_stiffness=1e6)
+    ring = Stop(1, "ring", gap=1.5e-4, stiffness=1e7)
+    rigid = SmallModel((1,), [20.0], [200.0], np.zeros((1, 1)), forces=[film, ring])
+    found = bearings(rigid, BearingsOptions(speeds=[100.0, 200.0]))
+    assert "the shaft rests on the stop 'ring' at node 1" in found.warnings
+    assert found.found[0].position == pytest.approx([-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6)

@@ -156,7 +156,8 @@ def test_a_sag_on_other_forces_is_that_of_their_formulas():
     ("forces", "speed", "words"),
     [
         ([JournalBearing(1, "DE", **BEARING)], 0.0, "speed 0: the journal bearing 'DE' at node 1 carries"),
-        ([SqueezeFilm(1, "", **BEARING)], 50.0, "nothing holds the rotor.* a squeeze film its centring spring"),
+        ([SqueezeFilm(1, "", **BEARING)], 50.0,
+         "nothing holds the rotor.* a squeeze film its centring spring"),
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=1e6)], 50.0, "under 20 % of the weight "
          "the shaft uses 100 % of its clearance at the squeeze film at node 1"),
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=5e6)], 50.0, "under 100 % of the weight"),

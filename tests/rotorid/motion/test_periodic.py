@@ -262,9 +262,7 @@ def test_limit_cycle_of_a_rigid_rotor_in_a_short_bearing():
 def test_limit_cycle_with_the_film_at_the_line_of_centres():
     """Digits of the issue, M = 8.0: 0.8988, 0.8945, 0.500004 Ω, where the film's law has its kink."""
     found = periodic_motion(journal(8.0, "line of centres"), 140.0, NOMINAL, limit_cycle=True)
-    (cycle,) = [
-        p for branch in found.branches for p in branch.points[-1:] if p.speed > 156.9 and not p.turns
-    ]
+    (cycle,) = [p for branch in found.branches for p in branch.points[-1:] if p.speed > 156.9 and not p.turns]
     e = np.hypot(*cycle.readings(np.eye(2)).T) / CLEARANCE
     assert [f"{v:.4f}" for v in (e.max(), e.min())] == ["0.8988", "0.8945"]
     assert f"{2 * np.pi / cycle.period / NOMINAL:.6f}" == "0.500004"
