@@ -183,9 +183,17 @@ class _AnyShare(RunErrors):
 
 
 def run_errors(trials: Trials) -> RunErrors:
-    """What changes from run to run where a model stands in place of coefficients: stated, or assumed.
+    """What changes from run to run where a model stands in place of coefficients.
 
-    No spare run tells how much of stated errors a run has in common: it may be nothing, too.
+    Parameters
+    ----------
+    trials
+        The runs, whose statement counts.
+
+    Returns
+    -------
+    RunErrors
+        Stated or assumed. No spare run tells how much of stated ones a run has in common: it may be nothing.
     """
     run = usual_run_errors(trials)
     if run.origin != "stated":

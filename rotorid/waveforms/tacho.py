@@ -24,9 +24,8 @@ HYSTERESIS = 0.15
 """Half of the band, over the height of the pulses."""
 SHARP = 0.9
 """Edges from one sample to the next are higher than this share of the pulses."""
-EXTREMES, SCATTER = (0.2, 99.8), (1, 99)
-"""Per cent of the samples between which the levels are, and of the pulses between which sharp edges scatter:
-over a sample, but for an offset of all of them."""
+EXTREMES = (0.2, 99.8)
+"""Per cent of the samples between which the levels are."""
 MOST_LEFT_OUT = 0.3
 """Share of pulses too many; more do not belong to a mark a turn."""
 UNEVEN = 0.005
@@ -71,7 +70,8 @@ class Tacho:
         Standard deviation of a pulse, degrees of a turn (median over the record).
     offset_s
         Standard deviation of all pulses together, that of their mean: sharp edges are somewhere between two
-        samples, and at a speed that goes with the sampling rate no pulse tells more than another.
+        samples, and at a speed that goes with the sampling rate many pulses tell no more than a few: it is
+        that of the widest part of a sample in which there is no edge.
     warnings
         What the user should know.
     angle
@@ -165,8 +165,8 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
     fit.angle.c[-1] -= begin
     lost = np.setdiff1d(np.arange(index[-1] + 1), index)
     lost = lost[np.isin(lost % pulses, present)]
-    seen = float(np.ptp(np.percentile((fit.ahead / speed)[kind == present[0]], SCATTER)))
-    unseen = sharp * max(0.0, 1 / rate - seen) / np.sqrt(12)
+    places = np.sort((fit.ahead / speed * rate)[kind == present[0]] % 1)
+    unseen = sharp * np.diff(places, append=places[0] + 1).max() / rate / np.sqrt(12)
     if jitter > UNEVEN + np.median(speed) / rate / 2:
         words.append(
             f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks "
