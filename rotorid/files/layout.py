@@ -79,7 +79,7 @@ def rows_from_header(rows: Sequence[Row], named: Mapping[str, str]) -> list[Row]
     return [*above, changed, *rows[last + 1 :]]
 
 
-def _text_from_header(text: str, named: Mapping[str, str]) -> str:
+def text_from_header(text: str, named: Mapping[str, str]) -> str:
     """The same of a text table."""
     parts = re.split(r"(\r\n|\n|\r)", text, maxsplit=MOST_ABOVE)
     lines, ends = parts[::2], [*parts[1::2], ""]
@@ -116,7 +116,7 @@ def _open(source: Source, named: Mapping[str, str], problems: Problems, *, first
         return make_grid(sheet_source(path, chosen[0]), rows_from_header(chosen[1], named), "", problems)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
-    return None if text is None else parse_text(str(path), _text_from_header(text, named), problems)
+    return None if text is None else parse_text(str(path), text_from_header(text, named), problems)
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
