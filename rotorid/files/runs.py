@@ -6,6 +6,7 @@ make trials.
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
@@ -165,8 +166,7 @@ def read_runs(
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
-    if table.unit("amplitude").name == "mm_s_rms" and is_severity(heading := _heading_of(table)):
-        words += (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
+    words += _which_mm_s(table)
     values = conventions.labels.vibration_from(amplitude, phase)
     repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
     order = {label: k for k, label in enumerate(dict.fromkeys(repeat))}
@@ -222,6 +222,16 @@ def _heading_of(table: Table) -> str:
     """The heading of the amplitudes in the file."""
     field = table.fields["amplitude"]
     return field.names[0] if field.names else field.name
+
+
+def _which_mm_s(table: Table) -> tuple[str, ...]:
+    """How mm/s alone are read, below a heading that is not one of this program's own."""
+    heading, unit = _heading_of(table), table.unit("amplitude").name
+    if unit == "mm_s_rms" and is_severity(heading):
+        return (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
+    if unit == "mm_s" and "mm_s" not in heading and not re.search("peak|pk", heading, re.IGNORECASE):
+        return (f"{heading!r} is read as mm/s peak: write rms in the heading where it is rms",)
+    return ()
 
 
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:

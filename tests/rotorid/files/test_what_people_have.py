@@ -149,7 +149,10 @@ def test_velocity_in_mm_s_is_rms_and_says_so(tmp_path):
     assert trials.labels.vibration_unit == "mm_s_rms"
     assert [word for word in trials.warnings if "is read as mm/s rms" in word]
     plain = trials_of(tmp_path, ONE_UNIT)
-    assert (plain.labels.vibration_unit, plain.warnings) == ("mm_s", ())
+    assert plain.labels.vibration_unit == "mm_s"
+    assert [word for word in plain.warnings if "'DE mm/s' is read as mm/s peak" in word]
+    assert trials_of(tmp_path, PUMP).warnings == ()
+    assert trials_of(tmp_path, ONE_UNIT.replace("mm/s", "mm/s pk")).warnings == ()
     np.testing.assert_allclose(trials.readings, plain.readings * np.sqrt(2), rtol=1e-14)
 
 
