@@ -21,7 +21,7 @@ from rotorid.tables.job.job_keys import CELLS, READINGS
 from rotorid.tables.job.workbook_sheets import dotted_key, number_cell, setting_cell
 from rotorid.tables.reader.columns import sheet_source
 from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma
-from rotorid.tables.reader.excel_pages import Line, header_row, put, sized
+from rotorid.tables.reader.excel_pages import Line, header_row, keep_cells, put
 from rotorid.tables.reader.excel_workbook import find_sheet, sheets_in
 from rotorid.tables.reader.grid import Cell, Row, clean, make_grid, show
 from rotorid.tables.reader.problems import InputError, Problems
@@ -175,12 +175,7 @@ class WorkbookVersion:
         """The workbook, if it is not as it was."""
         if "_book" not in vars(self):
             return {}
-        for sheet in self._book.worksheets:
-            for cell in (cell for row in sheet.iter_rows() for cell in row):
-                if cell.comment is not None:  # openpyxl does not read its size
-                    sized(cell.comment)
-                if isinstance(cell.value, float):  # nor would it write 17 digits
-                    put(cell, cell.value, sheet.title)
+        keep_cells(self._book)
         self._book.properties.modified = now().replace(tzinfo=None)
         return {self.job: workbook_bytes(self._book)}
 

@@ -55,6 +55,7 @@ def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  #
         book.properties.created = now().replace(tzinfo=None)
         book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
     book.properties.modified = now().replace(tzinfo=None)
+    keep_cells(book)
     for sheet in book.worksheets:
         sheet.sheet_view.tabSelected = False
     for page in pages:
@@ -63,6 +64,16 @@ def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  #
         sheet.sheet_view.tabSelected = page.title == shown
     book.active = book.sheetnames.index(shown)
     return workbook_bytes(book)
+
+
+def keep_cells(book: Any) -> None:  # noqa: ANN401
+    """Keep what openpyxl would change of a workbook that it has read: sizes of comments, the last digits."""
+    for sheet in book.worksheets:
+        for cell in (cell for row in sheet.iter_rows() for cell in row):
+            if cell.comment is not None:
+                sized(cell.comment)
+            if isinstance(cell.value, float):
+                put(cell, cell.value, sheet.title)
 
 
 def header_row(lines: Sequence[Line]) -> int:
