@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import off_axis, turned
 from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
@@ -138,10 +139,10 @@ def read_runs(
         Collects the complaints.
     """
     grids = read_runs_grids(source, conventions, problems)
-    if grids is None or (len(grids) > 1 and not all(_table(grid, problems) for grid in grids)):
+    if grids is None or (len(grids) > 1 and not all(readings_table(grid, problems) for grid in grids)):
         return None, None
     grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
-    table = None if grid is None else _table(grid, problems)
+    table = None if grid is None else readings_table(grid, problems)
     if table is None:
         return None, None
     amplitude, phase = table.numbers("amplitude"), table.numbers("phase")
@@ -189,16 +190,27 @@ def read_runs(
     trials = Trials(runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=words, steps=steps)
     if "phase_std" not in table:
         return runs, trials
-    along = table.numbers("amplitude_std")
-    across = np.where(amplitude > 0, amplitude * table.numbers("phase_std"), along)
     covariance = np.full((2, 2, *readings.shape), np.nan)
-    covariance[:, :, *at] = np.moveaxis(turned(values, along**2, across**2), 0, -1)[..., rows]
+    covariance[:, :, *at] = np.moveaxis(covariances(table, values), 0, -1)[..., rows]
     return runs, replace(trials, covariance=covariance)
 
 
-def _table(grid: Grid, problems: Problems) -> Table | None:
-    """The columns of a runs table, with numbers that can be."""
-    table = make_table(grid, COLUMNS, problems)
+def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
+    """Of real and imaginary parts of the readings (n,) of a table with `amplitude_std` and `phase_std`.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, 2, 2); where there is no amplitude, no direction is another.
+    """
+    along, size = table.numbers("amplitude_std"), np.abs(vectors)
+    across = np.where(size > 0, size * table.numbers("phase_std"), along)
+    return turned(vectors, along**2, across**2)
+
+
+def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = COLUMNS) -> Table | None:
+    """The columns of a runs table, with numbers that can be; None and problems."""
+    table = make_table(grid, columns, problems)
     if table is None:
         return None
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
