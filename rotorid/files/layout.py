@@ -44,7 +44,8 @@ from rotorid.tables.reader.units import UnitError, spelt
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
-_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*([@<∠/])\s*({NUMBER}[^@<∠/]*)")
+_AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
+_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*([@<∠/]|{_AT})\s*({NUMBER}[^@<∠/]*)")
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
 _WEIGHT = re.compile("weight|mass|correct", re.IGNORECASE)
 _BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)

@@ -18,8 +18,8 @@ from rotorid.base.arrays import ComplexArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.headings import LONGEST, Heading, read_headings, read_unit, readable
-from rotorid.files.layout import NUMBER, Unclear
+from rotorid.files.headings import Heading, read_headings, read_unit, readable
+from rotorid.files.layout import NUMBER, Unclear, vector_in
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
 from rotorid.tables.reader.grid import Cell, Grid, show
@@ -36,7 +36,6 @@ COLUMNS = (
     Column("angle", one_of(units.ANGLE), ("angle_deg",)),
 )
 _SIZE = re.compile(rf"({NUMBER})\s*([^\W\d_].*)?")
-_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠]|\bat\b)\s*({NUMBER}\s*(?:°|º|deg|degrees?)?)")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
 _CLOCK = re.compile(r"(1[0-2]|0?[0-9])(?::([0-5][0-9])(?::00)?)?(?:\s*(?:o['’]?clock|h))?", re.IGNORECASE)
 _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGNORECASE)
@@ -163,9 +162,9 @@ def _sizes(grid: Grid, size: Heading, unit_column: Heading | None) -> tuple[str,
     own: list[str] = []
     for _, row in grid.rows:
         cell = row[size.index]
-        vector = _VECTOR.fullmatch(cell) if isinstance(cell, str) and len(cell) <= LONGEST else None
-        angles.append(vector[2] if vector else "")
-        text = vector[1].strip() if vector else cell
+        vector = vector_in(cell)
+        text, angle = (vector[0].strip(), vector[1]) if vector and vector[2] else (cell, "")
+        angles.append(angle)
         match = _SIZE.fullmatch(text) if isinstance(text, str) else None
         unit = "" if unit_column is None else show(row[unit_column.index])
         unit = (match[2] if match else None) or unit

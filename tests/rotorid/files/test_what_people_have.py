@@ -59,6 +59,7 @@ SAME_RUNS = {
     "vib": wide("Run,rpm,DE Vib (mm/s),DE Angle (deg),NDE Vib (mm/s),NDE Angle (deg)", "{},1485,{},{},{},{}"),
     "vectors": wide("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{} @ {}°,{} @ {}°"),
     "vectors without a sign of degrees": wide("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{}<{},{}<{}"),
+    "vectors with a word": wide("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{} at {}°,{} at {} deg"),
     "two rows": wide("Run,rpm,DE,,NDE,\n,,mm/s,deg,mm/s,deg", "{},1485,{},{},{},{}"),
     "two rows with words": wide(
         ",,DE,,NDE,\nRun,rpm,Amp (mm/s),Phase (deg),Amp (mm/s),Phase (deg)", "{},1485,{},{},{},{}"
