@@ -77,7 +77,7 @@ class Calibrated(Found):
         ValueError
             For a rotor file of numbers that the data do not determine.
         """
-        from rotorid.tables.reader.table_writing import table_bytes
+        from rotorid.files.table_writing import table_bytes
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
         if path.suffix.lower() != ".toml":

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rotorid.base.suggestions import suggest
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import REMARKS
-from rotorid.tables.reader.grid import MOST_ABOVE
-from rotorid.tables.reader.units import UnitError, UnitReader, one_of
+from rotorid.files import units
+from rotorid.files.columns import REMARKS
+from rotorid.files.grid import MOST_ABOVE
+from rotorid.files.units import UnitError, UnitReader, one_of
 
 READING = ("amplitude", "phase")
 LONGEST = 100

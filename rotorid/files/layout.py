@@ -20,7 +20,10 @@ from typing import NamedTuple
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.columns import REMARKS, Source, sheet_source, source_name
 from rotorid.files.conventions import PHASES, Conventions, Phase, as_phase
+from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
+from rotorid.files.grid import MOST_ABOVE, Cell, Grid, Row, make_grid, show
 from rotorid.files.headings import (
     DEVIATION,
     LONGEST,
@@ -32,14 +35,11 @@ from rotorid.files.headings import (
     read_unit,
     readable,
 )
-from rotorid.tables.reader.columns import REMARKS, Source, sheet_source, source_name
-from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.tables.reader.grid import MOST_ABOVE, Cell, Grid, Row, make_grid, show
-from rotorid.tables.reader.input_file import STANDARD_INPUT
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
-from rotorid.tables.reader.text_file import cells_of_line, decode, parse_text, read_bytes
-from rotorid.tables.reader.units import UnitError, spelt
+from rotorid.files.input_file import STANDARD_INPUT
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Said
+from rotorid.files.text_file import cells_of_line, decode, parse_text, read_bytes
+from rotorid.files.units import UnitError, spelt
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)

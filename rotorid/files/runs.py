@@ -17,6 +17,8 @@ import numpy as np
 from balancing import Labels, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table, make_table
 from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
     FULL_TURN,
@@ -25,14 +27,12 @@ from rotorid.files.conventions import (
     Phase,
     StatedErrors,
 )
+from rotorid.files.grid import Grid
 from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
+from rotorid.files.problems import Problems
 from rotorid.files.speeds import merge_speeds, same_speed, show_speed
+from rotorid.files.units import one_of
 from rotorid.files.weights import read_weights
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, make_table
-from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))

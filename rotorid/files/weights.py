@@ -17,14 +17,14 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Conventions
+from rotorid.files.grid import Cell, Grid, show
 from rotorid.files.headings import Heading, read_headings, read_unit, readable
 from rotorid.files.layout import NUMBER, Unclear, vector_in
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
-from rotorid.tables.reader.grid import Cell, Grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit, one_of
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit, one_of
 
 COLUMNS = (
     Column("run"),

@@ -9,12 +9,12 @@ import numpy as np
 
 from fem import Rotor
 from rotorid.calibration.frequencies import MeasuredFrequencies
+from rotorid.files import units
+from rotorid.files.columns import Column, read_grid, read_table
+from rotorid.files.excel_workbook import is_workbook
+from rotorid.files.problems import Problems
+from rotorid.files.units import one_of, ratio
 from rotorid.tables.data.modes_table import read_modes
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, read_grid, read_table
-from rotorid.tables.reader.excel_workbook import is_workbook
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of, ratio
 
 FREQUENCY_ERROR, SHAPE_ERROR = 0.005, 0.05
 """Assumed, relative, of a table of modes that states none."""
@@ -42,7 +42,7 @@ def is_job(path: Path) -> bool:
     """Whether a file is a job: settings, or a workbook with a sheet `runs`."""
     if not is_workbook(path):
         return path.suffix.lower() == ".toml"
-    from rotorid.tables.reader.excel_workbook import read_workbook
+    from rotorid.files.excel_workbook import read_workbook
 
     problems = Problems()
     return "runs" in [name.strip().casefold() for name in problems.need(read_workbook(path, problems))]

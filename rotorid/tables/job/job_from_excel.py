@@ -11,14 +11,14 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.columns import REMARKS, sheet_source
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
+from rotorid.files.excel_workbook import is_workbook, read_workbook
+from rotorid.files.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
 from rotorid.files.layout import rows_from_header
+from rotorid.files.problems import Problems
+from rotorid.files.toml_file import Section, read_toml
 from rotorid.tables.job.job_keys import CELLS, PLANE, READINGS, SENSOR, TABLES
-from rotorid.tables.reader.columns import REMARKS, sheet_source
-from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma, parse_number
-from rotorid.tables.reader.excel_workbook import is_workbook, read_workbook
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.toml_file import Section, read_toml
 
 NAMED = {"planes": ("plane", PLANE), "sensors": ("sensor", SENSOR)}
 """Sheets with a row for each plane or sensor: the column of its name, and keys that are columns."""

@@ -14,11 +14,11 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.words import ErrorSource, Origin
+from rotorid.files.columns import Table
 from rotorid.files.conventions import ANGLES, PHASES, StatedErrors
-from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit
+from rotorid.files.decimal_numbers import NotANumber, parse_number
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit
 
 _ALLOWED = {"phase": PHASES, "angles": ANGLES}
 _CONVENTION = re.compile(r"(phase|angles)\s*=\s*(.*)")

@@ -21,12 +21,12 @@ import numpy as np
 
 from balancing import Influence, Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.files.columns import Column, Table
+from rotorid.files.decimal_numbers import SMALLEST
+from rotorid.files.grid import Grid, show
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit, UnitError, UnitReader, ratio, spelt
 from rotorid.regression import stretch, unstretch
-from rotorid.tables.reader.columns import Column, Table
-from rotorid.tables.reader.decimal_numbers import SMALLEST
-from rotorid.tables.reader.grid import Grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit, UnitError, UnitReader, ratio, spelt
 
 PARTS = ("re", "im")
 BASELINE = "(baseline)"

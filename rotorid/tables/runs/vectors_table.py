@@ -12,14 +12,14 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
 from rotorid.files import runs as runs_table
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
+from rotorid.files.grid import Grid
 from rotorid.files.layout import read_runs_grid
+from rotorid.files.problems import Problems
+from rotorid.files.units import one_of
 from rotorid.identify.modes_readings import Readings
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table
-from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
 from rotorid.tables.runs.slow_roll import make_slow_roll
 
 COLUMNS = (

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.grid import (
+from rotorid.files.grid import (
     MOST_CELLS,
     CommentLine,
     Grid,
@@ -19,8 +19,8 @@ from rotorid.tables.reader.grid import (
     clean,
     make_grid,
 )
-from rotorid.tables.reader.input_file import file_content
-from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.files.input_file import file_content
+from rotorid.files.problems import Problems, TableWarning
 
 SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
 _BLANK = ';,\t" \xa0\ufeff\r\n'

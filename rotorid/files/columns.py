@@ -14,19 +14,19 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
-from rotorid.tables.reader.decimal_numbers import (
+from rotorid.files.decimal_numbers import (
     NotANumber,
     check_size,
     decimal_comma,
     parse_number,
     thousands_or_decimals,
 )
-from rotorid.tables.reader.digits import written_steps
-from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.text_file import decode, parse_text, read_bytes
-from rotorid.tables.reader.units import Unit, UnitError, UnitReader
+from rotorid.files.digits import written_steps
+from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
+from rotorid.files.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import decode, parse_text, read_bytes
+from rotorid.files.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
 KINDS = {

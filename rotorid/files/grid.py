@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rotorid.base.text import counted
-from rotorid.tables.reader.problems import Problems
+from rotorid.files.problems import Problems
 
 LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
