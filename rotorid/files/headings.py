@@ -21,7 +21,7 @@ READING = ("amplitude", "phase")
 LONGEST = 100
 """Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
 _NEEDED = {"run", "speed", "sensor", *READING}
-_AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs"
+_AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs|ph|phi|φ"
 
 
 def _words(**words: str) -> dict[str, re.Pattern[str]]:
@@ -38,9 +38,9 @@ _READINGS = _words(
     phase=rf"{_PHASE}|lag|lead|angle",
 )
 _OTHERS = _words(
-    speed="speed|rpm",
+    speed="speed|rpm|cpm|frequency|freq",
     sensor="sensor|probe|channel|point|transducer|bearing",
-    run="run",
+    run="run|test|trial|state|condition|step|measurement",
     repeat="repeat",
 )
 _QUANTITY = _words(amplitude="vibration|vib|velocity|displacement|severity")
@@ -64,7 +64,10 @@ _TIDY = {
     ),
 }
 DEVIATION = re.compile(r"(?:amplitude|phase)_std(?:_|$)")
-_BESIDE = re.compile(r"order|time_s|turns|overall|gap(?:_|$)|.*\bcoeff", re.IGNORECASE)
+_BESIDE = re.compile(
+    r"order|time_s|turns|overall|gap(?:_|$)|.*\bcoeff|.*\boverall\b|date|time(?:\b|stamp)|remark|operator|temp",
+    re.IGNORECASE,
+)
 """What `rotorid vectors` and instruments write beside the readings."""
 _FILLERS = {
     "name",
@@ -79,7 +82,21 @@ _FILLERS = {
     "rotational",
     "nominal",
 }
-_FILLERS |= {"measured", "position", "vibration", "vib", "balance", "balancing", "trial", "correction", "of"}
+_FILLERS |= {
+    "",
+    "measurement",
+    "measuring",
+    "run",
+    "measured",
+    "position",
+    "vibration",
+    "vib",
+    "balance",
+    "balancing",
+    "trial",
+    "correction",
+    "of",
+}
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _ORDER = re.compile(r"(?<![^\W_])(?<!\.)([0-9]+(?:\.[0-9]+)?)[xX×](?![^\W_])")
 _PROBE_Y = re.compile(r"(?<![^\W_])[0-9]+[yY](?![^\W_])")
@@ -87,13 +104,19 @@ _DIRECTION = re.compile(r"(?<![^\W\d_])(lag|lead)(?:ging|ing)?(?![^\W\d_])", re.
 _SWINGS = r"(?P<pp>pp|p-p|pk[-_]?pk|peak[ -](?:to[ -])?peak)|(?P<rms>rms)|(?P<peak>pk|0-pk|0-p|peak)"
 _SWING = re.compile(rf"[\s_.,-]*(?:{_SWINGS})$", re.IGNORECASE)
 _AT_END = re.compile(
-    rf"(?<![^\W_])(?:(?P<angle>°|deg|degrees?)|(?:mils?|[uµμ]m|microns?|mm/s|in/s|ips)(?:[\s_.,-]*(?:{_SWINGS}))?)$",
+    rf"(?<![^\W_])(?:(?P<angle>°|deg|degrees?)|(?:mils?|[uµμ]m|microns?|(?:mm|in)[/_]s(?:ec)?|ips)"
+    rf"(?:[\s_.,-]*(?:{_SWINGS}))?)$",
     re.IGNORECASE,
 )
 """A unit that says what it measures: of a phase, or of a vibration."""
+_BOTH_AT_END = re.compile(
+    r"(?<![^\W_])((?:mils?|[uµμ]m|(?:mm|in)/s(?:ec)?|ips)[^/@<∠]*?\s*[/@<∠]\s*(?:°|deg|degrees?))$",
+    re.IGNORECASE,
+)
 _SPELLINGS = {
     "r_min": "rpm",
     "1_min": "rpm",
+    "cpm": "rpm",
     "hz": "Hz",
     **dict.fromkeys(("°", "º", "degree", "degrees"), "deg"),
     **{"mils": "mil", "micron": "um", "microns": "um", "ips": "in_s", "m_s²": "m_s2", "mm_s²": "mm_s2"},
@@ -146,7 +169,7 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     if not plain:
         return "", direction
     swing = _SWING.search(plain) if stem == "amplitude" else None
-    base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_")
+    base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_").removesuffix("ec")
     folded = base.casefold()
     if stem in ("mass", "unbalance"):
         parts = re.split("[_-]", re.sub(r"^(g|oz)\.?(mm|in)$", r"\1_\2", folded))
@@ -183,10 +206,14 @@ def read_headings(
     `named` are names of a runs table by names that the file has.
     """
     probes = any(_PROBE_Y.search(name) for name in header)  # 1X beside 1Y is a probe, else an order
-    return [
+    headings = [
         _heading(Heading(i, name), (named or {}).get(name, name), probes=probes, weights=weights)
         for i, name in enumerate(header)
     ]
+    plain = [h for h in headings if h.stem == "run" and re.search("run", h.name, re.IGNORECASE)]
+    if len(plain) == 1:  # beside it a column such as Condition says something else
+        headings = [replace(h, stem="note") if h.stem == "run" and h is not plain[0] else h for h in headings]
+    return headings
 
 
 def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
@@ -221,7 +248,7 @@ def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
         if re.fullmatch(r"[0-9.,+-]+", heading.name) and heading.name.strip("-"):
             return None
         if heading.stem in READING and not heading.sensor:
-            several = several or (not above and bool(group))
+            several = several or (above in ("", group) and bool(group))
             group = above or group
             names.append(f"{group} {heading.name}".strip())
         else:
@@ -247,6 +274,8 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
     if weights:
         return _of_weights(unknown, outside, inside)
     whole = f"{outside} {inside}".strip()
+    if both := _BOTH_AT_END.search(whole):
+        return replace(unknown, stem="vector", unit=both[1], sensor=_bare(whole[: both.start()]))
     unit = _AT_END.search(whole)
     for words in (_READINGS, {} if unit else _OTHERS, _QUANTITY):
         for stem, role in words.items():
@@ -254,9 +283,17 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
                 heading = _with_rest(replace(unknown, stem=stem), outside, match, inside)
                 if heading.stem and not (words is _QUANTITY and unit and unit["angle"]):
                     return heading
+    return _by_unit(unknown, outside, inside, unit)
+
+
+def _by_unit(unknown: Heading, outside: str, inside: str, unit: re.Match[str] | None) -> Heading:
+    """A heading without a word for what it is: its unit says it, at its end or in brackets."""
+    whole = f"{outside} {inside}".strip()
     sensor = _bare(whole[: unit.start()]) if unit else ""
     if unit and suggest(sensor, READING) is None:  # else a word for the quantity, misspelt
         return replace(unknown, stem="phase" if unit["angle"] else "amplitude", unit=unit[0], sensor=sensor)
+    if inside and readable("speed", inside):
+        return replace(unknown, stem="speed", unit=inside)
     if inside and readable("amplitude", inside):
         return replace(unknown, unit=inside, sensor=_bare(outside))
     return replace(unknown, sensor=unknown.name)
@@ -264,7 +301,7 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
 
 def _with_rest(heading: Heading, outside: str, match: re.Match[str], inside: str) -> Heading:
     """A heading with the unit that stands after its word or in brackets; the rest is the sensor."""
-    kept = match[0] if match[0].casefold() in ("rpm", "lag", "lead") else ""
+    kept = match[0] if match[0].casefold() in ("rpm", "cpm", "lag", "lead") else ""
     before, after = _bare(outside[: match.start()]), f"{kept} {_bare(outside[match.end() :])}".strip()
     quantity = "amplitude" if heading.stem == "vector" else heading.stem
     if quantity not in MEASURED:

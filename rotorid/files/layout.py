@@ -45,7 +45,7 @@ NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
-_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*([@<∠/]|{_AT})\s*({NUMBER}[^@<∠/]*)")
+_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*([@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
 _WEIGHT = re.compile("weight|mass|correct", re.IGNORECASE)
 _BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)
@@ -392,6 +392,7 @@ def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
     common = sensors.pop("")
     if not sensors:
         return {"": common}
+    _pair_by_number(sensors)
     loose = [common[stem] for stem in READING if stem in common]
     if len(sensors) == 1 and len(loose) == 1 and len(next(iter(sensors.values()))) == 1:
         [(sensor, own)] = sensors.items()  # one sensor, named in one of its headings
@@ -405,6 +406,16 @@ def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
             words = f"the {lacking} of this sensor too, in a column such as '{sensor} {lacking}'"
             raise Unclear(words, next(iter(own.values())).heading)
     return sensors
+
+
+def _pair_by_number(sensors: dict[str, dict[str, _Column]]) -> None:
+    """Join `A1 (mm/s)` and `P1 (deg)`, which are no two sensors, as 1."""
+    halves = {name: next(iter(own)) for name, own in sensors.items() if len(own) == 1}
+    numbers = {name: re.sub(r"^[^\W\d_]{1,3}(?=[0-9]+$)", "", name) for name in halves}
+    for number in dict.fromkeys(numbers.values()):
+        pair = [name for name in halves if numbers[name] == number]
+        if number.isdecimal() and sorted(halves[name] for name in pair) == sorted(READING):
+            sensors[number] = {stem: column for name in pair for stem, column in sensors.pop(name).items()}
 
 
 def _name(column: _Column) -> str:

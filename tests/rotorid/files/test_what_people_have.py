@@ -76,6 +76,40 @@ SAME_RUNS = {
 }
 
 
+SIX = "{},1485,{},{},{},{}"
+SAME_RUNS |= {
+    f"headings {k}": wide(header, SIX)
+    for k, header in enumerate(
+        (
+            "RUN #,SPEED RPM,DE AMP (MM/S),DE PHASE (DEG),NDE AMP (MM/S),NDE PHASE (DEG)",
+            "Step,CPM,DE mm/sec,DE deg,NDE mm/sec,NDE deg",
+            "Test,n [1/min],DE_mm_s,DE_deg,NDE_mm_s,NDE_deg",
+            "Run,Speed rpm,DE Vib mm/s,DE Ph deg,NDE Vib mm/s,NDE Ph deg",
+            ",,DE,DE,NDE,NDE\nCondition,RPM,mm/s,deg,mm/s,deg",
+            "Run,RPM,DE,DE,NDE,NDE\n,,mm/s,deg,mm/s,deg",
+            ",,DE,,NDE,\nRun,RPM,Amplitude,Phase,Amplitude,Phase\n,,mm/s,deg,mm/s,deg",
+        )
+    )
+}
+SAME_RUNS |= {
+    "sign and unit behind": wide("Run,RPM,DE mm/s@deg,NDE (mm/s / deg)", "{},1485,{}@{},{}/{}"),
+    "L": wide("Run,RPM,DE,NDE", "{},1485,{} mm/s L{},{} mm/s L{}"),
+    "columns beside": wide(
+        "Date,Time,Run,Condition,RPM,DE overall,DE mm/s,DE deg,NDE mm/s,NDE deg",
+        "2026-01-02,10:11,{},hot,1485,9.9,{},{},{},{}",
+    ),
+}
+
+
+def test_amplitudes_and_phases_numbered_alike_are_one_sensor(tmp_path):
+    runs = wide("Run;n [1/min];A1 [µm];φ1 [°];A2 [µm];φ2 [°]", "{};1485;{};{};{};{}")
+    trials = trials_of(tmp_path, runs)
+    assert trials.sensors == ("1", "2")
+    assert_same(
+        trials, trials_of(tmp_path, PUMP.replace("mm_s", "um").replace("NDE", "2").replace("DE", "1"))
+    )
+
+
 def trials_of(folder, runs, weights=None, **options):
     (folder / "runs.csv").write_text(runs, encoding="utf-8")
     if weights is not None:
