@@ -20,6 +20,7 @@ from rotorid.files.units import UnitError, UnitReader, one_of
 READING = ("amplitude", "phase")
 LONGEST = 100
 """Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
+_RUN = "run|test|trial|state|condition|step|measurement"
 _NEEDED = {"run", "speed", "sensor", *READING}
 _AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs|ph|phi|φ"
 
@@ -40,22 +41,22 @@ _READINGS = _words(
 _OTHERS = _words(
     speed="speed|rpm|cpm|frequency|freq",
     sensor="sensor|probe|channel|point|transducer|bearing",
-    run="run|test|trial|state|condition|step|measurement",
+    run=_RUN,
     repeat="repeat",
 )
 _QUANTITY = _words(amplitude="vibration|vib|velocity|displacement|severity")
 """Says the quantity where nothing else does."""
 _WEIGHTS = _words(
     clock="o['’]?clock|clock",
-    angle="angle|angular position|direction",
+    angle="angle|angular position|location|direction|phase",
     hole="hole|blade|vane|position|pos",
     plane="plane",
     action="action",
     unit="unit",
     pieces="pieces",
     unbalance="unbalance|imbalance",
-    mass="weight|mass|wt",
-    run="run|trial",
+    mass="weight|mass|wt|amount",
+    run=_RUN,
 )
 _TIDY = {
     False: re.compile(r"(?:(speed|amplitude|phase)(?:_(.*))?|run|sensor|repeat)"),
@@ -69,6 +70,7 @@ _BESIDE = re.compile(
     re.IGNORECASE,
 )
 """What `rotorid vectors` and instruments write beside the readings."""
+_BESIDE_WEIGHTS = re.compile("date|time|remark|operator", re.IGNORECASE)
 _FILLERS = {
     "name",
     "no",
@@ -120,7 +122,7 @@ _SPELLINGS = {
     "hz": "Hz",
     **dict.fromkeys(("°", "º", "degree", "degrees"), "deg"),
     **{"mils": "mil", "micron": "um", "microns": "um", "ips": "in_s", "m_s²": "m_s2", "mm_s²": "mm_s2"},
-    **dict.fromkeys(("gram", "grams", "gr"), "g"),
+    **dict.fromkeys(("gram", "grams", "gr", "gm", "gms"), "g"),
     **{"ounce": "oz", "ounces": "oz", "lbs": "lb", "pound": "lb", "pounds": "lb"},
 }
 
@@ -139,7 +141,7 @@ class Heading:
     unit
         As it is written.
     sensor
-        What is left of the name beside these.
+        What is left of the name beside these; in a weights table the plane.
     tidy
         Whether it is a name of such a table already.
     """
@@ -224,14 +226,19 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
 
 
 def find_header(
-    rows: Sequence[Sequence[str]], named: Mapping[str, str]
+    rows: Sequence[Sequence[str]], named: Mapping[str, str], *, weights: bool = False
 ) -> tuple[int, int, Sequence[str]] | None:
-    """Where the header of a runs table surely stands: its first and last row, and its names.
+    """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 
     Two rows make one header where a name in the upper one stands over several columns: `Bearing 1` over
     `mils` and `deg`.
     """
     for at, cells in enumerate(rows[:MOST_ABOVE]):
+        if weights:
+            stems = {heading.stem for heading in read_headings(cells, weights=True)}
+            if "plane" in stems and stems & {"mass", "unbalance"}:
+                return at, at, cells
+            continue
         both = _joined(cells, rows[at + 1]) if at + 1 < len(rows) else None
         if both is not None and looks_like_header(both, named):
             return at, at + 1, both
@@ -328,10 +335,15 @@ def _of_weights(unknown: Heading, outside: str, inside: str) -> Heading:
             if stem in ("mass", "unbalance") and unit and readable("mass", unit):
                 stem = units.weight(read_unit("mass", unit)[0]).kind
             measured = stem in ("mass", "unbalance", "angle")
-            return replace(unknown, stem=stem, unit=unit if measured else "")
-    if unknown.name.casefold() in ("deg", "°", "degrees"):
-        return replace(unknown, stem="angle", unit="deg")
-    return unknown
+            plane = _bare(outside[: match.start()]) if measured else ""
+            return replace(unknown, stem=stem, unit=unit if measured else "", sensor=plane)
+    whole = f"{outside} {inside}".strip()
+    at_end = _AT_END.search(whole)
+    if at_end and at_end["angle"]:
+        return replace(unknown, stem="angle", unit="deg", sensor=_bare(whole[: at_end.start()]))
+    if readable("mass", whole) and _SPELLINGS.get(whole.casefold(), whole) != whole:  # Grams
+        return replace(unknown, stem="mass", unit=whole)
+    return replace(unknown, stem="note") if _BESIDE_WEIGHTS.match(unknown.name) else unknown
 
 
 def _bare(text: str) -> str:

@@ -69,9 +69,10 @@ class _Column(NamedTuple):
     cells: Sequence[Cell]
 
 
-def rows_from_header(rows: Sequence[Row], named: Mapping[str, str]) -> list[Row]:
-    """Rows of a sheet with the header of a runs table in one row; those above it become comments."""
-    header = find_header([[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]], named)
+def rows_from_header(rows: Sequence[Row], named: Mapping[str, str], *, weights: bool = False) -> list[Row]:
+    """Rows of a sheet with the header of the table in one row; those above it become comments."""
+    top = [[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]]
+    header = find_header(top, named, weights=weights)
     if header is None:
         return list(rows)
     first, last, names = header
@@ -80,7 +81,7 @@ def rows_from_header(rows: Sequence[Row], named: Mapping[str, str]) -> list[Row]
     return [*above, changed, *rows[last + 1 :]]
 
 
-def text_from_header(text: str, named: Mapping[str, str]) -> str:
+def text_from_header(text: str, named: Mapping[str, str], *, weights: bool = False) -> str:
     """The same of a text table."""
     parts = re.split(r"(\r\n|\n|\r)", text, maxsplit=MOST_ABOVE)
     lines, ends = parts[::2], [*parts[1::2], ""]
@@ -90,7 +91,7 @@ def text_from_header(text: str, named: Mapping[str, str]) -> str:
         if plain and not plain.startswith(("#", "sep=")) and len(line) < LONGEST * LONGEST:
             with suppress(csv.Error):
                 rows[at] = cells_of_line(line)
-    header = find_header([cells for cells, _ in rows.values()], named)
+    header = find_header([cells for cells, _ in rows.values()], named, weights=weights)
     if header is None:
         return text
     first, last, names = header
@@ -104,20 +105,31 @@ def text_from_header(text: str, named: Mapping[str, str]) -> str:
     return "".join(line + end for line, end in zip(lines, ends, strict=True))
 
 
-def _open(source: Source, named: Mapping[str, str], problems: Problems, *, first: bool) -> Grid | None:
-    """The cells of a runs table from its header on."""
+def open_table(
+    source: Source,
+    named: Mapping[str, str],
+    problems: Problems,
+    *,
+    first: bool = False,
+    weights: bool = False,
+) -> Grid | None:
+    """The cells of a runs table, or of a weights table, from its header on."""
     if isinstance(source, Grid):
         return source
-    path = Path(source_name(source))
+    path, sheet = Path(source_name(source)), "weights" if weights else "runs"
     if is_workbook(path):
         sheets = read_workbook(path, problems)
-        chosen = None if sheets is None else pick_sheet(path, sheets, "runs", problems, first=first)
+        chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
         if chosen is None:
             return None
-        return make_grid(sheet_source(path, chosen[0]), rows_from_header(chosen[1], named), "", problems)
+        rows = rows_from_header(chosen[1], named, weights=weights)
+        return make_grid(sheet_source(path, chosen[0]), rows, "", problems, may_be_empty=weights)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
-    return None if text is None else parse_text(str(path), text_from_header(text, named), problems)
+    if text is None:
+        return None
+    shaped = text_from_header(text, named, weights=weights)
+    return parse_text(str(path), shaped, problems, may_be_empty=weights)
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
@@ -178,7 +190,7 @@ def stated_phase(source: Source, columns: Said | None = None) -> Phase | None:
                 continue
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file that is read once more
-            grid = _open(file, named, Problems(), first=True)
+            grid = open_table(file, named, Problems(), first=True)
         units_ = [h.unit for h in read_headings(grid.header, named) if h.stem == "phase"] if grid else []
         words |= {read_unit("phase", unit)[1] for unit in units_ if readable("phase", unit)}
     words -= {""}
@@ -203,7 +215,7 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
 
 def _read_one(source: Source, conventions: Conventions, problems: Problems, *, first: bool) -> Grid | None:
     named = _names_of(conventions.columns)
-    grid = _open(source, named, problems, first=first)
+    grid = open_table(source, named, problems, first=first)
     if grid is None or not _are_there(named, grid, conventions):
         return None
     try:

@@ -103,8 +103,8 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
         if title is None or not (name in TABLES[:2] or _holds_cells(sheets[title])):
             continue
         source, rows = sheet_source(path, title), sheets[title]
-        if name in READINGS:
-            rows = rows_from_header(rows, {})
+        if name in (*READINGS, "weights", "check_weights"):
+            rows = rows_from_header(rows, {}, weights=name not in READINGS)
         if name == "runs" and _is_a_form(rows):
             expected = "readings below the header, one row per run, speed and sensor: none are filled in yet"
             problems.add(source, None, None, None, expected)

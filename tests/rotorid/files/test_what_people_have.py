@@ -282,6 +282,14 @@ SAME_WEIGHTS = {
     "blade": "run,plane,mass_g,Blade no.\ntrial P1,P1,10,3\ntrial P2,P2,10,7\n",
     "position": "run,plane,mass_g,Position\ntrial P1,P1,10,3\ntrial P2,P2,10,7\n",
     "hole in the angle": "run,plane,mass_g,angle\ntrial P1,P1,10,hole 3\ntrial P2,P2,10,#7\n",
+    "columns for each plane": "Run,P1 weight (g),P1 angle (deg),P2 weight (g),P2 angle (deg)\n"
+    "as found,,,,\ntrial P1,10,90,,\ntrial P2,,,10,270\n",
+    "units row and a title": "Pump 3\n\nTest,Plane,Amount,Location\n,,g,deg\n"
+    "trial P1,P1,10,90\ntrial P2,P2,10,270\n",
+    "grams and degrees": "Date,Trial run,Plane,Grams,Degrees\n2026-01-02,trial P1,P1,10,90\n"
+    "2026-01-03,trial P2,P2,10,270\n",
+    "a run without a weight": "run,plane,weight (gm),phase (deg)\nas found,,,\n"
+    "trial P1,P1,10,90\ntrial P2,P2,10,270\n",
     "removed on the other side": "run,plane,action,mass_g,angle_deg\n"
     "trial P1,P1,add,10,90\ntrial P2,P2,remove,10,90\n",
 }
@@ -363,6 +371,12 @@ def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
     job = job_of(tmp_path, settings, **files, pieces=PIECES)
     turn = np.exp(1j * np.radians([0, 135, 225]))
     np.testing.assert_allclose(job.check.weights[0], [0.003, 0.004 * turn[1] + 0.01 * turn[2]], rtol=1e-12)
+
+
+def test_a_wrong_cell_of_a_plane_names_its_column(tmp_path):
+    weights = SAME_WEIGHTS["columns for each plane"].replace(",10,270", ",10,400")
+    words = refused(trials_of, tmp_path, PUMP, weights)
+    assert "row 4, column P2 angle (deg): found '400', expected an angle from -360" in words
 
 
 QUESTIONS = {
