@@ -418,7 +418,7 @@ def _has_columns(
     if (len(missing) > 1 and unknown) or len(unknown) > max(2, len(known)):
         seems = _seems(grid) or "; remarks go into 'note'"
         expected = f"a table with the columns {_known(columns)}; its columns are {present}{seems}"
-        problems.add(grid.source, grid.header_row, None, None, expected)
+        problems.add(grid.source, grid.header_row, unknown[0], None, expected)
         return False
     if unknown:
         one = unknown[0] if len(unknown) == 1 else None

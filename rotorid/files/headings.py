@@ -266,7 +266,7 @@ def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
 
 
 def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Heading:
-    if len(name) > LONGEST:
+    if len(name) > LONGEST or name.startswith("//"):  # a line that was taken out
         return unknown
     beside = not weights and (DEVIATION.match(name) or _BESIDE.match(name))
     if beside or name.casefold().startswith(REMARKS):

@@ -536,6 +536,10 @@ def test_the_wrong_kind_of_file_is_one_message(name, cli):
     assert outcome.err.strip().count("\n") == lines - 1
 
 
+def test_a_header_that_was_taken_out_is_none(tmp_path):
+    assert "found '//run', expected a known column" in refused(trials_of, tmp_path, f"//{PUMP}")
+
+
 def test_a_column_list_stands_once(tmp_path):
     runs = PUMP.replace("phase_deg", "phase_deg,who,when,why").replace("\n", ",,,\n").replace("why,,,", "why")
     words = refused(trials_of, tmp_path, runs)
