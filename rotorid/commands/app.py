@@ -120,8 +120,8 @@ class Destination:
             For a file that could not be written, before any work is done, and for one that was read.
         """
         from rotorid.commands.verbose import note
-        from rotorid.tables.reader.problems import printable
-        from rotorid.tables.reader.table_writing import write_files
+        from rotorid.files.problems import printable
+        from rotorid.files.table_writing import write_files
 
         if self.latex and (self.show is None or self.json or self.table):
             raise ValueError("--latex belongs to --show equations, without --json or --table")

@@ -438,7 +438,7 @@ def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     import numpy as np
 
     from rotorid.commands.option_quantities import quantity
-    from rotorid.tables.reader import units
+    from rotorid.files import units
 
     def read(_: str, value: str) -> complex:
         size, _, angle = value.partition("@")

@@ -57,7 +57,7 @@ class Delivered(Answered):
 
     def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
         """What `--output` writes to a file of this name, or several files by their paths."""
-        from rotorid.tables.reader.table_writing import table_bytes
+        from rotorid.files.table_writing import table_bytes
 
         return table_bytes(path, self.to_frame())
 
@@ -230,7 +230,7 @@ def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
     @functools.wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _T:
-        from rotorid.tables.reader.input_file import each_file_once
+        from rotorid.files.input_file import each_file_once
 
         given = signature.bind(*args, **kwargs)
         options = given.arguments.get("options")
@@ -269,14 +269,14 @@ def provenance(
 
 def hash_of(file: Path) -> str:
     """SHA-256 of a file."""
-    from rotorid.tables.reader.input_file import sha256
+    from rotorid.files.input_file import sha256
 
     return sha256(file)
 
 
 def text_of(file: object) -> str:
     """Text of a file that was read; nothing, where what was given is none."""
-    from rotorid.tables.reader.input_file import file_content
+    from rotorid.files.input_file import file_content
 
     return file_content(Path(file)).decode("utf-8-sig", "replace") if isinstance(file, Path | str) else ""
 

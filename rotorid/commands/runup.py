@@ -188,7 +188,7 @@ def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Se
 
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
-    from rotorid.tables.reader.problems import Problems
+    from rotorid.files.problems import Problems
     from rotorid.tables.runs.vectors_table import read_vectors
     from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
     from rotorid.tables.waveforms.waveforms import WaveformWishes

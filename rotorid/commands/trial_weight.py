@@ -16,7 +16,7 @@ from rotorid.commands.input_checks import job_source, refuse
 from rotorid.commands.option_quantities import limited, mass, quantity, size, speed_with_unit
 from rotorid.commands.outcome import USUAL, Delivered, command, provenance
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
-from rotorid.tables.reader.units import FORCE, MASS, UNBALANCE
+from rotorid.files.units import FORCE, MASS, UNBALANCE
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -88,8 +88,8 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapper(*args: Any, verbose: bool = False, **kwargs: Any) -> None:  # noqa: ANN401 - any command
-        from rotorid.tables.reader.decimal_numbers import LARGEST_STATED, NotANumber, check_size
-        from rotorid.tables.reader.input_file import each_file_once
+        from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size
+        from rotorid.files.input_file import each_file_once
 
         for option, value in kwargs.items():
             if isinstance(value, float):

@@ -1,1 +1,1 @@
-"""Files of people and instruments: runs, weights and influence tables, read into SI and written."""
+"""Files of people and instruments: cells, units, settings, complaints; runs and weights in any layout."""

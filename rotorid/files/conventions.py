@@ -16,7 +16,7 @@ from rotorid.base.words import Angles as Angles
 from rotorid.base.words import Phase as Phase
 from rotorid.base.words import Rotation as Rotation
 from rotorid.base.words import View as View
-from rotorid.tables.reader.settings_keys import Said
+from rotorid.files.settings_keys import Said
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 ANGLES: tuple[Angles, ...] = get_args(Angles)

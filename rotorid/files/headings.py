@@ -12,16 +12,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rotorid.base.suggestions import suggest
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import REMARKS
-from rotorid.tables.reader.grid import MOST_ABOVE
-from rotorid.tables.reader.units import UnitError, UnitReader, one_of
+from rotorid.files import units
+from rotorid.files.columns import REMARKS
+from rotorid.files.grid import MOST_ABOVE
+from rotorid.files.units import UnitError, UnitReader, one_of
 
 READING = ("amplitude", "phase")
 LONGEST = 100
 """Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
+_RUN = "run|test|trial|state|condition|step|measurement"
 _NEEDED = {"run", "speed", "sensor", *READING}
-_AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs"
+_AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs|ph|phi|φ"
 
 
 def _words(**words: str) -> dict[str, re.Pattern[str]]:
@@ -38,24 +39,24 @@ _READINGS = _words(
     phase=rf"{_PHASE}|lag|lead|angle",
 )
 _OTHERS = _words(
-    speed="speed|rpm",
+    speed="speed|rpm|cpm|frequency|freq",
     sensor="sensor|probe|channel|point|transducer|bearing",
-    run="run",
+    run=_RUN,
     repeat="repeat",
 )
 _QUANTITY = _words(amplitude="vibration|vib|velocity|displacement|severity")
 """Says the quantity where nothing else does."""
 _WEIGHTS = _words(
     clock="o['’]?clock|clock",
-    angle="angle|angular position|direction",
+    angle="angle|angular position|location|direction|phase",
     hole="hole|blade|vane|position|pos",
     plane="plane",
     action="action",
     unit="unit",
     pieces="pieces",
     unbalance="unbalance|imbalance",
-    mass="weight|mass|wt",
-    run="run|trial",
+    mass="weight|mass|wt|amount",
+    run=_RUN,
 )
 _TIDY = {
     False: re.compile(r"(?:(speed|amplitude|phase)(?:_(.*))?|run|sensor|repeat)"),
@@ -64,8 +65,12 @@ _TIDY = {
     ),
 }
 DEVIATION = re.compile(r"(?:amplitude|phase)_std(?:_|$)")
-_BESIDE = re.compile(r"order|time_s|turns|overall|gap(?:_|$)|.*\bcoeff", re.IGNORECASE)
+_BESIDE = re.compile(
+    r"order|time_s|turns|overall|gap(?:_|$)|.*\bcoeff|.*\boverall\b|date|time(?:\b|stamp)|remark|operator|temp",
+    re.IGNORECASE,
+)
 """What `rotorid vectors` and instruments write beside the readings."""
+_BESIDE_WEIGHTS = re.compile("date|time|remark|operator", re.IGNORECASE)
 _FILLERS = {
     "name",
     "no",
@@ -79,7 +84,21 @@ _FILLERS = {
     "rotational",
     "nominal",
 }
-_FILLERS |= {"measured", "position", "vibration", "vib", "balance", "balancing", "trial", "correction", "of"}
+_FILLERS |= {
+    "",
+    "measurement",
+    "measuring",
+    "run",
+    "measured",
+    "position",
+    "vibration",
+    "vib",
+    "balance",
+    "balancing",
+    "trial",
+    "correction",
+    "of",
+}
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _ORDER = re.compile(r"(?<![^\W_])(?<!\.)([0-9]+(?:\.[0-9]+)?)[xX×](?![^\W_])")
 _PROBE_Y = re.compile(r"(?<![^\W_])[0-9]+[yY](?![^\W_])")
@@ -87,17 +106,23 @@ _DIRECTION = re.compile(r"(?<![^\W\d_])(lag|lead)(?:ging|ing)?(?![^\W\d_])", re.
 _SWINGS = r"(?P<pp>pp|p-p|pk[-_]?pk|peak[ -](?:to[ -])?peak)|(?P<rms>rms)|(?P<peak>pk|0-pk|0-p|peak)"
 _SWING = re.compile(rf"[\s_.,-]*(?:{_SWINGS})$", re.IGNORECASE)
 _AT_END = re.compile(
-    rf"(?<![^\W_])(?:(?P<angle>°|deg|degrees?)|(?:mils?|[uµμ]m|microns?|mm/s|in/s|ips)(?:[\s_.,-]*(?:{_SWINGS}))?)$",
+    rf"(?<![^\W_])(?:(?P<angle>°|deg|degrees?)|(?:mils?|[uµμ]m|microns?|(?:mm|in)[/_]s(?:ec)?|ips)"
+    rf"(?:[\s_.,-]*(?:{_SWINGS}))?)$",
     re.IGNORECASE,
 )
 """A unit that says what it measures: of a phase, or of a vibration."""
+_BOTH_AT_END = re.compile(
+    r"(?<![^\W_])((?:mils?|[uµμ]m|(?:mm|in)/s(?:ec)?|ips)[^/@<∠]*?\s*[/@<∠]\s*(?:°|deg|degrees?))$",
+    re.IGNORECASE,
+)
 _SPELLINGS = {
     "r_min": "rpm",
     "1_min": "rpm",
+    "cpm": "rpm",
     "hz": "Hz",
     **dict.fromkeys(("°", "º", "degree", "degrees"), "deg"),
     **{"mils": "mil", "micron": "um", "microns": "um", "ips": "in_s", "m_s²": "m_s2", "mm_s²": "mm_s2"},
-    **dict.fromkeys(("gram", "grams", "gr"), "g"),
+    **dict.fromkeys(("gram", "grams", "gr", "gm", "gms"), "g"),
     **{"ounce": "oz", "ounces": "oz", "lbs": "lb", "pound": "lb", "pounds": "lb"},
 }
 
@@ -116,7 +141,7 @@ class Heading:
     unit
         As it is written.
     sensor
-        What is left of the name beside these.
+        What is left of the name beside these; in a weights table the plane.
     tidy
         Whether it is a name of such a table already.
     """
@@ -146,7 +171,7 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     if not plain:
         return "", direction
     swing = _SWING.search(plain) if stem == "amplitude" else None
-    base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_")
+    base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_").removesuffix("ec")
     folded = base.casefold()
     if stem in ("mass", "unbalance"):
         parts = re.split("[_-]", re.sub(r"^(g|oz)\.?(mm|in)$", r"\1_\2", folded))
@@ -183,10 +208,14 @@ def read_headings(
     `named` are names of a runs table by names that the file has.
     """
     probes = any(_PROBE_Y.search(name) for name in header)  # 1X beside 1Y is a probe, else an order
-    return [
+    headings = [
         _heading(Heading(i, name), (named or {}).get(name, name), probes=probes, weights=weights)
         for i, name in enumerate(header)
     ]
+    plain = [h for h in headings if h.stem == "run" and re.search("run", h.name, re.IGNORECASE)]
+    if len(plain) == 1:  # beside it a column such as Condition says something else
+        headings = [replace(h, stem="note") if h.stem == "run" and h is not plain[0] else h for h in headings]
+    return headings
 
 
 def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
@@ -197,14 +226,19 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
 
 
 def find_header(
-    rows: Sequence[Sequence[str]], named: Mapping[str, str]
+    rows: Sequence[Sequence[str]], named: Mapping[str, str], *, weights: bool = False
 ) -> tuple[int, int, Sequence[str]] | None:
-    """Where the header of a runs table surely stands: its first and last row, and its names.
+    """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 
     Two rows make one header where a name in the upper one stands over several columns: `Bearing 1` over
     `mils` and `deg`.
     """
     for at, cells in enumerate(rows[:MOST_ABOVE]):
+        if weights:
+            stems = {heading.stem for heading in read_headings(cells, weights=True)}
+            if "plane" in stems and stems & {"mass", "unbalance"}:
+                return at, at, cells
+            continue
         both = _joined(cells, rows[at + 1]) if at + 1 < len(rows) else None
         if both is not None and looks_like_header(both, named):
             return at, at + 1, both
@@ -221,7 +255,7 @@ def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
         if re.fullmatch(r"[0-9.,+-]+", heading.name) and heading.name.strip("-"):
             return None
         if heading.stem in READING and not heading.sensor:
-            several = several or (not above and bool(group))
+            several = several or (above in ("", group) and bool(group))
             group = above or group
             names.append(f"{group} {heading.name}".strip())
         else:
@@ -232,7 +266,7 @@ def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
 
 
 def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Heading:
-    if len(name) > LONGEST:
+    if len(name) > LONGEST or name.startswith("//"):  # a line that was taken out
         return unknown
     beside = not weights and (DEVIATION.match(name) or _BESIDE.match(name))
     if beside or name.casefold().startswith(REMARKS):
@@ -247,6 +281,8 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
     if weights:
         return _of_weights(unknown, outside, inside)
     whole = f"{outside} {inside}".strip()
+    if both := _BOTH_AT_END.search(whole):
+        return replace(unknown, stem="vector", unit=both[1], sensor=_bare(whole[: both.start()]))
     unit = _AT_END.search(whole)
     for words in (_READINGS, {} if unit else _OTHERS, _QUANTITY):
         for stem, role in words.items():
@@ -254,9 +290,17 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
                 heading = _with_rest(replace(unknown, stem=stem), outside, match, inside)
                 if heading.stem and not (words is _QUANTITY and unit and unit["angle"]):
                     return heading
+    return _by_unit(unknown, outside, inside, unit)
+
+
+def _by_unit(unknown: Heading, outside: str, inside: str, unit: re.Match[str] | None) -> Heading:
+    """A heading without a word for what it is: its unit says it, at its end or in brackets."""
+    whole = f"{outside} {inside}".strip()
     sensor = _bare(whole[: unit.start()]) if unit else ""
     if unit and suggest(sensor, READING) is None:  # else a word for the quantity, misspelt
         return replace(unknown, stem="phase" if unit["angle"] else "amplitude", unit=unit[0], sensor=sensor)
+    if inside and readable("speed", inside):
+        return replace(unknown, stem="speed", unit=inside)
     if inside and readable("amplitude", inside):
         return replace(unknown, unit=inside, sensor=_bare(outside))
     return replace(unknown, sensor=unknown.name)
@@ -264,7 +308,7 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
 
 def _with_rest(heading: Heading, outside: str, match: re.Match[str], inside: str) -> Heading:
     """A heading with the unit that stands after its word or in brackets; the rest is the sensor."""
-    kept = match[0] if match[0].casefold() in ("rpm", "lag", "lead") else ""
+    kept = match[0] if match[0].casefold() in ("rpm", "cpm", "lag", "lead") else ""
     before, after = _bare(outside[: match.start()]), f"{kept} {_bare(outside[match.end() :])}".strip()
     quantity = "amplitude" if heading.stem == "vector" else heading.stem
     if quantity not in MEASURED:
@@ -291,10 +335,15 @@ def _of_weights(unknown: Heading, outside: str, inside: str) -> Heading:
             if stem in ("mass", "unbalance") and unit and readable("mass", unit):
                 stem = units.weight(read_unit("mass", unit)[0]).kind
             measured = stem in ("mass", "unbalance", "angle")
-            return replace(unknown, stem=stem, unit=unit if measured else "")
-    if unknown.name.casefold() in ("deg", "°", "degrees"):
-        return replace(unknown, stem="angle", unit="deg")
-    return unknown
+            plane = _bare(outside[: match.start()]) if measured else ""
+            return replace(unknown, stem=stem, unit=unit if measured else "", sensor=plane)
+    whole = f"{outside} {inside}".strip()
+    at_end = _AT_END.search(whole)
+    if at_end and at_end["angle"]:
+        return replace(unknown, stem="angle", unit="deg", sensor=_bare(whole[: at_end.start()]))
+    if readable("mass", whole) and _SPELLINGS.get(whole.casefold(), whole) != whole:  # Grams
+        return replace(unknown, stem="mass", unit=whole)
+    return replace(unknown, stem="note") if _BESIDE_WEIGHTS.match(unknown.name) else unknown
 
 
 def _bare(text: str) -> str:

@@ -20,7 +20,10 @@ from typing import NamedTuple
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.columns import REMARKS, Source, sheet_source, source_name
 from rotorid.files.conventions import PHASES, Conventions, Phase, as_phase
+from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
+from rotorid.files.grid import MOST_ABOVE, Cell, Grid, Row, make_grid, show
 from rotorid.files.headings import (
     DEVIATION,
     LONGEST,
@@ -32,19 +35,17 @@ from rotorid.files.headings import (
     read_unit,
     readable,
 )
-from rotorid.tables.reader.columns import REMARKS, Source, sheet_source, source_name
-from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.tables.reader.grid import MOST_ABOVE, Cell, Grid, Row, make_grid, show
-from rotorid.tables.reader.input_file import STANDARD_INPUT
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
-from rotorid.tables.reader.text_file import cells_of_line, decode, parse_text, read_bytes
-from rotorid.tables.reader.units import UnitError, spelt
+from rotorid.files.input_file import STANDARD_INPUT
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Said
+from rotorid.files.text_file import cells_of_line, decode, parse_text, read_bytes
+from rotorid.files.units import UnitError, spelt
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
-_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*([@<∠/])\s*({NUMBER}[^@<∠/]*)")
+_AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
+_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*([@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
 _WEIGHT = re.compile("weight|mass|correct", re.IGNORECASE)
 _BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)
@@ -68,9 +69,10 @@ class _Column(NamedTuple):
     cells: Sequence[Cell]
 
 
-def rows_from_header(rows: Sequence[Row], named: Mapping[str, str]) -> list[Row]:
-    """Rows of a sheet with the header of a runs table in one row; those above it become comments."""
-    header = find_header([[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]], named)
+def rows_from_header(rows: Sequence[Row], named: Mapping[str, str], *, weights: bool = False) -> list[Row]:
+    """Rows of a sheet with the header of the table in one row; those above it become comments."""
+    top = [[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]]
+    header = find_header(top, named, weights=weights)
     if header is None:
         return list(rows)
     first, last, names = header
@@ -79,7 +81,7 @@ def rows_from_header(rows: Sequence[Row], named: Mapping[str, str]) -> list[Row]
     return [*above, changed, *rows[last + 1 :]]
 
 
-def _text_from_header(text: str, named: Mapping[str, str]) -> str:
+def text_from_header(text: str, named: Mapping[str, str], *, weights: bool = False) -> str:
     """The same of a text table."""
     parts = re.split(r"(\r\n|\n|\r)", text, maxsplit=MOST_ABOVE)
     lines, ends = parts[::2], [*parts[1::2], ""]
@@ -89,7 +91,7 @@ def _text_from_header(text: str, named: Mapping[str, str]) -> str:
         if plain and not plain.startswith(("#", "sep=")) and len(line) < LONGEST * LONGEST:
             with suppress(csv.Error):
                 rows[at] = cells_of_line(line)
-    header = find_header([cells for cells, _ in rows.values()], named)
+    header = find_header([cells for cells, _ in rows.values()], named, weights=weights)
     if header is None:
         return text
     first, last, names = header
@@ -103,20 +105,31 @@ def _text_from_header(text: str, named: Mapping[str, str]) -> str:
     return "".join(line + end for line, end in zip(lines, ends, strict=True))
 
 
-def _open(source: Source, named: Mapping[str, str], problems: Problems, *, first: bool) -> Grid | None:
-    """The cells of a runs table from its header on."""
+def open_table(
+    source: Source,
+    named: Mapping[str, str],
+    problems: Problems,
+    *,
+    first: bool = False,
+    weights: bool = False,
+) -> Grid | None:
+    """The cells of a runs table, or of a weights table, from its header on."""
     if isinstance(source, Grid):
         return source
-    path = Path(source_name(source))
+    path, sheet = Path(source_name(source)), "weights" if weights else "runs"
     if is_workbook(path):
         sheets = read_workbook(path, problems)
-        chosen = None if sheets is None else pick_sheet(path, sheets, "runs", problems, first=first)
+        chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
         if chosen is None:
             return None
-        return make_grid(sheet_source(path, chosen[0]), rows_from_header(chosen[1], named), "", problems)
+        rows = rows_from_header(chosen[1], named, weights=weights)
+        return make_grid(sheet_source(path, chosen[0]), rows, "", problems, may_be_empty=weights)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
-    return None if text is None else parse_text(str(path), _text_from_header(text, named), problems)
+    if text is None:
+        return None
+    shaped = text_from_header(text, named, weights=weights)
+    return parse_text(str(path), shaped, problems, may_be_empty=weights)
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
@@ -177,7 +190,7 @@ def stated_phase(source: Source, columns: Said | None = None) -> Phase | None:
                 continue
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file that is read once more
-            grid = _open(file, named, Problems(), first=True)
+            grid = open_table(file, named, Problems(), first=True)
         units_ = [h.unit for h in read_headings(grid.header, named) if h.stem == "phase"] if grid else []
         words |= {read_unit("phase", unit)[1] for unit in units_ if readable("phase", unit)}
     words -= {""}
@@ -202,7 +215,7 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
 
 def _read_one(source: Source, conventions: Conventions, problems: Problems, *, first: bool) -> Grid | None:
     named = _names_of(conventions.columns)
-    grid = _open(source, named, problems, first=first)
+    grid = open_table(source, named, problems, first=first)
     if grid is None or not _are_there(named, grid, conventions):
         return None
     try:
@@ -391,6 +404,7 @@ def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
     common = sensors.pop("")
     if not sensors:
         return {"": common}
+    _pair_by_number(sensors)
     loose = [common[stem] for stem in READING if stem in common]
     if len(sensors) == 1 and len(loose) == 1 and len(next(iter(sensors.values()))) == 1:
         [(sensor, own)] = sensors.items()  # one sensor, named in one of its headings
@@ -404,6 +418,16 @@ def _by_sensor(columns: Sequence[_Column]) -> dict[str, dict[str, _Column]]:
             words = f"the {lacking} of this sensor too, in a column such as '{sensor} {lacking}'"
             raise Unclear(words, next(iter(own.values())).heading)
     return sensors
+
+
+def _pair_by_number(sensors: dict[str, dict[str, _Column]]) -> None:
+    """Join `A1 (mm/s)` and `P1 (deg)`, which are no two sensors, as 1."""
+    halves = {name: next(iter(own)) for name, own in sensors.items() if len(own) == 1}
+    numbers = {name: re.sub(r"^[^\W\d_]{1,3}(?=[0-9]+$)", "", name) for name in halves}
+    for number in dict.fromkeys(numbers.values()):
+        pair = [name for name in halves if numbers[name] == number]
+        if number.isdecimal() and sorted(halves[name] for name in pair) == sorted(READING):
+            sensors[number] = {stem: column for name in pair for stem, column in sensors.pop(name).items()}
 
 
 def _name(column: _Column) -> str:

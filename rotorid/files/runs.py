@@ -6,15 +6,19 @@ make trials.
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table, make_table
 from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
     FULL_TURN,
@@ -23,14 +27,12 @@ from rotorid.files.conventions import (
     Phase,
     StatedErrors,
 )
+from rotorid.files.grid import Grid
 from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
+from rotorid.files.problems import Problems
 from rotorid.files.speeds import merge_speeds, same_speed, show_speed
+from rotorid.files.units import one_of
 from rotorid.files.weights import read_weights
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, make_table
-from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
@@ -137,10 +139,10 @@ def read_runs(
         Collects the complaints.
     """
     grids = read_runs_grids(source, conventions, problems)
-    if grids is None or (len(grids) > 1 and not all(_table(grid, problems) for grid in grids)):
+    if grids is None or (len(grids) > 1 and not all(readings_table(grid, problems) for grid in grids)):
         return None, None
     grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
-    table = None if grid is None else _table(grid, problems)
+    table = None if grid is None else readings_table(grid, problems)
     if table is None:
         return None, None
     amplitude, phase = table.numbers("amplitude"), table.numbers("phase")
@@ -165,8 +167,7 @@ def read_runs(
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
-    if table.unit("amplitude").name == "mm_s_rms" and is_severity(heading := _heading_of(table)):
-        words += (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
+    words += _which_mm_s(table)
     values = conventions.labels.vibration_from(amplitude, phase)
     repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
     order = {label: k for k, label in enumerate(dict.fromkeys(repeat))}
@@ -189,16 +190,27 @@ def read_runs(
     trials = Trials(runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=words, steps=steps)
     if "phase_std" not in table:
         return runs, trials
-    along = table.numbers("amplitude_std")
-    across = np.where(amplitude > 0, amplitude * table.numbers("phase_std"), along)
     covariance = np.full((2, 2, *readings.shape), np.nan)
-    covariance[:, :, *at] = np.moveaxis(turned(values, along**2, across**2), 0, -1)[..., rows]
+    covariance[:, :, *at] = np.moveaxis(covariances(table, values), 0, -1)[..., rows]
     return runs, replace(trials, covariance=covariance)
 
 
-def _table(grid: Grid, problems: Problems) -> Table | None:
-    """The columns of a runs table, with numbers that can be."""
-    table = make_table(grid, COLUMNS, problems)
+def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
+    """Of real and imaginary parts of the readings (n,) of a table with `amplitude_std` and `phase_std`.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, 2, 2); where there is no amplitude, no direction is another.
+    """
+    along, size = table.numbers("amplitude_std"), np.abs(vectors)
+    across = np.where(size > 0, size * table.numbers("phase_std"), along)
+    return turned(vectors, along**2, across**2)
+
+
+def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = COLUMNS) -> Table | None:
+    """The columns of a runs table, with numbers that can be; None and problems."""
+    table = make_table(grid, columns, problems)
     if table is None:
         return None
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
@@ -222,6 +234,16 @@ def _heading_of(table: Table) -> str:
     """The heading of the amplitudes in the file."""
     field = table.fields["amplitude"]
     return field.names[0] if field.names else field.name
+
+
+def _which_mm_s(table: Table) -> tuple[str, ...]:
+    """How mm/s alone are read, below a heading that is not one of this program's own."""
+    heading, unit = _heading_of(table), table.unit("amplitude").name
+    if unit == "mm_s_rms" and is_severity(heading):
+        return (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
+    if unit == "mm_s" and "mm_s" not in heading and not re.search("peak|pk", heading, re.IGNORECASE):
+        return (f"{heading!r} is read as mm/s peak: write rms in the heading where it is rms",)
+    return ()
 
 
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
-from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.units import Unit
+from rotorid.files.columns import Table
+from rotorid.files.units import Unit
 
 ROUNDING = 1e-12
 UNSAID = 0.1

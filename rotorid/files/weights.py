@@ -17,14 +17,14 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import REMARKS, Column, Source, make_table
 from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.headings import LONGEST, Heading, read_headings, read_unit, readable
-from rotorid.files.layout import NUMBER, Unclear
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
-from rotorid.tables.reader.grid import Cell, Grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit, one_of
+from rotorid.files.grid import Cell, Grid, show
+from rotorid.files.headings import Heading, read_headings, read_unit, readable
+from rotorid.files.layout import NUMBER, Unclear, open_table, vector_in
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit, one_of
 
 COLUMNS = (
     Column("run"),
@@ -36,7 +36,6 @@ COLUMNS = (
     Column("angle", one_of(units.ANGLE), ("angle_deg",)),
 )
 _SIZE = re.compile(rf"({NUMBER})\s*([^\W\d_].*)?")
-_VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠]|\bat\b)\s*({NUMBER}\s*(?:°|º|deg|degrees?)?)")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
 _CLOCK = re.compile(r"(1[0-2]|0?[0-9])(?::([0-5][0-9])(?::00)?)?(?:\s*(?:o['’]?clock|h))?", re.IGNORECASE)
 _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGNORECASE)
@@ -68,7 +67,7 @@ def read_weights(
     problems
         Collects the complaints.
     """
-    grid = read_grid(source, "weights", problems, may_be_empty=True)
+    grid = open_table(source, {}, problems, weights=True)
     if grid is None:
         return None
     try:
@@ -113,6 +112,7 @@ def read_weights(
 
 def _tidied(grid: Grid, runs: Sequence[str] | None, conventions: Conventions) -> Grid:
     """The table with the columns run, plane, mass or unbalance with its unit, and angle_deg."""
+    grid = _by_row(grid, read_headings(grid.header, weights=True))
     headings = read_headings(grid.header, weights=True)
     by = {heading.stem: heading for heading in headings if heading.stem not in ("", "note")}
     known = [heading for heading in headings if heading.stem not in ("", "note")]
@@ -120,6 +120,7 @@ def _tidied(grid: Grid, runs: Sequence[str] | None, conventions: Conventions) ->
     if len(by) < len(known) or "plane" not in by or size is None or {"mass", "unbalance"} <= set(by):
         return grid
     columns: dict[str, tuple[Heading, list[Cell]]] = {}
+    grid, size = _filled(grid, by, size)
 
     def cells(heading: Heading) -> list[Cell]:
         return [row[heading.index] for _, row in grid.rows]
@@ -139,16 +140,54 @@ def _tidied(grid: Grid, runs: Sequence[str] | None, conventions: Conventions) ->
         columns[f"angle_{unit}" if unit else "angle"] = place, angles
     for heading in headings:
         if heading.stem in ("", "note") and heading.name:
-            columns[heading.name] = heading, cells(heading)
-    places = tuple(heading.index for heading, _ in columns.values())
-    rows = zip(*(column for _, column in columns.values()), strict=True)
+            remark = heading.stem == "note" and not heading.name.casefold().startswith(REMARKS)
+            columns[f"note {heading.name}" if remark else heading.name] = heading, cells(heading)
+    places = [heading.index for heading, _ in columns.values()]
+    rows, width = zip(*(column for _, column in columns.values()), strict=True), len(grid.header)
     return replace(
         grid,
         header=tuple(columns),
         rows=tuple((number, row) for (number, _), row in zip(grid.rows, rows, strict=True)),
-        named=grid.header,
-        taken=(places,) * len(grid.rows),
+        named=grid.named or grid.header,
+        taken=tuple(tuple(row[k] for k in places) for row in grid.taken or [range(width)] * len(grid.rows)),
     )
+
+
+def _by_row(grid: Grid, headings: Sequence[Heading]) -> Grid:
+    """A table with columns for each plane, `P1 weight (g), P1 angle (deg), …`, as one row a weight."""
+    planes: dict[str, dict[str, Heading]] = {}
+    for heading in headings:
+        if heading.stem in ("mass", "unbalance", "angle") and heading.sensor and heading.unit:
+            planes.setdefault(heading.sensor, {})[heading.stem] = heading
+    kinds = {tuple(sorted((stem, own.unit) for stem, own in each.items())) for each in planes.values()}
+    if len(planes) < 2 or len(kinds) > 1 or "plane" in {heading.stem for heading in headings}:
+        return grid
+    used = {own.index for each in planes.values() for own in each.values()}
+    others = [heading for heading in headings if heading.index not in used]
+    [kind] = kinds
+    rows, taken = [], []
+    for number, cells in grid.rows:
+        for plane, own in planes.items():
+            places = [own[stem].index for stem, _ in kind]
+            if any(show(cells[place]) for place in places):
+                rows.append((number, (*(cells[h.index] for h in others), plane, *(cells[k] for k in places))))
+                taken.append((*(h.index for h in others), places[0], *places))
+    header = (*(h.name for h in others), "plane", *(f"{stem} ({unit})" for stem, unit in kind))
+    return replace(grid, header=header, rows=tuple(rows), named=grid.header, taken=tuple(taken))
+
+
+def _filled(grid: Grid, by: Mapping[str, Heading], size: Heading) -> tuple[Grid, Heading]:
+    """The table without a row of units below the header, and without rows of runs that had no weight."""
+    filled = [
+        k for k, (_, row) in enumerate(grid.rows) if any(show(row[by[s].index]) for s in by if s != "run")
+    ]
+    top = grid.rows[filled[0]][1] if filled else ()
+    unit = show(top[size.index]).strip("()[] ") if filled else ""
+    named = any(show(top[by[stem].index]) for stem in ("run", "plane") if filled and stem in by)
+    if unit and not named and not size.unit and readable("mass", unit):
+        size, filled = replace(size, unit=unit, tidy=False), filled[1:]
+    rows = tuple(grid.rows[k] for k in filled)
+    return replace(grid, rows=rows, taken=tuple(grid.taken[k] for k in filled if grid.taken)), size
 
 
 def _sizes(grid: Grid, size: Heading, unit_column: Heading | None) -> tuple[str, list[Cell], list[str]]:
@@ -163,9 +202,9 @@ def _sizes(grid: Grid, size: Heading, unit_column: Heading | None) -> tuple[str,
     own: list[str] = []
     for _, row in grid.rows:
         cell = row[size.index]
-        vector = _VECTOR.fullmatch(cell) if isinstance(cell, str) and len(cell) <= LONGEST else None
-        angles.append(vector[2] if vector else "")
-        text = vector[1].strip() if vector else cell
+        vector = vector_in(cell)
+        text, angle = (vector[0].strip(), vector[1]) if vector and vector[2] else (cell, "")
+        angles.append(angle)
         match = _SIZE.fullmatch(text) if isinstance(text, str) else None
         unit = "" if unit_column is None else show(row[unit_column.index])
         unit = (match[2] if match else None) or unit

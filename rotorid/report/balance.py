@@ -11,12 +11,12 @@ import numpy as np
 
 from rotorid.base.rpm import RPM
 from rotorid.base.text import sentence
+from rotorid.files import units
 from rotorid.report import conventions_explained
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import plane_figure
 from rotorid.report.number_tables import every_warning
 from rotorid.report.page import inline_svg, render_report
-from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from markupsafe import Markup

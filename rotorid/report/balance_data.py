@@ -11,8 +11,8 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import rpm
+from rotorid.files import units
 from rotorid.regression import coverage_factor, region_radius
-from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence, Mounted, Trials

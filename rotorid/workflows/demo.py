@@ -164,8 +164,8 @@ def demo(folder: Path | str, options: DemoOptions | None = None) -> Demo:
 
 def _copy(folder: Path, sample: Sample) -> list[Path]:
     """Write the files of a sample; refuse before anything is written."""
+    from rotorid.files.table_writing import write_files
     from rotorid.samples import sample_data
-    from rotorid.tables.reader.table_writing import write_files
 
     samples = sample_data()
     sources: list[Path] = []

@@ -72,8 +72,8 @@ def _write_template(path: Path, files: Sequence[Path]) -> None:
         If there is a job as well, or the name is no workbook's or one of an existing file, which may be
         filled in already.
     """
+    from rotorid.files.table_writing import write_bytes
     from rotorid.tables.job.workbook_template import template_bytes
-    from rotorid.tables.reader.table_writing import write_bytes
 
     if files:
         raise ValueError(

@@ -14,8 +14,8 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
+from rotorid.files import units
 from rotorid.files.headings import read_unit, readable
-from rotorid.tables.reader import units
 from rotorid.tables.waveforms.instrument_files import names_of_sets
 from rotorid.tables.waveforms.sampled_file import library, refusal
 

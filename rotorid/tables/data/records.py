@@ -14,10 +14,10 @@ from rotorid.base import result
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
-from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
-from rotorid.tables.reader.grid import Cell, Grid
-from rotorid.tables.reader.problems import Problems, TableWarning
-from rotorid.tables.reader.units import TIME, Unit, UnitError, one_of
+from rotorid.files.columns import Column, Table, make_table, read_grid
+from rotorid.files.grid import Cell, Grid
+from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.units import TIME, Unit, UnitError, one_of
 
 if TYPE_CHECKING:
     from rotorid.identify.ode import OdeModel

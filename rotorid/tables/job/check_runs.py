@@ -12,14 +12,14 @@ from balancing import Holes, Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import Source, source_name
+from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
 from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.files.weights import read_weights
 from rotorid.tables.job.job_planes import Planes
 from rotorid.tables.job.readings import Readings
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.slow_roll import subtract_slow_roll
 
 IN_HOLE = 1e-3

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rotorid.files.settings_keys import Quantity
 from rotorid.tables.job.job_data import Overrides
-from rotorid.tables.reader.settings_keys import Quantity
 
 
 @dataclass(frozen=True)

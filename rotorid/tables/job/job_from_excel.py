@@ -11,14 +11,14 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.columns import REMARKS, sheet_source
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
+from rotorid.files.excel_workbook import is_workbook, read_workbook
+from rotorid.files.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
 from rotorid.files.layout import rows_from_header
+from rotorid.files.problems import Problems
+from rotorid.files.toml_file import Section, read_toml
 from rotorid.tables.job.job_keys import CELLS, PLANE, READINGS, SENSOR, TABLES
-from rotorid.tables.reader.columns import REMARKS, sheet_source
-from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma, parse_number
-from rotorid.tables.reader.excel_workbook import is_workbook, read_workbook
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.toml_file import Section, read_toml
 
 NAMED = {"planes": ("plane", PLANE), "sensors": ("sensor", SENSOR)}
 """Sheets with a row for each plane or sensor: the column of its name, and keys that are columns."""
@@ -103,8 +103,8 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
         if title is None or not (name in TABLES[:2] or _holds_cells(sheets[title])):
             continue
         source, rows = sheet_source(path, title), sheets[title]
-        if name in READINGS:
-            rows = rows_from_header(rows, {})
+        if name in (*READINGS, "weights", "check_weights"):
+            rows = rows_from_header(rows, {}, weights=name not in READINGS)
         if name == "runs" and _is_a_form(rows):
             expected = "readings below the header, one row per run, speed and sensor: none are filled in yet"
             problems.add(source, None, None, None, expected)

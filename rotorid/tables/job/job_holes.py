@@ -14,9 +14,9 @@ import numpy as np
 
 from balancing import Holes, Labels, Limits, from_list
 from rotorid.base.suggestions import did_you_mean
+from rotorid.files.settings_keys import Said
+from rotorid.files.weights_with_units import in_job_units, other_kind
 from rotorid.tables.job.job_keys import FORBIDDEN, HOLES, SAME_DEG
-from rotorid.tables.reader.settings_keys import Said
-from rotorid.tables.reader.weights_with_units import in_job_units, other_kind
 
 
 def read_holes(

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from rotorid.files import units, value_kinds
 from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,
@@ -17,10 +18,9 @@ from rotorid.files.conventions import (
     VIEWS,
     StatedErrors,
 )
-from rotorid.tables.reader import units, value_kinds
-from rotorid.tables.reader.settings_keys import Key, Kind
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
+from rotorid.files.settings_keys import Key, Kind
+from rotorid.files.toml_file import Section
+from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""

@@ -10,11 +10,11 @@ import numpy as np
 from balancing import Trials
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Said
 from rotorid.tables.job.job_model import Model
 from rotorid.tables.job.readings import Readings
-from rotorid.tables.reader import units
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
 
 
 @dataclass(frozen=True, eq=False)

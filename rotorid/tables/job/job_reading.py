@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from balancing import Labels
+from rotorid.files.columns import Source
 from rotorid.files.layout import files_of_runs
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import take
+from rotorid.files.toml_file import Section
 from rotorid.tables.job.assumed_conventions import with_assumed
 from rotorid.tables.job.check_runs import holes_taken, read_check
 from rotorid.tables.job.job_data import Job, Overrides
@@ -17,10 +21,6 @@ from rotorid.tables.job.job_model import read_model
 from rotorid.tables.job.job_planes import read_planes
 from rotorid.tables.job.job_waveforms import with_vectors
 from rotorid.tables.job.readings import read_readings
-from rotorid.tables.reader.columns import Source
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import take
-from rotorid.tables.reader.toml_file import Section
 
 
 def job_of(

@@ -8,6 +8,7 @@ from typing import cast
 
 from balancing import Influence, Labels, Trials
 from rotorid.base.text import listing
+from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import (
     ANGLES,
     ROTATIONS,
@@ -22,12 +23,11 @@ from rotorid.files.conventions import (
     resolve_angles,
 )
 from rotorid.files.layout import stated_phase
+from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
+from rotorid.files.settings_keys import Said
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.job_holes import hole_angles
-from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
 from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
 from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 

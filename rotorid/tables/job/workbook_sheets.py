@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from typing import Any
 
+from rotorid.files.decimal_numbers import parse_number
+from rotorid.files.grid import Cell, Shown, show
 from rotorid.tables.job.job_keys import FORBIDDEN
-from rotorid.tables.reader.decimal_numbers import parse_number
-from rotorid.tables.reader.grid import Cell, Shown, show
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""

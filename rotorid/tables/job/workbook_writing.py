@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from balancing import Influence
+from rotorid.files.excel_pages import Line, Page, book_bytes
+from rotorid.files.excel_workbook import is_workbook
+from rotorid.files.grid import Cell
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import read_bytes
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.job_data import Job
 from rotorid.tables.job.job_from_excel import RESULTS
-from rotorid.tables.reader.excel_pages import Line, Page, book_bytes
-from rotorid.tables.reader.excel_workbook import is_workbook
-from rotorid.tables.reader.grid import Cell
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.text_file import read_bytes
 from rotorid.tables.runs.influence_comments import PHASE_MEANING
 from rotorid.tables.runs.influence_table import influence_frame, labels_of
 

@@ -14,13 +14,13 @@ from fem import KINDS, Coefficient, Pair, Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find, names
 from rotorid.base.text import listing
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, Kind, take
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.units import one_of
-from rotorid.tables.reader.value_kinds import TEXT, choice, number, plain_number
+from rotorid.files import units
+from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, Kind, take
+from rotorid.files.toml_file import Section
+from rotorid.files.units import one_of
+from rotorid.files.value_kinds import TEXT, choice, number, plain_number
 
 SCALARS = {"stiffness": "stiffness_N_per_m", "damping": "damping_N_s_per_m"}
 ENTRIES = {

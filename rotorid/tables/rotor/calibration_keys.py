@@ -9,9 +9,9 @@ import numpy as np
 from fem import Calibration, Rotor
 from fem.parameters import expand
 from rotorid.base.text import counted
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, Said
-from rotorid.tables.reader.value_kinds import FLAG, TEXT, each, number, numbers
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, Said
+from rotorid.files.value_kinds import FLAG, TEXT, each, number, numbers
 
 PARAMETER = (
     Key("name", TEXT, "which of the rotor's numbers, such as `bearing[1].kxx.scale`", required="its name"),

@@ -11,11 +11,11 @@ from typing import Any
 from fem import KINDS, STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
 from fem.forces import FORCES
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader import units
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, take
-from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
+from rotorid.files import units
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, take
+from rotorid.files.toml_file import Section, read_toml
+from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
 from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, read_support
 from rotorid.tables.rotor.calibration_keys import CALIBRATION, read_calibration
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, read_force

@@ -18,17 +18,17 @@ from fem import label
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.grid import Grid
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
+from rotorid.files.problems import Problems
 from rotorid.files.runs import PHASE, SPEED
 from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
-from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.table_writing import table_bytes, write_bytes
-from rotorid.tables.reader.units import Unit, UnitError
+from rotorid.files.table_writing import table_bytes, write_bytes
+from rotorid.files.units import Unit, UnitError
 from rotorid.tables.runs.influence_comments import (
     PHASE_MEANING,
     check_notes,

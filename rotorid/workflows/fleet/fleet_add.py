@@ -83,7 +83,7 @@ class FleetAdded(Delivered):
     @property
     def answer(self) -> Answer:
         """The numbers, then each file that cannot be read."""
-        from rotorid.tables.reader.problems import printable
+        from rotorid.files.problems import printable
 
         new = f"{counted(self.jobs, 'job')} with {counted(self.vectors, 'vector')}"
         head = f"Added {new} to {self.store.folder}; {counted(self.known, 'job')} known already."
@@ -177,9 +177,9 @@ def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[JobRows | str
 
 
 def _read(found: FoundJob) -> JobRows | str:
+    from rotorid.files.input_file import each_file_once
     from rotorid.tables import read_job
     from rotorid.tables.fleet.job_search import reason_of
-    from rotorid.tables.reader.input_file import each_file_once
 
     try:
         with each_file_once(), warnings.catch_warnings(record=True) as caught:
@@ -194,9 +194,9 @@ def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) 
     from balancing import estimate_influence
     from rotorid.commands.after_check import pieces_mounted
     from rotorid.commands.coefficients import proposed
+    from rotorid.files.input_file import sha256
     from rotorid.tables.fleet.job_records import job_rows, kind_of
     from rotorid.tables.fleet.job_search import job_id
-    from rotorid.tables.reader.input_file import sha256
 
     influence, trials, check, labels = job.influence, job.trials, job.check, job.trials.labels
     before = mounted = None

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from scipy.io import wavfile
 
+from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
-from rotorid.tables.reader.problems import InputError
 from rotorid.workflows import BalanceOptions, VectorsOptions, balance, vectors
 
 SAMPLE = sample_data() / "waveforms"

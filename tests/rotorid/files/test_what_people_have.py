@@ -59,6 +59,7 @@ SAME_RUNS = {
     "vib": wide("Run,rpm,DE Vib (mm/s),DE Angle (deg),NDE Vib (mm/s),NDE Angle (deg)", "{},1485,{},{},{},{}"),
     "vectors": wide("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{} @ {}°,{} @ {}°"),
     "vectors without a sign of degrees": wide("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{}<{},{}<{}"),
+    "vectors with a word": wide("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{} at {}°,{} at {} deg"),
     "two rows": wide("Run,rpm,DE,,NDE,\n,,mm/s,deg,mm/s,deg", "{},1485,{},{},{},{}"),
     "two rows with words": wide(
         ",,DE,,NDE,\nRun,rpm,Amp (mm/s),Phase (deg),Amp (mm/s),Phase (deg)", "{},1485,{},{},{},{}"
@@ -73,6 +74,40 @@ SAME_RUNS = {
     .replace(",45\n", ",45,0.2\n"),
     "phase without a unit": ONE_UNIT.replace("DE deg", "DE Phase").replace("NNDE", "NDE"),
 }
+
+
+SIX = "{},1485,{},{},{},{}"
+SAME_RUNS |= {
+    f"headings {k}": wide(header, SIX)
+    for k, header in enumerate(
+        (
+            "RUN #,SPEED RPM,DE AMP (MM/S),DE PHASE (DEG),NDE AMP (MM/S),NDE PHASE (DEG)",
+            "Step,CPM,DE mm/sec,DE deg,NDE mm/sec,NDE deg",
+            "Test,n [1/min],DE_mm_s,DE_deg,NDE_mm_s,NDE_deg",
+            "Run,Speed rpm,DE Vib mm/s,DE Ph deg,NDE Vib mm/s,NDE Ph deg",
+            ",,DE,DE,NDE,NDE\nCondition,RPM,mm/s,deg,mm/s,deg",
+            "Run,RPM,DE,DE,NDE,NDE\n,,mm/s,deg,mm/s,deg",
+            ",,DE,,NDE,\nRun,RPM,Amplitude,Phase,Amplitude,Phase\n,,mm/s,deg,mm/s,deg",
+        )
+    )
+}
+SAME_RUNS |= {
+    "sign and unit behind": wide("Run,RPM,DE mm/s@deg,NDE (mm/s / deg)", "{},1485,{}@{},{}/{}"),
+    "L": wide("Run,RPM,DE,NDE", "{},1485,{} mm/s L{},{} mm/s L{}"),
+    "columns beside": wide(
+        "Date,Time,Run,Condition,RPM,DE overall,DE mm/s,DE deg,NDE mm/s,NDE deg",
+        "2026-01-02,10:11,{},hot,1485,9.9,{},{},{},{}",
+    ),
+}
+
+
+def test_amplitudes_and_phases_numbered_alike_are_one_sensor(tmp_path):
+    runs = wide("Run;n [1/min];A1 [µm];φ1 [°];A2 [µm];φ2 [°]", "{};1485;{};{};{};{}")
+    trials = trials_of(tmp_path, runs)
+    assert trials.sensors == ("1", "2")
+    assert_same(
+        trials, trials_of(tmp_path, PUMP.replace("mm_s", "um").replace("NDE", "2").replace("DE", "1"))
+    )
 
 
 def trials_of(folder, runs, weights=None, **options):
@@ -149,7 +184,10 @@ def test_velocity_in_mm_s_is_rms_and_says_so(tmp_path):
     assert trials.labels.vibration_unit == "mm_s_rms"
     assert [word for word in trials.warnings if "is read as mm/s rms" in word]
     plain = trials_of(tmp_path, ONE_UNIT)
-    assert (plain.labels.vibration_unit, plain.warnings) == ("mm_s", ())
+    assert plain.labels.vibration_unit == "mm_s"
+    assert [word for word in plain.warnings if "'DE mm/s' is read as mm/s peak" in word]
+    assert trials_of(tmp_path, PUMP).warnings == ()
+    assert trials_of(tmp_path, ONE_UNIT.replace("mm/s", "mm/s pk")).warnings == ()
     np.testing.assert_allclose(trials.readings, plain.readings * np.sqrt(2), rtol=1e-14)
 
 
@@ -244,6 +282,14 @@ SAME_WEIGHTS = {
     "blade": "run,plane,mass_g,Blade no.\ntrial P1,P1,10,3\ntrial P2,P2,10,7\n",
     "position": "run,plane,mass_g,Position\ntrial P1,P1,10,3\ntrial P2,P2,10,7\n",
     "hole in the angle": "run,plane,mass_g,angle\ntrial P1,P1,10,hole 3\ntrial P2,P2,10,#7\n",
+    "columns for each plane": "Run,P1 weight (g),P1 angle (deg),P2 weight (g),P2 angle (deg)\n"
+    "as found,,,,\ntrial P1,10,90,,\ntrial P2,,,10,270\n",
+    "units row and a title": "Pump 3\n\nTest,Plane,Amount,Location\n,,g,deg\n"
+    "trial P1,P1,10,90\ntrial P2,P2,10,270\n",
+    "grams and degrees": "Date,Trial run,Plane,Grams,Degrees\n2026-01-02,trial P1,P1,10,90\n"
+    "2026-01-03,trial P2,P2,10,270\n",
+    "a run without a weight": "run,plane,weight (gm),phase (deg)\nas found,,,\n"
+    "trial P1,P1,10,90\ntrial P2,P2,10,270\n",
     "removed on the other side": "run,plane,action,mass_g,angle_deg\n"
     "trial P1,P1,add,10,90\ntrial P2,P2,remove,10,90\n",
 }
@@ -325,6 +371,12 @@ def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
     job = job_of(tmp_path, settings, **files, pieces=PIECES)
     turn = np.exp(1j * np.radians([0, 135, 225]))
     np.testing.assert_allclose(job.check.weights[0], [0.003, 0.004 * turn[1] + 0.01 * turn[2]], rtol=1e-12)
+
+
+def test_a_wrong_cell_of_a_plane_names_its_column(tmp_path):
+    weights = SAME_WEIGHTS["columns for each plane"].replace(",10,270", ",10,400")
+    words = refused(trials_of, tmp_path, PUMP, weights)
+    assert "row 4, column P2 angle (deg): found '400', expected an angle from -360" in words
 
 
 QUESTIONS = {
@@ -482,6 +534,10 @@ def test_the_wrong_kind_of_file_is_one_message(name, cli):
     assert (outcome.code, outcome.out) == (2, "")
     assert words in outcome.err
     assert outcome.err.strip().count("\n") == lines - 1
+
+
+def test_a_header_that_was_taken_out_is_none(tmp_path):
+    assert "found '//run', expected a known column" in refused(trials_of, tmp_path, f"//{PUMP}")
 
 
 def test_a_column_list_stands_once(tmp_path):

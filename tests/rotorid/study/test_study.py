@@ -14,8 +14,8 @@ from studies.drawn import SCATTER, STUDY, write
 import fem
 from balancing import Trials, correct, refine
 from rotorid import read_rotor
+from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
-from rotorid.tables.reader.problems import InputError
 from rotorid.tables.study_file import read_study
 from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.workflows.studies import drawn_machine

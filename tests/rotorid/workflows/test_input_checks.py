@@ -10,9 +10,9 @@ import pytest
 
 import rotorid.workflows as workflows
 from rotorid.commands.input_checks import changed, checked, plain
+from rotorid.files.input_file import each_file_once
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.reader.input_file import each_file_once
 from rotorid.workflows import (
     BalanceOptions,
     CampbellOptions,

@@ -9,9 +9,9 @@ from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorid.tables.reader import units
-from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number, thousands_or_decimals
-from rotorid.tables.reader.problems import InputError, Problem, Problems
+from rotorid.files import units
+from rotorid.files.decimal_numbers import NotANumber, parse_number, thousands_or_decimals
+from rotorid.files.problems import InputError, Problem, Problems
 
 
 @pytest.mark.parametrize(

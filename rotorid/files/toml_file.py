@@ -12,10 +12,10 @@ from typing import Any
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.tables.reader.decimal_numbers import LARGEST
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.text_file import read_bytes
-from rotorid.tables.reader.units import Unit
+from rotorid.files.decimal_numbers import LARGEST
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import read_bytes
+from rotorid.files.units import Unit
 
 MOST_BYTES = 2_000_000
 _DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")

@@ -10,7 +10,7 @@ from typing import Any
 
 from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
-from rotorid.tables.reader.grid import BadCell, Cell, Shown, show
+from rotorid.files.grid import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
 MOST_ROWS = 1048576
@@ -55,6 +55,7 @@ def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  #
         book.properties.created = now().replace(tzinfo=None)
         book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
     book.properties.modified = now().replace(tzinfo=None)
+    keep_cells(book)
     for sheet in book.worksheets:
         sheet.sheet_view.tabSelected = False
     for page in pages:
@@ -63,6 +64,16 @@ def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  #
         sheet.sheet_view.tabSelected = page.title == shown
     book.active = book.sheetnames.index(shown)
     return workbook_bytes(book)
+
+
+def keep_cells(book: Any) -> None:  # noqa: ANN401
+    """Keep what openpyxl would change of a workbook that it has read: sizes of comments, the last digits."""
+    for sheet in book.worksheets:
+        for cell in (cell for row in sheet.iter_rows() for cell in row):
+            if cell.comment is not None:
+                sized(cell.comment)
+            if isinstance(cell.value, float):
+                put(cell, cell.value, sheet.title)
 
 
 def header_row(lines: Sequence[Line]) -> int:

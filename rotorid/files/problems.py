@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from rotorid.base.suggestions import suggest
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.tables.reader.input_file import STANDARD_INPUT
+from rotorid.files.input_file import STANDARD_INPUT
 
 __all__ = ["InputError", "Problem", "Problems", "TableWarning"]
 __all__ += ["printable", "quote", "suggest"]

@@ -6,13 +6,11 @@ import codecs
 import csv
 import re
 import warnings
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.grid import (
-    MOST_ABOVE,
+from rotorid.files.grid import (
     MOST_CELLS,
     CommentLine,
     Grid,
@@ -21,8 +19,8 @@ from rotorid.tables.reader.grid import (
     clean,
     make_grid,
 )
-from rotorid.tables.reader.input_file import file_content
-from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.files.input_file import file_content
+from rotorid.files.problems import Problems, TableWarning
 
 SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
 _BLANK = ';,\t" \xa0\ufeff\r\n'
@@ -153,21 +151,6 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
             below_header = below_header or any(cells)
         rows.append((number, cells))
     return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
-
-
-def text_from_header(text: str, is_header: Callable[[tuple[str, ...]], bool]) -> str:
-    """A text table; lines above one that is surely the header become comments."""
-    lines = re.split(r"(\r\n|\n|\r)", text, maxsplit=MOST_ABOVE)
-    above: list[int] = []
-    for at, line in enumerate(lines[: 2 * MOST_ABOVE]):
-        if not line.strip(_BLANK) or line.strip(_BLANK).casefold().startswith(("#", "sep=")):
-            continue
-        with suppress(csv.Error):
-            if is_header(_cells(line, _separator([line]))):
-                lines = [f"# {one}" if k in above else one for k, one in enumerate(lines)]
-                return "".join(lines) if above else text
-        above.append(at)
-    return text
 
 
 def cells_of_line(line: str) -> tuple[tuple[str, ...], str]:

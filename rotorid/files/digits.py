@@ -9,7 +9,7 @@ from decimal import Decimal
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.tables.reader.grid import Cell, Shown, show
+from rotorid.files.grid import Cell, Shown, show
 
 _SURE = 15
 """A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""
@@ -37,16 +37,17 @@ def written_steps(cells: Sequence[Cell]) -> FloatArray:
     ndarray
         Shape (rows,), 10 to the power of minus the decimals.
     """
-    found = np.array([_digits(cell) for cell in cells], dtype=np.int64).reshape(-1, 3)
+    texts = [(cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells]
+    digits = {text: _digits(text) for text in set(texts)}  # a long column says most of its numbers again
+    found = np.array([digits[text] for text in texts], dtype=np.int64).reshape(-1, 3)
     decimals, significant, first = found.T
     most = decimals.max(initial=-99)
     fixed = np.minimum(most, significant.max(initial=0) - 1 - first)
     return np.asarray(10.0 ** -np.where(significant > 0, np.maximum(decimals, fixed), most))
 
 
-def _digits(cell: Cell) -> tuple[int, int, int]:
+def _digits(text: str) -> tuple[int, int, int]:
     """Decimals, significant digits (none of 0), and at which power of ten the first one stands."""
-    text = (cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".")
     if float(text) == 0:  # also 1e-999
         return max(0, -int(Decimal(re.sub("[eE].*", "", text)).as_tuple().exponent)), 0, 0
     number = Decimal(text)

@@ -36,14 +36,15 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("title", [["My rotor"], ["Rotor 7, trial of June", "", "", "7"]])
 def test_a_title_above_the_header_is_named(tmp_path, files, title):
+    """Runs and weights are found under a title; any other table begins with its header."""
     path = write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": [title, *WEIGHTS]})
-    words = "the header in the first row, and it seems to be row 2"
-    [problem] = complaints(read_job, path)
-    assert words in problem.expected
+    assert read_job(path).planes == read_trials(*files).planes
     text = tmp_path / "titled.csv"
     text.write_text("My rotor\n\n" + csv_text(WEIGHTS), encoding="utf-8")
-    [problem] = complaints(read_trials, files[0], text)
-    assert "it seems to be row 3" in problem.expected
+    assert read_trials(files[0], text).planes == read_trials(*files).planes
+    rotor = write_book(tmp_path / "rotor.xlsx", {"rotor": [title, ["length_m", "diameter_m"], [1, 0.1]]})
+    [problem] = complaints(read_rotor, rotor)
+    assert "the header in the first row, and it seems to be row 2" in problem.expected
 
 
 def test_different_values_and_scattered_rows():

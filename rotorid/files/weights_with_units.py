@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rotorid.tables.reader import units
-from rotorid.tables.reader.settings_keys import Quantity
+from rotorid.files import units
+from rotorid.files.settings_keys import Quantity
 
 
 def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[float, ...] | None:

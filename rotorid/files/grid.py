@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rotorid.base.text import counted
-from rotorid.tables.reader.problems import Problems
+from rotorid.files.problems import Problems
 
 LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
@@ -181,14 +181,6 @@ def make_grid(
     _complain_about_nameless(source, header_row, header, body, problems)
     top = tuple(filled[:LOOKED_AT])
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete, top)
-
-
-def from_header(rows: list[Row], is_header: Callable[[Sequence[str]], bool]) -> list[Row]:
-    """Rows of a sheet; those above one that is surely the header become comments."""
-    for above, (_, cells) in enumerate(rows[:MOST_ABOVE]):
-        if is_header([show(cell) for cell in cells]):
-            return [(n, (f"# {_comment(row, '')}",)) for n, row in rows[:above]] + rows[above:]
-    return rows
 
 
 def _comment(cells: tuple[Cell, ...], separator: str) -> str:

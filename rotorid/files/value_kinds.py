@@ -12,9 +12,9 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.decimal_numbers import NotANumber, check_size, has_decimal_comma, parse_number
-from rotorid.tables.reader.settings_keys import Key, Kind, object_schema, take
-from rotorid.tables.reader.toml_file import Section
+from rotorid.files.decimal_numbers import NotANumber, check_size, has_decimal_comma, parse_number
+from rotorid.files.settings_keys import Key, Kind, object_schema, take
+from rotorid.files.toml_file import Section
 
 _DAY = re.compile(r"\d{4}-\d\d-\d\d")
 _TEXT = {"type": "string"}

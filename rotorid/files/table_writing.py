@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from rotorid.base import logs
 from rotorid.base.tables import Value, csv_bytes, one_line
-from rotorid.tables.reader.excel_pages import Page, book_bytes
-from rotorid.tables.reader.problems import InputError, Problem
+from rotorid.files.excel_pages import Page, book_bytes
+from rotorid.files.problems import InputError, Problem
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import SupportsIndex
@@ -14,19 +14,19 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
-from rotorid.tables.reader.decimal_numbers import (
+from rotorid.files.decimal_numbers import (
     NotANumber,
     check_size,
     decimal_comma,
     parse_number,
     thousands_or_decimals,
 )
-from rotorid.tables.reader.digits import written_steps
-from rotorid.tables.reader.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, from_header, is_spreadsheet_error, make_grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.text_file import decode, parse_text, read_bytes, text_from_header
-from rotorid.tables.reader.units import Unit, UnitError, UnitReader
+from rotorid.files.digits import written_steps
+from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
+from rotorid.files.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import decode, parse_text, read_bytes
+from rotorid.files.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
 KINDS = {
@@ -254,9 +254,8 @@ def read_grid(
     *,
     first: bool = False,
     may_be_empty: bool = False,
-    is_header: Callable[[Sequence[str]], bool] | None = None,
 ) -> Grid | None:
-    """The cells of a text file or of a sheet; with `is_header` whatever stands above it is a comment."""
+    """The cells of a text file or of a sheet."""
     if isinstance(source, Grid):
         return source
     path = Path(source_name(source))
@@ -266,12 +265,9 @@ def read_grid(
         if chosen is None:
             return None
         title, rows = chosen
-        rows = rows if is_header is None else from_header(rows, is_header)
         return make_grid(sheet_source(path, title), rows, "", problems, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
-    if text is not None and is_header is not None:
-        text = text_from_header(text, is_header)
     return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
 
 
@@ -422,7 +418,7 @@ def _has_columns(
     if (len(missing) > 1 and unknown) or len(unknown) > max(2, len(known)):
         seems = _seems(grid) or "; remarks go into 'note'"
         expected = f"a table with the columns {_known(columns)}; its columns are {present}{seems}"
-        problems.add(grid.source, grid.header_row, None, None, expected)
+        problems.add(grid.source, grid.header_row, unknown[0], None, expected)
         return False
     if unknown:
         one = unknown[0] if len(unknown) == 1 else None

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from cases import each_of
 
-from rotorid.tables.reader import units, value_kinds
-from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.settings_keys import Key, Quantity, file_schema, object_schema, take
-from rotorid.tables.reader.toml_file import Section
+from rotorid.files import units, value_kinds
+from rotorid.files.problems import InputError, Problems
+from rotorid.files.settings_keys import Key, Quantity, file_schema, object_schema, take
+from rotorid.files.toml_file import Section
 
 WEIGHT = {**units.MASS, **units.UNBALANCE}
 INNER = (

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.units import Unit, UnitError, UnitReader
+from rotorid.files.toml_file import Section
+from rotorid.files.units import Unit, UnitError, UnitReader
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _MARKED = str.maketrans("", "", "`")
