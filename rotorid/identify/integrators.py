@@ -61,6 +61,8 @@ class System:
 
     def inputs(self, time: float) -> FloatArray:
         """Inputs at a time, (n_u,)."""
+        if not self.u.size:
+            return np.zeros(0)
         return np.array([np.interp(time, self.t, column) for column in self.u.T])
 
     def __call__(self, time: float, z: FloatArray) -> FloatArray:
