@@ -8,36 +8,36 @@ import typer
 
 from rotorid.base.answer import COLUMNS
 from rotorid.cli.choices import Command
-from rotorid.cli.commands import (
-    balance,
-    calibrate,
-    demo,
-    fit,
-    reduce,
-    schema,
-)
-from rotorid.cli.fleet import fleet
-from rotorid.cli.study import study
+from rotorid.cli.commands import calibrate, fit
+from rotorid.cli.demo import demo
+from rotorid.cli.schema import schema
 from rotorid.cli.worksheet import worksheet
 from rotorid.commands import (
+    balance,
     bearings,
     campbell,
     critical,
+    fleet_add,
+    fleet_fit,
+    fleet_show,
     identify,
     influence,
     modes,
     motion,
     periodic,
+    reduce,
     response,
     runup,
     simulate,
     split,
+    study,
     tolerance,
     trial_weight,
     unbalance,
     vectors,
 )
 from rotorid.commands.app import run, typer_command, written_help
+from rotorid.commands.outcome import Delivered
 from rotorid.commands.terminal import markup_mode
 from rotorid.commands.verbose import verbosely
 
@@ -49,9 +49,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+fleet = typer.Typer(
+    no_args_is_help=True, help="Jobs of many machines as tables, and coefficients of their type."
+)
+_FLEET: dict[str, Callable[..., Delivered]] = {"add": fleet_add, "show": fleet_show, "fit": fleet_fit}
+for _name, _work in _FLEET.items():
+    fleet.command(_name, cls=Command)(verbosely(typer_command(_work)))
 _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Balance rotors": {
-        "balance": balance.balance,
+        "balance": typer_command(balance),
         "worksheet": worksheet,
         "vectors": typer_command(vectors),
         "trial-weight": typer_command(trial_weight),
@@ -65,10 +71,10 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "campbell": typer_command(campbell),
         "response": typer_command(response),
         "influence": typer_command(influence),
-        "study": study,
+        "study": typer_command(study),
     },
     "Reduce rotors, let them move": {
-        "reduce": reduce.reduce,
+        "reduce": typer_command(reduce),
         "bearings": typer_command(bearings),
         "motion": typer_command(motion),
         "periodic": typer_command(periodic),
@@ -81,7 +87,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "runup": typer_command(runup),
         "calibrate": calibrate.calibrate,
     },
-    "Samples, and checks": {"demo": demo.demo, "schema": schema.schema},
+    "Samples, and checks": {"demo": demo, "schema": schema},
 }
 for _job, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():

@@ -5,19 +5,28 @@
 
 from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.commands.bearings import BearingEquilibria, BearingsOptions, bearings
+from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
+from rotorid.commands.demo import Demo, DemoOptions, demo
 from rotorid.commands.fit import FitOptions, RecordFit, fit
-from rotorid.commands.identify import IdentifyOptions, identify
+from rotorid.commands.fleet_add import FleetAdded, FleetAddOptions, fleet_add
+from rotorid.commands.fleet_fit import FleetFitOptions, TypeFound, fleet_fit
+from rotorid.commands.fleet_show import FleetShown, FleetShowOptions, fleet_show
+from rotorid.commands.identify import Coefficients, IdentifyOptions, identify
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.modes import ModesOptions, modes
 from rotorid.commands.motion import Motion, MotionOptions, motion
-from rotorid.commands.outcome import Outcome
+from rotorid.commands.outcome import Delivered, Outcome
 from rotorid.commands.periodic import PeriodicMotions, PeriodicOptions, periodic
+from rotorid.commands.reduce import ReduceOptions, reduce
+from rotorid.commands.reduce_result import ReducedRotor
 from rotorid.commands.response import ResponseOptions, response
 from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.commands.split import SplitOptions, split
+from rotorid.commands.study import StudyOptions, study
+from rotorid.commands.study_result import StudiedMachines, StudiedStarts
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
@@ -28,9 +37,20 @@ __all__ = [
     "BalanceOptions",
     "BearingEquilibria",
     "BearingsOptions",
+    "CalibrateOptions",
+    "Calibrated",
     "CampbellOptions",
+    "Coefficients",
     "CriticalOptions",
+    "Delivered",
+    "Demo",
+    "DemoOptions",
     "FitOptions",
+    "FleetAddOptions",
+    "FleetAdded",
+    "FleetFitOptions",
+    "FleetShowOptions",
+    "FleetShown",
     "IdentifyOptions",
     "InfluenceOptions",
     "ModesOptions",
@@ -40,29 +60,42 @@ __all__ = [
     "PeriodicMotions",
     "PeriodicOptions",
     "RecordFit",
+    "ReduceOptions",
+    "ReducedRotor",
     "ResponseOptions",
     "RunUpOptions",
     "SimulateOptions",
     "SplitOptions",
+    "StudiedMachines",
+    "StudiedStarts",
+    "StudyOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
     "TrialWeights",
+    "TypeFound",
     "UnbalanceOptions",
     "VectorsOptions",
     "balance",
     "bearings",
+    "calibrate",
     "campbell",
     "critical",
+    "demo",
     "fit",
+    "fleet_add",
+    "fleet_fit",
+    "fleet_show",
     "identify",
     "influence",
     "modes",
     "motion",
     "periodic",
+    "reduce",
     "response",
     "runup",
     "simulate",
     "split",
+    "study",
     "tolerance",
     "trial_weight",
     "unbalance",

@@ -271,38 +271,54 @@ def command(
 
 
 def typer_command(work: Callable[..., Delivered]) -> Command:
-    """The command of a function: its first parameter and what may be left out are arguments.
+    """The command of a function: its first parameter, lists of files and what may be left out are arguments.
 
-    Others before `options` are required options.
+    Others before `options` are required options; those after it are Python's alone. A class of options may
+    have `writes`: names of those that take a file, and how its name may end, which the outcome's
+    `further_file` makes; and `before(*arguments)`, which may refuse what is typed, or do all that is asked.
     """
     kind = options_of(work)
     about = _documentation(work)
-    given = {name: one for name, one in inspect.signature(work).parameters.items() if name != "options"}
+    every = list(inspect.signature(work).parameters.items())
+    given = dict(every[: [name for name, _ in every].index("options")])
+    further: Mapping[str, Sequence[str]] = getattr(kind, "writes", {})
 
     def deliver(options: Any, to: Destination, **values: Any) -> None:  # noqa: ANN401 - of that kind
         what = work.__name__.replace("_", " ")
+        arguments = [values[name] for name in given]
+        if hasattr(options, "before") and (answer := options.before(*arguments)):
+            typer.echo(answer)
+            return
         to.deliver(
             what,
-            lambda: work(*(values[name] for name in given), options),
+            lambda: work(*arguments, options),
             endings=getattr(kind, "outputs", TABLES),
+            more=[(getattr(options, name), ends, _further(options, name)) for name, ends in further.items()],
         )
 
     hints: dict[str, Any] = {}
     parameters = []
     for name, one in given.items():
         told: dict[str, Any] = {"metavar": about[name].metavar, "help": about[name].text}
-        first = not hints or one.default is not one.empty
+        files = str(one.annotation).startswith(("Sequence[Path", "JobGiven"))
+        first = files or not hints or one.default is not one.empty
         declared = typer.Argument(**told) if first else typer.Option(f"--{name}", **told)
         taken: Any = Path if "Path" in str(one.annotation) and first else str
-        taken = list[Path] if str(one.annotation).startswith("Sequence[Path") else taken
+        taken = list[Path] if files else taken
         hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
-        parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
+        default = None if one.default == () else one.default
+        parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default))
     parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]
     deliver.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     deliver.__annotations__ = hints
     made = command(kind, panels=getattr(kind, "panels", {}), to=getattr(kind, "to", WITH_REPORT))(deliver)
     made.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
     return made
+
+
+def _further(options: Any, name: str) -> Callable[[Delivered], bytes | Mapping[Path, bytes]]:  # noqa: ANN401
+    """What makes a further file."""
+    return lambda result: result.further_file(name, Path(getattr(options, name)))
 
 
 def _in_panels(

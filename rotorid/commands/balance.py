@@ -166,6 +166,10 @@ class Balance(Parts):
             self.to_dict(), self.parts, self.influence, self.job, self.provenance, self.answer.judgement
         )
 
+    def further_file(self, option: str, path: Path) -> bytes:
+        """The coefficients, .csv or .xlsx."""
+        return self.influence_table(path)
+
     def influence_table(self, path: Path | str) -> bytes:
         """The coefficients for a file at this path, .csv or .xlsx."""
         from rotorid.tables.runs.influence_table import influence_bytes
@@ -179,14 +183,27 @@ def _behind(answer: Answer) -> Answer:
 
 
 @command
-def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
-    """Correction weights that minimise the vibration, with predicted residuals and uncertainty.
+def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balance:
+    """Correction weights from trial runs or a rotor model, with ± and what will be left.
+
+    Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
+
+    Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
+
+    Example: rotorid balance sample_data/turbo_job/runs.csv sample_data/turbo_job/weights.csv --phase lead
+
+    Example: rotorid balance --template job.xlsx
+
+    Den Hartog's method: influence coefficients at several speeds, least squares over all of them.
+
+    The workbook, filled in, is a job: --output sheet.xlsx writes it with its results, and --output
+    weights.csv the corrections alone. From Python a job that has been read may be given, too: what it would
+    be under other conventions cannot be told then.
 
     Parameters
     ----------
-    job
-        A job file (`.toml`, `.xlsx`), or a runs table with a weights table or stored coefficients; or a job
-        that has been read already: what it would be under other conventions cannot be told then.
+    job : JOB | RUNS WEIGHTS | RUNS
+        Job (.toml, .xlsx); or runs and weights tables; or a runs table with --influence.
     options
         Those that differ from the defaults.
 

@@ -84,6 +84,10 @@ class BalanceOptions:
         For --positions, 0mm,700mm.
     centre : POSITION
         For --positions: of the centre of mass.
+    save_influence : FILE
+        Write the coefficients, .csv or .xlsx.
+    template : FILE.xlsx
+        Write an empty workbook to fill in.
     """
 
     method: str | None = None
@@ -111,6 +115,8 @@ class BalanceOptions:
     positions: Positions | None = None
     bearings: str | tuple[float, float] | None = None
     centre: Amount | None = None
+    save_influence: Path | None = None
+    template: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input and conventions": "phase angles amplitude_error phase_error run_error waveforms",
         "Method": "method planes speeds best_planes coefficients",
@@ -123,6 +129,38 @@ class BalanceOptions:
         "Expert": "influence model_error ridge",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
+    writes: ClassVar[Mapping[str, Sequence[str]]] = {"save_influence": (".csv", ".xlsx")}
+
+    def before(self, job: Sequence[Path] | None) -> str | None:
+        """Write the empty workbook where it is asked for, and say so.
+
+        Raises
+        ------
+        ValueError
+            Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
+        """
+        from rotorid.commands.app import check_targets
+        from rotorid.tables.job.workbook_template import template_bytes
+        from rotorid.tables.reader.table_writing import write_bytes
+
+        if self.template is None:
+            if not job:
+                raise ValueError(
+                    "give a job (.toml, .xlsx) or a runs table and a weights table; --template writes a form"
+                )
+            return None
+        path = self.template
+        if job:
+            raise ValueError(
+                "--template writes an empty workbook: leave the job away, or use --output for its own"
+            )
+        check_targets([(path, (".xlsx",))])
+        if path.exists():
+            raise ValueError(
+                f"{path}: exists already, and may be filled in; choose another name or delete it"
+            )
+        write_bytes(path, template_bytes())
+        return f"written: {path}\nFill it in (its sheet notes says how), then: rotorid balance {path}"
 
 
 def check_options(options: BalanceOptions) -> None:

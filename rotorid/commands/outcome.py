@@ -61,6 +61,10 @@ class Delivered(Answered):
 
         return table_bytes(path, self.to_frame())
 
+    def further_file(self, option: str, path: Path) -> bytes | Mapping[Path, bytes]:
+        """What another option that takes a file writes: `writes` of the options."""
+        raise ValueError(f"{type(self).__name__} has no file for {option}")
+
     @property
     def equations(self) -> Equations:
         """What was solved, in symbols and in numbers."""

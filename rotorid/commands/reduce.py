@@ -6,12 +6,12 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rotorid.base.logs import workflows as log
 from rotorid.base.text import counted
 from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import command, provenance
+from rotorid.commands.outcome import EQUATIONS, WITH_REPORT, command, provenance
 from rotorid.commands.quantities import (
     Band,
     Nodes,
@@ -52,9 +52,9 @@ class ReduceOptions:
     place
         Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
         (extrema of the first two modes).
-    masses : N
+    masses : N from 1
         How many masses are placed or ranked; default: 3.
-    modes : N
+    modes : N from 1
         How many modes the regression uses; default: 2.
     normalise
         Shapes scaled to 1 at the first mass (the book), at their largest, or in length.
@@ -97,6 +97,11 @@ class ReduceOptions:
     keep_supports
         For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
         all supports and forces stay in the model, at nodes of their own.
+    model : FILE.toml
+        Write the small model for `rotorid motion`, `periodic`, `bearings`, and for `fit`, `identify` and
+        `simulate`, a damper to be estimated at each mass.
+    state_space : FILE
+        Write A, B, C, D in both planes: .json, .npz or .mat.
     """
 
     nodes: Nodes | None = None
@@ -122,19 +127,51 @@ class ReduceOptions:
     both_planes: bool = False
     force: Nodes | None = None
     keep_supports: bool = False
+    model: Path | None = None
+    state_space: Path | None = None
+    panels: ClassVar[Mapping[str, str]] = {
+        "Input": "nodes modes speed measured compliance seals",
+        "Method": "rank place masses candidates methods",
+        "Errors": "errors what_if",
+        "Small model": "response stability model state_space damping force both_planes keep_supports",
+        "Expert": "normalise rows nonnegative supports_apart",
+    }
+    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
+    writes: ClassVar[Mapping[str, Sequence[str]]] = {
+        "model": (".toml",),
+        "state_space": (".json", ".npz", ".mat"),
+    }
+
+    def before(self, rotor: Path | None) -> None:
+        """Refuse what would be in no file."""
+        used = {
+            "--damping": (self.damping, self.model or self.state_space, "--model or --state-space"),
+            "--both-planes": (self.both_planes, self.model, "--model"),
+            "--force": (self.force, self.model, "--model"),
+        }
+        for option, (given, of_use, needed) in used.items():
+            if given and not of_use:
+                raise ValueError(f"{option} does nothing without {needed}")
+        if self.keep_supports and self.state_space:
+            raise ValueError("--state-space writes the rotor on its supports: leave out --keep-supports")
 
 
 @command
 def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> ReducedRotor:
-    """Find equivalent masses at chosen nodes (formula 50), how good they are, and the small model.
+    """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
-    small model.
+    small model (--response, --stability, --model, --state-space). With --keep-supports bearings, films and
+    other forces stay apart from the masses, for motion.
+
+    Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
+
+    Example: rotorid reduce sample_data/rotor23.csv --rank --plot map.png
 
     Parameters
     ----------
-    rotor
-        A rotor, a rotor table or a rotor file; None: compliance and modes are given by tables.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml); not needed with --compliance.
     options
         Those that differ from the defaults.
 
@@ -154,6 +191,9 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
         reduced = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
     else:
         reduced = _of_rotor(rotor, options, how)
+        if options.model or options.state_space:
+            name = Path(rotor).name if isinstance(rotor, Path | str) else ""
+            reduced = dataclasses.replace(reduced.with_small(), name=name)
     solved = reduced.result.masses
     log.info("rank = %s", solved.rank)
     log.info("degrees_of_freedom = %s", solved.dof)

@@ -49,8 +49,8 @@ class ReducedRotor(Parts):
         Whether its masses are those of the shaft on rigid supports.
     damping
         Its modal damping ratios.
-    speed, both_planes, forces
-        Of the files of the small model: rad/s, whether both planes are written, nodes of forces.
+    speed, both_planes, forces, name
+        Of the files of the small model: rad/s, whether both planes are written, nodes of forces, the rotor's.
     """
 
     result: Reduction
@@ -65,6 +65,7 @@ class ReducedRotor(Parts):
     speed: float = 0.0
     both_planes: bool = False
     forces: Sequence[int | str] = ()
+    name: str = ""
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -192,6 +193,12 @@ class ReducedRotor(Parts):
             "v_x7 is the velocity of x7; forces of time in [equations.force]; measured ones: --force NODES.",
         ]
         return small_model_files(path, small, comments, {k: v for k, v in equations.items() if v})
+
+    def further_file(self, option: str, path: Path) -> bytes | Mapping[Path, bytes]:
+        """The small model, or its state space."""
+        if option == "state_space":
+            return self.state_space_bytes(path.suffix.lower())
+        return self.model_files(path, self.name)
 
     def state_space_bytes(self, ending: str = ".json") -> bytes:
         """A, B, C, D in both planes at the speed, as a file that ends in .json, .npz or .mat."""

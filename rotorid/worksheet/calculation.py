@@ -73,7 +73,7 @@ def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]
 def _balance(job: str, version: int, kind: str) -> Balance:
     """The job as it is now, balanced; once for each version of its files."""
     from rotorid.base.answer import kinds
-    from rotorid.workflows import BalanceOptions, balance
+    from rotorid.commands import BalanceOptions, balance
 
     if kind not in _kept or _kept[kind][0] != version:
         options = BalanceOptions(**KINDS[kind.removesuffix(UNCHECKED)])
@@ -158,7 +158,7 @@ def whole(job: str, version: int, kind: str) -> str:
 
 def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, Any]:
     """A first trial weight, with the job's coefficients or from the load alone."""
-    from rotorid.workflows import TrialWeightOptions, trial_weight
+    from rotorid.commands import TrialWeightOptions, trial_weight
 
     found = told(made := trial_weight(None if job is None else Path(job), TrialWeightOptions(**options)))
     to_draw = all(one["angle_deg"] is not None for one in found["document"]["trial_weights"])

@@ -8,8 +8,8 @@ from repetitions import FULL
 from golden.cases import CASES
 from golden.running import run
 from rotorid.base.answer import COLUMNS, LINES
+from rotorid.commands import BalanceOptions, balance
 from rotorid.samples import sample_data
-from rotorid.workflows import BalanceOptions, balance
 
 FEW = (
     "turbo",

@@ -1,1 +1,1 @@
-"""One module a command, and what only one of them needs."""
+"""Commands whose modules others are rewriting."""

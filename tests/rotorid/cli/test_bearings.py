@@ -6,9 +6,9 @@ import pytest
 
 import fem
 from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm
+from rotorid.commands import BearingsOptions, bearings
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
-from rotorid.workflows import BearingsOptions, bearings
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 SPEEDS = ("--speeds", "1000:9000:1000rpm")

@@ -5,8 +5,8 @@ import shlex
 
 import pytest
 
+from rotorid.commands.demo_samples import SAMPLES
 from rotorid.samples import sample_data
-from rotorid.workflows.demo_samples import SAMPLES
 
 NUMBERS = {
     "main": ["1291.45", "134.203"],

@@ -9,10 +9,10 @@ import pytest
 
 import fem
 from fem import JournalBearing, MuszynskaSeal
+from rotorid.commands import MotionOptions, motion
 from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
-from rotorid.workflows import MotionOptions, motion
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 SHORT = ("--speed", "4000rpm", "--time", "0.3s")

@@ -5,9 +5,9 @@ import math
 import pytest
 from documents import same
 
+from rotorid.commands import Balance, BalanceOptions, balance
 from rotorid.samples import sample_data
 from rotorid.tables import job_from_files, read_job
-from rotorid.workflows import Balance, BalanceOptions, balance
 
 TURBO = sample_data() / "turbo_job"
 TABLES = [TURBO / "runs.csv", TURBO / "weights.csv"]

@@ -8,11 +8,11 @@ import pytest
 from run_ups import drawn, table
 
 from rotorid.base.rpm import RPM
+from rotorid.commands import RunUpOptions, runup
 from rotorid.samples import sample_data
 from rotorid.tables import read_modes, read_rotor
 from rotorid.tables.data.frequency_table import read_frequencies
 from rotorid.tables.runs.vectors_table import read_vectors
-from rotorid.workflows import RunUpOptions, runup
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy.io import wavfile
 
+from rotorid.commands import BalanceOptions, VectorsOptions, balance, vectors
 from rotorid.samples import sample_data
 from rotorid.tables.reader.problems import InputError
-from rotorid.workflows import BalanceOptions, VectorsOptions, balance, vectors
 
 SAMPLE = sample_data() / "waveforms"
 RATE = 2048

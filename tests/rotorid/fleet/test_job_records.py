@@ -10,10 +10,10 @@ import pytest
 from cases import each_of
 
 from balancing import estimate_influence
+from rotorid.commands.fleet_add import FleetAddOptions, fleet_add
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
-from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 FLEET = sample_data() / "fleet"

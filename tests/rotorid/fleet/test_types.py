@@ -7,13 +7,13 @@ import pandas as pd
 import pytest
 
 from balancing import UndeterminedError
+from rotorid.commands import balance
 from rotorid.commands.balance import BalanceOptions
+from rotorid.commands.fleet_add import FleetAddOptions, fleet_add
+from rotorid.commands.fleet_fit import FleetFitOptions, fleet_fit
 from rotorid.commands.type_coefficients import type_coefficients
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.workflows import balance
-from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
-from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")

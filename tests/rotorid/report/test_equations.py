@@ -9,6 +9,7 @@ import pytest
 import sympy
 from matplotlib.mathtext import MathTextParser
 
+from rotorid.commands import BalanceOptions, balance
 from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.reduce import ReduceOptions, reduce
@@ -22,7 +23,6 @@ from rotorid.identify.simulation import simulate
 from rotorid.report.equations import BEHIND, Equations, Row
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_job
-from rotorid.workflows import BalanceOptions, balance
 
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
 ROTOR = sample_data() / "rotor23.csv"

@@ -14,13 +14,13 @@ from studies.drawn import SCATTER, STUDY, write
 import fem
 from balancing import Trials, correct, refine
 from rotorid import read_rotor
+from rotorid.commands import CalibrateOptions, StudyOptions, calibrate, study
 from rotorid.samples import sample_data
+from rotorid.study import drawn_machine
+from rotorid.study.drawn_machine import UNSTABLE
+from rotorid.study.machine_counts import EDGES, UNDETERMINED
 from rotorid.tables.reader.problems import InputError
 from rotorid.tables.study_file import read_study
-from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
-from rotorid.workflows.studies import drawn_machine
-from rotorid.workflows.studies.drawn_machine import UNSTABLE
-from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
@@ -171,7 +171,7 @@ def test_starts_end_where_calibrate_does():
 
 
 def test_ends_of_searches_are_told_apart_by_their_numbers():
-    from rotorid.workflows.studies.calibration_starts import count_minima
+    from rotorid.study.calibration_starts import count_minima
 
     columns = {
         "converged": [True, True, True, False, True],
@@ -251,7 +251,7 @@ def test_a_number_that_is_called_as_another_column_is_refused(tmp_path, name):
 
 def test_the_command(cli, tmp_path, monkeypatch):
     file = write(tmp_path, TWO)
-    monkeypatch.setattr(sys.modules["rotorid.workflows.studies.study"], "MACHINES", 30)
+    monkeypatch.setattr(sys.modules["rotorid.commands.study"], "MACHINES", 30)
     outcome = cli("study", file, "--json", "--results", tmp_path / "kept", "--plot", tmp_path / "a.png")
     assert outcome.code == 0, outcome.err
     assert {"probability", "interval", "samples"} < set(outcome.json)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.plot_style import look, plain
-from rotorid.workflows.studies.machine_counts import EDGES
+from rotorid.study.machine_counts import EDGES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, figures
-from rotorid.commands.outcome import Delivered, command, provenance
+from rotorid.commands.outcome import USUAL, Delivered, command, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,11 +30,12 @@ class FleetFitOptions:
 
     Attributes
     ----------
-    machine_type : NAME
+    machine_type : --type NAME
         The type.
     """
 
     machine_type: str
+    to: ClassVar[Sequence[str]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -139,9 +141,23 @@ def _typical(along: FloatArray, across: FloatArray) -> str:
 
 @command
 def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
-    """Coefficients of a type: their mean, how machines and runs differ, and the machines that are odd.
+    """Coefficients of a type: mean, differences between machines, odd machines.
 
-    ValueError for a fleet or a type that are not there; UndeterminedError with fewer than three machines.
+    Example: rotorid fleet fit fans --type fan-132
+
+    With `balance --type FLEET:TYPE` a machine of the type is balanced from its baseline alone.
+
+    Parameters
+    ----------
+    fleet : FLEET
+        Folder of the tables of the fleet.
+    options
+        See there.
+
+    Raises
+    ------
+    ValueError
+        For a fleet or a type that are not there; UndeterminedError with fewer than three machines.
     """
     from rotorid.commands.type_records import known_type
     from rotorid.tables.fleet.fleet_store import FleetStore, trials_of

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.commands import PeriodicOptions, ResponseOptions, periodic, response
 from rotorid.samples import sample_data
-from rotorid.workflows import PeriodicOptions, ResponseOptions, periodic, response
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 RANGE = ("--speeds", "6200:6600rpm")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from rotorid.calibration import calibrate
 if TYPE_CHECKING:
     import pandas as pd
 
+    from fem import Rotor
     from rotorid.base.arrays import FloatArray
-    from rotorid.commands.calibrate import Prepared
+    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
 
 SPREAD = 0.3
 """Relative, of drawn starting values without a prior."""
@@ -22,7 +23,27 @@ SAME = 1e-3
 """Relative: ends of searches whose numbers and χ² (besides 0.01) differ by less are one."""
 
 
-def draw_start(given: Prepared, rng: np.random.Generator) -> dict[str, Any]:
+class Problem(Protocol):
+    """What is calibrated, as `commands.calibrate.prepared` reads it."""
+
+    @property
+    def rotor(self) -> Rotor:
+        """As it is believed to be."""
+
+    @property
+    def numbers(self) -> Sequence[Unknown]:
+        """What is unknown of it."""
+
+    @property
+    def readings(self) -> Sequence[RunReadings]:
+        """Of its runs."""
+
+    @property
+    def frequencies(self) -> Sequence[MeasuredFrequencies]:
+        """Measured beside them."""
+
+
+def draw_start(given: Problem, rng: np.random.Generator) -> dict[str, Any]:
     """χ² of data and priors where the search from one drawn start ends, and the numbers there."""
     begun = []
     for unknown in given.numbers:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.workflows.studies.drawn_machine import UNSTABLE
+from rotorid.study.drawn_machine import UNSTABLE
 
 if TYPE_CHECKING:
     import pandas as pd

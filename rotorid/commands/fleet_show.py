@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
@@ -26,11 +27,12 @@ class FleetShowOptions:
 
     Attributes
     ----------
-    machine_type : NAME
+    machine_type : --type NAME
         Only machines of this type.
     """
 
     machine_type: str | None = None
+    to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,12 +106,14 @@ class FleetShown(Delivered):
 
 @command
 def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> FleetShown:
-    """Tell what a store holds.
+    """Machines, jobs and outcomes of each type.
+
+    Example: rotorid fleet show fans
 
     Parameters
     ----------
-    fleet
-        Its folder.
+    fleet : FLEET
+        Folder of the tables of the fleet.
     options
         See there.
 

@@ -5,22 +5,22 @@ from __future__ import annotations
 import json
 import sqlite3
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.commands.input_checks import file_of
-from rotorid.commands.outcome import command, hash_of, phase, provenance
-from rotorid.workflows.studies.study_result import StudiedMachines, StudiedStarts
+from rotorid.commands.outcome import USUAL, command, hash_of, phase, provenance
+from rotorid.commands.study_result import StudiedMachines, StudiedStarts
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from rotorid.study.chunks import Task
     from rotorid.tables.study_file import StudyFile
-    from rotorid.workflows.studies.chunks import Task
 
 MACHINES, STARTS = 250, 8
 """Samples in a file: some seconds of work."""
@@ -34,11 +34,11 @@ class StudyOptions:
 
     Attributes
     ----------
-    samples : N
+    samples : N from 1
         How many, in place of what the file says; a finished study is continued with more.
-    seed : N
+    seed : N from 0
         In place of what the file says.
-    workers : N
+    workers : N from 1
         Processes on this machine.
     results : FOLDER
         For the samples, as Parquet; a study that was broken off there is continued.
@@ -48,18 +48,25 @@ class StudyOptions:
     seed: int | None = None
     workers: int = 1
     results: Path | str | None = None
+    panels: ClassVar[Mapping[str, str]] = {"Work": "workers results"}
+    to: ClassVar[Sequence[str]] = USUAL
 
 
 @command
 def study(
     file: Path | str, options: StudyOptions | None = None, executor: Executor | None = None
 ) -> StudiedMachines | StudiedStarts:
-    """Draw samples, each by its number, and count what becomes of them.
+    """Chance that a machine meets its limit, as built and balanced, by simulation.
+
+    A study that was broken off is continued by the same command with --results; the samples do not
+    depend on the workers. In Python it runs on any executor, such as that of a Dask cluster.
+
+    Example: rotorid study sample_data/study/study.toml --samples 50
 
     Parameters
     ----------
-    file
-        A study file.
+    file : STUDY
+        Study file (.toml).
     options
         How many samples, where they are kept.
     executor
@@ -75,8 +82,8 @@ def study(
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise ValueError("a study needs pyarrow: pip install pyarrow") from error
+    from rotorid.study.chunks import read_parts, run_study
     from rotorid.tables.study_file import read_study
-    from rotorid.workflows.studies.chunks import read_parts, run_study
 
     options = options or StudyOptions()
     path = file_of(file, "a study")
@@ -95,21 +102,21 @@ def study(
         parts = read_parts(task, samples, folder)
         common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words, "provenance": told}
         if read.machine is not None:
-            from rotorid.workflows.studies.machine_counts import count_machines
+            from rotorid.study.machine_counts import count_machines
 
             planes, most = len(read.machine.planes), read.machine.corrections
             return StudiedMachines(**common, **count_machines(parts, planes, most))
-        from rotorid.workflows.studies.calibration_starts import count_minima
+        from rotorid.study.calibration_starts import count_minima
 
         return StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
 
 
 def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], tuple[str, ...]]:
     """What the workers get, all files that were read, and what is to be known of them."""
-    from rotorid.workflows.studies.chunks import Task
+    from rotorid.study.chunks import Task
 
     if read.machine is not None:
-        from rotorid.workflows.studies.drawn_machine import draw_machine, nominal
+        from rotorid.study.drawn_machine import draw_machine, nominal
 
         ratios = {f"ratio_{k}": "double" for k in range(read.machine.corrections + 1)}
         columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
@@ -117,7 +124,7 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
         machine = read.machine, coefficients
         return Task(draw_machine, machine, seed, columns, MACHINES), [*read.files], words
     from rotorid.commands.calibrate import CalibrateOptions, prepared
-    from rotorid.workflows.studies.calibration_starts import draw_start
+    from rotorid.study.calibration_starts import draw_start
 
     said = dict(read.calibrate)
     data = [folder / name for name in said.pop("data")]

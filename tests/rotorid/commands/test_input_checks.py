@@ -8,12 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rotorid.workflows as workflows
-from rotorid.commands.input_checks import changed, checked, plain
-from rotorid.samples import sample_data
-from rotorid.tables import read_job
-from rotorid.tables.reader.input_file import each_file_once
-from rotorid.workflows import (
+import rotorid.commands as commands
+from rotorid.commands import (
     BalanceOptions,
     CampbellOptions,
     CriticalOptions,
@@ -40,13 +36,17 @@ from rotorid.workflows import (
     trial_weight,
     unbalance,
 )
+from rotorid.commands.input_checks import changed, checked, plain
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+from rotorid.tables.reader.input_file import each_file_once
 
 SAMPLES = sample_data()
 ROTOR = SAMPLES / "rotor23.csv"
 JOB = SAMPLES / "bk_two_plane" / "job.toml"
 MODEL = SAMPLES / "fit" / "run_down" / "model.toml"
 RECORD = SAMPLES / "fit" / "run_down" / "record.csv"
-KINDS = [getattr(workflows, name) for name in workflows.__all__ if name.endswith("Options")]
+KINDS = [getattr(commands, name) for name in commands.__all__ if name.endswith("Options")]
 NEEDED = {"speeds": (100.0,), "mass": 1.0, "speed": 1.0, "grade": 1.0, "stations": (6,), "planes": (7,)}
 
 

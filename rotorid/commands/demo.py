@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.suggestions import one_of
+from rotorid.commands.demo_samples import SAMPLES, Sample
 from rotorid.commands.input_checks import file_of
 from rotorid.commands.outcome import Delivered, command, provenance
-from rotorid.workflows.demo_samples import SAMPLES, Sample
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,7 +1,7 @@
-"""`rotorid.workflows.demo` from Python: files, commands and the documents of whoever runs them."""
+"""`rotorid.commands.demo` from Python: files, commands and the documents of whoever runs them."""
 
-from rotorid.workflows.demo import DemoOptions, demo, samples
-from rotorid.workflows.demo_samples import SAMPLES
+from rotorid.commands.demo import DemoOptions, demo, samples
+from rotorid.commands.demo_samples import SAMPLES
 
 
 def test_files_are_written_and_commands_told(tmp_path, cli):

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
+from rotorid.commands import SimulateOptions, simulate
 from rotorid.identify import AmplitudeErrors, harmonic_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_measurements, read_ode_model, read_record
-from rotorid.workflows import SimulateOptions, simulate
 
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
 TRUTH = {

@@ -109,7 +109,7 @@ class StudiedMachines(Delivered):
     def figure(self) -> Figure:
         """Which share of the machines lies below a ratio to the limit, as built and at last."""
         from rotorid.base.plot_style import on_figure
-        from rotorid.workflows.studies.study_pictures import draw_machines
+        from rotorid.study.study_pictures import draw_machines
 
         return on_figure(lambda ax: draw_machines(ax, self.ratios / self.samples))
 

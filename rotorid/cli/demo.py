@@ -11,9 +11,9 @@ import typer
 
 from rotorid.base.answer import LINES
 from rotorid.commands.app import Destination, command, json_text
-from rotorid.workflows.demo import DemoOptions, samples
-from rotorid.workflows.demo import demo as work
-from rotorid.workflows.demo_samples import SAMPLES
+from rotorid.commands.demo import DemoOptions, samples
+from rotorid.commands.demo import demo as work
+from rotorid.commands.demo_samples import SAMPLES
 
 
 @command(to=("table", "json"))

@@ -9,7 +9,7 @@ from concurrent.futures import BrokenExecutor
 from contextvars import Context
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.answer import Answer
 from rotorid.base.logs import progress
@@ -38,14 +38,15 @@ class FleetAddOptions:
 
     Attributes
     ----------
-    machine_type : NAME
+    machine_type : --type NAME
         Of the jobs that do not say it; default: the first folder below TREE, of those two folders deep.
-    workers : N
+    workers : N from 1
         Processes that read; 2 and more for hundreds of jobs.
     """
 
     machine_type: str | None = None
     workers: int = 1
+    to: ClassVar[Sequence[str]] = ("table", "json")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -99,14 +100,16 @@ class FleetAdded(Delivered):
 def fleet_add(
     fleet: Path | str, trees: Sequence[Path | str], options: FleetAddOptions | None = None
 ) -> FleetAdded:
-    """Add the jobs of folder trees to a store, a batch after the other.
+    """Add the jobs of folder trees to the tables; what is known already stays as it is.
+
+    Example: rotorid fleet add fans sample_data/fleet
 
     Parameters
     ----------
-    fleet
-        The folder of the store; it is made where there is none.
-    trees
-        Folders with jobs, at any depth, or jobs.
+    fleet : FLEET
+        Folder of the tables of the fleet.
+    trees : TREE…
+        Folders with jobs (.toml, .xlsx) at any depth, or jobs.
     options
         See there.
 

@@ -1,0 +1,1 @@
+"""Studies: samples drawn and counted, machines that are balanced or starts of a calibration."""
