@@ -11,8 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from rotorid.commands import StudyOptions, study
 from rotorid.samples import sample_data
+from rotorid.study import StudyOptions, study
 
 
 def main(samples: int = 10_000, runs: int = 0) -> None:

@@ -13,13 +13,11 @@ from rotorid.cli.demo import demo
 from rotorid.cli.schema import schema
 from rotorid.cli.worksheet import worksheet
 from rotorid.commands import (
+    Delivered,
     balance,
     bearings,
     campbell,
     critical,
-    fleet_add,
-    fleet_fit,
-    fleet_show,
     identify,
     influence,
     modes,
@@ -30,16 +28,18 @@ from rotorid.commands import (
     runup,
     simulate,
     split,
-    study,
     tolerance,
     trial_weight,
     unbalance,
     vectors,
 )
 from rotorid.commands.app import run, typer_command, written_help
-from rotorid.commands.outcome import Delivered
 from rotorid.commands.terminal import markup_mode
 from rotorid.commands.verbose import verbosely
+from rotorid.fleet.adding import fleet_add
+from rotorid.fleet.fitting import fleet_fit
+from rotorid.fleet.showing import fleet_show
+from rotorid.study.studies import study
 
 app = typer.Typer(
     name="rotorid",

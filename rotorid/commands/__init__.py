@@ -10,14 +10,10 @@ from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
 from rotorid.commands.demo import Demo, DemoOptions, demo
 from rotorid.commands.fit import FitOptions, RecordFit, fit
-from rotorid.commands.fleet_add import FleetAdded, FleetAddOptions, fleet_add
-from rotorid.commands.fleet_fit import FleetFitOptions, TypeFound, fleet_fit
-from rotorid.commands.fleet_show import FleetShown, FleetShowOptions, fleet_show
 from rotorid.commands.identify import Coefficients, IdentifyOptions, identify
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.modes import ModesOptions, modes
 from rotorid.commands.motion import Motion, MotionOptions, motion
-from rotorid.commands.outcome import Delivered, Outcome
 from rotorid.commands.periodic import PeriodicMotions, PeriodicOptions, periodic
 from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.commands.reduce_result import ReducedRotor
@@ -25,12 +21,11 @@ from rotorid.commands.response import ResponseOptions, response
 from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.commands.split import SplitOptions, split
-from rotorid.commands.study import StudyOptions, study
-from rotorid.commands.study_result import StudiedMachines, StudiedStarts
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 from rotorid.commands.vectors import VectorsOptions, vectors
+from rotorid.report.outcome import Delivered, Outcome
 
 __all__ = [
     "Balance",
@@ -46,11 +41,6 @@ __all__ = [
     "Demo",
     "DemoOptions",
     "FitOptions",
-    "FleetAddOptions",
-    "FleetAdded",
-    "FleetFitOptions",
-    "FleetShowOptions",
-    "FleetShown",
     "IdentifyOptions",
     "InfluenceOptions",
     "ModesOptions",
@@ -66,13 +56,9 @@ __all__ = [
     "RunUpOptions",
     "SimulateOptions",
     "SplitOptions",
-    "StudiedMachines",
-    "StudiedStarts",
-    "StudyOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
     "TrialWeights",
-    "TypeFound",
     "UnbalanceOptions",
     "VectorsOptions",
     "balance",
@@ -82,9 +68,6 @@ __all__ = [
     "critical",
     "demo",
     "fit",
-    "fleet_add",
-    "fleet_fit",
-    "fleet_show",
     "identify",
     "influence",
     "modes",
@@ -95,7 +78,6 @@ __all__ = [
     "runup",
     "simulate",
     "split",
-    "study",
     "tolerance",
     "trial_weight",
     "unbalance",

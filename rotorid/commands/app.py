@@ -42,8 +42,8 @@ import typer
 from typer.models import OptionInfo
 
 from rotorid.base.answer import LINES, kinds
-from rotorid.commands.outcome import USUAL, WITH_REPORT, Delivered, options_of
 from rotorid.commands.progress import busy
+from rotorid.report.outcome import USUAL, WITH_REPORT, Delivered, options_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

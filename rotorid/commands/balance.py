@@ -21,8 +21,8 @@ from rotorid.commands.balance_solution import (
     with_other_conventions,
 )
 from rotorid.commands.option_quantities import positions
-from rotorid.commands.outcome import Parts, command, provenance
 from rotorid.commands.tolerance import ToleranceOptions, permissible
+from rotorid.report.outcome import Parts, command, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         Verdict,
     )
     from rotorid.commands.balance_solution import JobGiven
-    from rotorid.commands.type_coefficients import TypeKnowledge
+    from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.commands.coefficients import KINDS
-from rotorid.commands.input_checks import check_choices
-from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
 from rotorid.commands.quantities import Names, Speeds, one_of
+from rotorid.report.options import check_choices
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
 if TYPE_CHECKING:
     from rotorid.base.registry import Method

@@ -11,14 +11,14 @@ from warnings import catch_warnings
 
 from rotorid.base.text import listing
 from rotorid.commands.coefficients import choose, used_planes
-from rotorid.commands.input_checks import file_of
 from rotorid.commands.option_quantities import largest_amplitudes, largest_weights, limited
 from rotorid.commands.quantities import names, speeds
+from rotorid.report.options import file_of
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Subsets, Trials
     from rotorid.commands.balance_options import BalanceOptions
-    from rotorid.commands.type_coefficients import TypeKnowledge
+    from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource
 
@@ -112,7 +112,7 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
     if options.machine_type is None:
         known = choose(job, options.coefficients, options.model_error, refined=options.refine)
     else:
-        from rotorid.commands.type_coefficients import type_coefficients
+        from rotorid.fleet.type_coefficients import type_coefficients
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
         known = of_type.influence, None

@@ -13,8 +13,8 @@ from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import capital, counted, figures
 from rotorid.commands.moving import moving
-from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Speeds, degrees, rising_speeds
+from rotorid.report.outcome import USUAL, Delivered, command, phase, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotorid.base.answer import Answer
-from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import Found, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Names, Nodes, nodes
+from rotorid.report.options import file_of, rotor_source
+from rotorid.report.outcome import Found, command, log_rotor, phase, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,9 +13,9 @@ from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, percent
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import Outcome, command, log_rotor, phase, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

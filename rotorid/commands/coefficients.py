@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from balancing import Correction, Influence, Trials
+    from balancing import Influence, Trials
     from rotorid.tables import Job
 
 KINDS = ("measured", "computed", "combined")
@@ -86,28 +86,6 @@ def _separate(trials: Trials) -> bool:
 def used_planes(job: Job, influence: Influence) -> list[str]:
     """Planes of these coefficients that the job does not leave out."""
     return [plane for plane in influence.planes if plane not in job.left_out]
-
-
-def proposed(job: Job, influence: Influence, runs: Trials | None = None) -> Correction:
-    """What `balance` proposes for a job with these coefficients, and no option changes it.
-
-    Parameters
-    ----------
-    job
-        With its limits, the planes it uses, and what is removed.
-    influence, runs
-        As of `correct`.
-    """
-    from balancing import correct
-
-    return correct(
-        influence,
-        runs,
-        used_planes(job, influence),
-        limits=job.limits_of(influence.planes),
-        row_weights=job.row_weights,
-        remove=sorted(job.remove),
-    )
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.text import listing
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, band
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import Outcome, command, log_rotor, phase, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

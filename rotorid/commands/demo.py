@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.suggestions import one_of
 from rotorid.commands.demo_samples import SAMPLES, Sample
-from rotorid.commands.input_checks import file_of
-from rotorid.commands.outcome import Delivered, command, provenance
+from rotorid.report.options import file_of
+from rotorid.report.outcome import Delivered, command, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

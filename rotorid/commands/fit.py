@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.logs import workflows as log
 from rotorid.base.text import listing
-from rotorid.commands.input_checks import check_choices, file_of, refuse
-from rotorid.commands.outcome import Found, command, phase, provenance, text_of
 from rotorid.commands.quantities import check_names, number, pairs
+from rotorid.report.options import check_choices, file_of, refuse
+from rotorid.report.outcome import Found, command, phase, provenance, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

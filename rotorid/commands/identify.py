@@ -11,8 +11,8 @@ from rotorid.base.answer import Answer
 from rotorid.base.logs import workflows as log
 from rotorid.base.text import listing
 from rotorid.commands.amplitude_errors import amplitude_errors
-from rotorid.commands.input_checks import check_choices, file_of, refuse
-from rotorid.commands.outcome import EQUATIONS, WITH_REPORT, Parts, command, phase, provenance, text_of
+from rotorid.report.options import check_choices, file_of, refuse
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Parts, command, phase, provenance, text_of
 
 if TYPE_CHECKING:
     import pandas as pd

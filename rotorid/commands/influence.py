@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from rotorid.base.tables import LONG
 from rotorid.base.text import counted
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import Outcome, command, log_rotor, phase, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, listing
-from rotorid.commands.input_checks import file_of
-from rotorid.commands.outcome import USUAL, Outcome, command, phase, provenance
 from rotorid.commands.quantities import Band, band, one_of
+from rotorid.report.options import file_of
+from rotorid.report.outcome import USUAL, Outcome, command, phase, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,6 @@ from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
 from rotorid.commands.moving import moving
-from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
@@ -29,6 +28,7 @@ from rotorid.commands.quantities import (
     pairs,
     speeds,
 )
+from rotorid.report.outcome import USUAL, Delivered, command, phase, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.commands.input_checks import rotor_source
+from rotorid.report.options import rotor_source
 
 if TYPE_CHECKING:
     from fem import Rotor

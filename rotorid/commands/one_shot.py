@@ -15,7 +15,7 @@ from balancing import Gaussian, Trials, usual_run_errors, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings
-from rotorid.commands.outcome import hash_of
+from rotorid.report.outcome import hash_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

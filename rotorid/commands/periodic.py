@@ -14,8 +14,8 @@ from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
 from rotorid.commands.moving import Moving, moving
-from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Band, Sensor, degrees, sensors, speeds
+from rotorid.report.outcome import USUAL, Delivered, command, phase, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,6 +13,7 @@ from typing import TypeVar, cast
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.suggestions import one_of as one_of
 from rotorid.base.text import listing
+from rotorid.report.options import option_name as option_name
 
 _T = TypeVar("_T")
 Speeds = str | Sequence[float | str]
@@ -32,11 +33,6 @@ Names = str | Sequence[str]
 SLOWEST, FASTEST = 1e-9, 1e9
 """rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
 _SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
-
-
-def option_name(field: str) -> str:
-    """As the command line writes it: "--first-hole"."""
-    return f"--{field.replace('_', '-')}"
 
 
 def number(text: str) -> float:

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rotorid.base.logs import workflows as log
 from rotorid.base.text import counted
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import EQUATIONS, WITH_REPORT, command, provenance
 from rotorid.commands.quantities import (
     Band,
     Nodes,
@@ -25,6 +23,8 @@ from rotorid.commands.quantities import (
     option_name,
     rising_speeds,
 )
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, command, provenance
 
 if TYPE_CHECKING:
     from fem import Rotor

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
-from rotorid.commands.outcome import Parts
+from rotorid.report.outcome import Parts
 
 if TYPE_CHECKING:
     import pandas as pd

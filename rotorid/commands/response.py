@@ -13,8 +13,6 @@ from rotorid.base.json import cell
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, figures, listing
-from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import (
     Band,
     Sensor,
@@ -27,6 +25,8 @@ from rotorid.commands.quantities import (
     rising_speeds,
     sensors,
 )
+from rotorid.report.options import file_of, rotor_source
+from rotorid.report.outcome import Outcome, command, log_rotor, phase, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,12 +12,12 @@ from rotorid.base.rpm import RPM
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures, listing
-from rotorid.commands.input_checks import file_of
 from rotorid.commands.modes import NO_MODES, ModesOutcome, bands
-from rotorid.commands.outcome import USUAL, command, provenance
-from rotorid.commands.outcome import phase as timed
 from rotorid.commands.quantities import Band, Names, Speeds, names, number, one_of, one_speed
 from rotorid.commands.quantities import speeds as read_speeds
+from rotorid.report.options import file_of
+from rotorid.report.outcome import USUAL, command, provenance
+from rotorid.report.outcome import phase as timed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

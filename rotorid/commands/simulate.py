@@ -13,8 +13,6 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import capital, counted, listing
 from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.fit import Values, sigmas
-from rotorid.commands.input_checks import file_of, refuse
-from rotorid.commands.outcome import Outcome, command, phase, provenance
 from rotorid.commands.quantities import (
     Speeds,
     Times,
@@ -27,6 +25,8 @@ from rotorid.commands.quantities import (
     speeds,
     times,
 )
+from rotorid.report.options import file_of, refuse
+from rotorid.report.outcome import Outcome, command, phase, provenance
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import FloatArray

@@ -8,10 +8,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rotorid.base.tables import Column, Table
-from rotorid.commands.input_checks import changed, refuse
 from rotorid.commands.option_quantities import size, vectors, weight, weights
-from rotorid.commands.outcome import USUAL, Outcome, command, provenance
 from rotorid.commands.quantities import degrees, option_name, pairs
+from rotorid.report.options import changed, refuse
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.commands.option_quantities import grade, length, mass, positions, speed_with_unit, two_positions
-from rotorid.commands.outcome import USUAL, Found, command, provenance
+from rotorid.report.outcome import USUAL, Found, command, provenance
 
 if TYPE_CHECKING:
     from balancing import Tolerance

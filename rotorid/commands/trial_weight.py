@@ -12,10 +12,10 @@ from rotorid.base.answer import Answer, together
 from rotorid.base.logs import workflows as log
 from rotorid.base.words import Angles, Phase, Quantity
 from rotorid.commands.coefficients import choose, used_planes
-from rotorid.commands.input_checks import job_source, refuse
 from rotorid.commands.option_quantities import limited, mass, quantity, size, speed_with_unit
-from rotorid.commands.outcome import USUAL, Delivered, command, provenance
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
+from rotorid.report.options import job_source, refuse
+from rotorid.report.outcome import USUAL, Delivered, command, provenance
 from rotorid.tables.reader.units import FORCE, MASS, UNBALANCE
 
 if TYPE_CHECKING:

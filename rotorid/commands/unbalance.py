@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.commands.coefficients import computed
-from rotorid.commands.input_checks import check_choices, job_source, refuse
-from rotorid.commands.outcome import USUAL, Found, command, provenance
 from rotorid.commands.quantities import Nodes, nodes
+from rotorid.report.options import check_choices, job_source, refuse
+from rotorid.report.outcome import USUAL, Found, command, provenance
 
 if TYPE_CHECKING:
     from rotorid.base.registry import Method

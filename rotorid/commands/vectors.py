@@ -13,8 +13,8 @@ from rotorid.base.result import rows
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, listing
-from rotorid.commands.outcome import USUAL, Outcome, command, phase, provenance
 from rotorid.commands.quantities import Names, Speeds, names, one_of, speeds
+from rotorid.report.outcome import USUAL, Outcome, command, phase, provenance
 
 if TYPE_CHECKING:
     from rotorid.waveforms.vectors import Vectors

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.commands.balance import Balance
-    from rotorid.commands.outcome import Delivered
+    from rotorid.report.outcome import Delivered
     from rotorid.tables import Job
 
 KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}

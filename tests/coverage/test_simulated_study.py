@@ -6,7 +6,7 @@ from repetitions import FULL
 from scipy.stats import binomtest
 from studies.drawn import STUDY, write
 
-from rotorid.commands import StudyOptions, study
+from rotorid.study import StudyOptions, study
 
 TWO = STUDY.replace(
     "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"

@@ -10,7 +10,6 @@ import typer
 from rotorid.commands.app import OUTPUT, Destination, command
 from rotorid.commands.fit import FitOptions
 from rotorid.commands.fit import fit as work
-from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
 
 
 @command(
@@ -22,7 +21,7 @@ from rotorid.commands.outcome import EQUATIONS, WITH_REPORT
         OUTPUT: "",
         "Expert": "integrator rtol seed",
     },
-    to=(*WITH_REPORT, *EQUATIONS),
+    to=("report", "plot", "output", "table", "json", "show", "latex"),
 )
 def fit(
     model: Annotated[

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from repetitions import FULL
 
-from rotorid.commands.fleet_add import fleet_add, read_jobs
-from rotorid.commands.fleet_show import FleetShowOptions, fleet_show
+from rotorid.fleet.adding import fleet_add, read_jobs
+from rotorid.fleet.showing import FleetShowOptions, fleet_show
 from rotorid.samples import sample_data
 from rotorid.tables.fleet.fleet_store import FleetStore
 from rotorid.tables.fleet.fleet_tables import TABLES
@@ -26,7 +26,7 @@ def killed(*names):
     left[0] -= 1
     replace(*names)
 os.replace = killed
-from rotorid.commands.fleet_add import fleet_add
+from rotorid.fleet.adding import fleet_add
 fleet_add("F", [sys.argv[2]])
 """
 
@@ -48,7 +48,7 @@ def test_the_same_job_twice_changes_nothing_wherever_it_lies(tree, cli, monkeypa
     shutil.copytree(tree / "fan" / "132-08", tree / "elsewhere")
     read = []
     monkeypatch.setattr(
-        sys.modules["rotorid.commands.fleet_add"], "read_jobs", lambda found, _: read.extend(found) or ()
+        sys.modules["rotorid.fleet.adding"], "read_jobs", lambda found, _: read.extend(found) or ()
     )
     again = cli("fleet", "add", "F", "tree", "tree/fan").out
     assert read == []  # what its files hold says it, before they are read as a job
@@ -83,7 +83,7 @@ def test_what_another_writer_has_added_meanwhile_is_known(tree, monkeypatch):
         FleetStore(tree.parent / "F").append(rows[:1])
         return rows
 
-    monkeypatch.setattr(sys.modules["rotorid.commands.fleet_add"], "read_jobs", slow)
+    monkeypatch.setattr(sys.modules["rotorid.fleet.adding"], "read_jobs", slow)
     added = fleet_add("F", [tree])
     assert (added.jobs, added.vectors, added.known) == (1, 12, 1)
 

@@ -10,7 +10,7 @@ import pytest
 from cases import each_of
 
 from balancing import estimate_influence
-from rotorid.commands.fleet_add import FleetAddOptions, fleet_add
+from rotorid.fleet.adding import FleetAddOptions, fleet_add
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.tables.fleet.fleet_store import FleetStore, trials_of

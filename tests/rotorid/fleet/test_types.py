@@ -9,9 +9,9 @@ import pytest
 from balancing import UndeterminedError
 from rotorid.commands import balance
 from rotorid.commands.balance import BalanceOptions
-from rotorid.commands.fleet_add import FleetAddOptions, fleet_add
-from rotorid.commands.fleet_fit import FleetFitOptions, fleet_fit
-from rotorid.commands.type_coefficients import type_coefficients
+from rotorid.fleet.adding import FleetAddOptions, fleet_add
+from rotorid.fleet.fitting import FleetFitOptions, fleet_fit
+from rotorid.fleet.type_coefficients import type_coefficients
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 

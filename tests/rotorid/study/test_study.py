@@ -14,9 +14,9 @@ from studies.drawn import SCATTER, STUDY, write
 import fem
 from balancing import Trials, correct, refine
 from rotorid import read_rotor
-from rotorid.commands import CalibrateOptions, StudyOptions, calibrate, study
+from rotorid.commands import CalibrateOptions, calibrate
 from rotorid.samples import sample_data
-from rotorid.study import drawn_machine
+from rotorid.study import StudyOptions, drawn_machine, study
 from rotorid.study.drawn_machine import UNSTABLE
 from rotorid.study.machine_counts import EDGES, UNDETERMINED
 from rotorid.tables.reader.problems import InputError
@@ -251,7 +251,7 @@ def test_a_number_that_is_called_as_another_column_is_refused(tmp_path, name):
 
 def test_the_command(cli, tmp_path, monkeypatch):
     file = write(tmp_path, TWO)
-    monkeypatch.setattr(sys.modules["rotorid.commands.study"], "MACHINES", 30)
+    monkeypatch.setattr(sys.modules["rotorid.study.studies"], "MACHINES", 30)
     outcome = cli("study", file, "--json", "--results", tmp_path / "kept", "--plot", tmp_path / "a.png")
     assert outcome.code == 0, outcome.err
     assert {"probability", "interval", "samples"} < set(outcome.json)

@@ -12,7 +12,7 @@ import numpy as np
 from balancing import Labels, UndeterminedError
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing
-from rotorid.fleet import MachineRecord, MachineType, fit_type
+from rotorid.fleet.machine_type import MachineRecord, MachineType, fit_type
 from rotorid.tables.reader.units import vibration, weight
 from rotorid.tables.runs.stated_conventions import DEFAULT_TOLERANCE
 

@@ -12,7 +12,7 @@ from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, figures
-from rotorid.commands.outcome import USUAL, Delivered, command, provenance
+from rotorid.report.outcome import USUAL, Delivered, command, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.arrays import FloatArray
-    from rotorid.commands.type_records import KnownType
+    from rotorid.fleet.type_records import KnownType
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
     ValueError
         For a fleet or a type that are not there; UndeterminedError with fewer than three machines.
     """
-    from rotorid.commands.type_records import known_type
+    from rotorid.fleet.type_records import known_type
     from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
 
     store = FleetStore(Path(fleet))

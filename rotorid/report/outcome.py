@@ -17,7 +17,7 @@ from rotorid.base.logs import workflows as log
 from rotorid.base.tables import Table, file_bytes, frame, terminal
 from rotorid.base.text import capital, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
-from rotorid.commands.input_checks import changed, checked, plain
+from rotorid.report.options import changed, checked, plain
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,4 +1,4 @@
-"""Checks of what a workflow is given: options, as JSON has them, too; rotors and jobs read from files."""
+"""Options of commands: checked as they enter, and as JSON has them; files, rotors and jobs that are named."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import cmath
 import dataclasses
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.registry import Method, find
-from rotorid.commands.quantities import option_name
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -19,30 +17,11 @@ if TYPE_CHECKING:
     from rotorid.tables import Job
 
 _T = TypeVar("_T", bound="DataclassInstance")
-_NUMBER = (int, float)
-_KINDS: dict[str, tuple[type, ...]] = {
-    "None": (NoneType,),
-    "str": (str,),
-    "Path": (Path,),
-    "int": (int,),
-    "float": _NUMBER,
-    "bool": (bool,),
-    "Amount": (str, *_NUMBER),
-    "Vector": (str, *_NUMBER, complex),
-    "Weights": (str, *_NUMBER, Mapping),
-}
-"""What a part of an annotation allows; any other part: a text, or several in a list or a mapping."""
-_MANY = (str, Collection)
-_WORDS = {
-    str: "a text",
-    Path: "a path",
-    int: "a whole number",
-    float: "a number",
-    bool: "True or False",
-    complex: "a complex number",
-    Mapping: "a mapping",
-    Collection: "a list or a mapping",
-}
+
+
+def option_name(field: str) -> str:
+    """As the command line writes it: "--first-hole"."""
+    return f"--{field.replace('_', '-')}"
 
 
 def checked(given: object, kind: type[_T]) -> _T:
@@ -51,22 +30,18 @@ def checked(given: object, kind: type[_T]) -> _T:
     Raises
     ------
     ValueError
-        For options of another workflow, a value of another type, and a number that is not finite.
+        For options of another command, what is no bool where one is needed, and a number that is not finite.
     """
     if not isinstance(given, kind):
         raise ValueError(f"options are {kind.__name__}(...), not {given!r}")
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for field in dataclasses.fields(given):
-        value = found[field.name] = _of_python(getattr(given, field.name))
-        types = dict.fromkeys(one for part in str(field.type).split(" | ") for one in _KINDS.get(part, _MANY))
-        same = bool in types if isinstance(value, bool) else isinstance(value, tuple(types))
-        if not same or isinstance(value, bytes):
-            shown = ([] if float in types else [_WORDS[int]] if int in types else []) + [
-                word for one, word in _WORDS.items() if one in types and one is not int
-            ]
-            raise ValueError(f"{kind.__name__}({field.name}={value!r}): {' or '.join(shown)} is needed")
+        value = values[field.name] = _of_python(getattr(given, field.name))
+        if (str(field.type) == "bool") != isinstance(value, bool):
+            needed = "True or False is needed" if str(field.type) == "bool" else "this is no switch"
+            raise ValueError(f"{kind.__name__}({field.name}={value!r}): {needed}")
         _check_finite(value, option_name(field.name))
-    return dataclasses.replace(given, **found)
+    return dataclasses.replace(given, **values)
 
 
 def changed(options: DataclassInstance) -> dict[str, object]:
@@ -113,9 +88,7 @@ def _of_python(value: object) -> object:
         return value.tolist()
     if isinstance(value, Mapping):
         return {_of_python(key): _of_python(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [*map(_of_python, value)] if isinstance(value, list) else (*map(_of_python, value),)
-    return value
+    return type(value)(map(_of_python, value)) if isinstance(value, list | tuple) else value
 
 
 def _check_finite(value: object, what: str) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, figures
-from rotorid.commands.outcome import Delivered
+from rotorid.report.outcome import Delivered
 
 if TYPE_CHECKING:
     import pandas as pd

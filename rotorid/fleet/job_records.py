@@ -9,7 +9,7 @@ import numpy as np
 
 from balancing import Influence, Labels, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.fleet import MachineRecord
+from rotorid.fleet.machine_type import MachineRecord
 from rotorid.tables.fleet.fleet_tables import Columns, JobRows
 from rotorid.tables.job.job_data import Job
 from rotorid.tables.reader.units import vibration

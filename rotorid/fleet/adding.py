@@ -16,7 +16,7 @@ from rotorid.base.logs import progress
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
 from rotorid.base.worker_processes import single_threads, worker_pool
-from rotorid.commands.outcome import Delivered, command, provenance
+from rotorid.report.outcome import Delivered, command, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -195,9 +195,8 @@ def _read(found: FoundJob) -> JobRows | str:
 def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> JobRows:
     """Rows of a job with its coefficients, and what `correct` proposes where that was mounted."""
     from balancing import estimate_influence
-    from rotorid.commands.after_check import pieces_mounted
-    from rotorid.commands.coefficients import proposed
-    from rotorid.tables.fleet.job_records import job_rows, kind_of
+    from rotorid.fleet.job_records import job_rows, kind_of
+    from rotorid.fleet.proposals import pieces_mounted, proposed
     from rotorid.tables.fleet.job_search import job_id
     from rotorid.tables.reader.input_file import sha256
 

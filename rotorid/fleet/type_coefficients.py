@@ -11,13 +11,14 @@ import numpy as np
 
 from balancing import Influence, Trials, with_check_runs
 from rotorid.base.text import counted
-from rotorid.commands.outcome import hash_of
-from rotorid.commands.type_records import Grid, KnownType, known_type
-from rotorid.fleet import MachineRecord, update
+from rotorid.fleet.machine_type import MachineRecord
+from rotorid.fleet.posterior import update
+from rotorid.fleet.type_records import Grid, KnownType, known_type
+from rotorid.report.outcome import hash_of
 
 if TYPE_CHECKING:
     from balancing import Correction
-    from rotorid.fleet import MachineType
+    from rotorid.fleet.machine_type import MachineType
     from rotorid.tables import Job
     from rotorid.tables.fleet.fleet_store import FleetStore
 
@@ -77,8 +78,8 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
 
     ValueError for an address, a fleet or a type that are not there, and check runs that are not.
     """
+    from rotorid.fleet.job_records import kind_of
     from rotorid.tables.fleet.fleet_store import FleetStore
-    from rotorid.tables.fleet.job_records import kind_of
     from rotorid.tables.fleet.job_search import machine_of
 
     folder, _, name = address.rpartition(":")

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.commands.input_checks import file_of
-from rotorid.commands.outcome import USUAL, command, hash_of, phase, provenance
-from rotorid.commands.study_result import StudiedMachines, StudiedStarts
+from rotorid.report.options import file_of
+from rotorid.report.outcome import USUAL, command, hash_of, phase, provenance
+from rotorid.study.study_result import StudiedMachines, StudiedStarts
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

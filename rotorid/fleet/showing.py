@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted
-from rotorid.commands.outcome import Delivered, command, provenance
+from rotorid.report.outcome import Delivered, command, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
