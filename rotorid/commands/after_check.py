@@ -73,7 +73,7 @@ def left_to_do(
             if misplaced:  # what is really there is not known, what it leaves is
                 known = influence, last_run(runs)
             elif measured:
-                known = choose(job, options.coefficients, options.model_error, refined=True)
+                known = choose(job, options.coefficients, refined=True)
             else:
                 known = influence, runs
             result = correct_job(job, known, result.planes, options)

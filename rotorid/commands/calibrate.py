@@ -5,21 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rotorid.base.answer import Answer
 from rotorid.commands.quantities import Names, Nodes, nodes
 from rotorid.report.options import file_of, rotor_source
-from rotorid.report.outcome import Found, command, log_rotor, phase, provenance
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from fem import Rotor
     from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
-
-    DataFiles = Path | str | Sequence[Path | str]
-    """Jobs, tables of critical speeds or natural frequencies, tables of modes."""
 
 
 @dataclass(frozen=True)
@@ -50,47 +44,8 @@ class CalibrateOptions:
     exact: bool = False
     unbalance_at: Nodes | None = None
     bow: int = 0
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Calibrated(Found):
-    """The calibrated rotor, and what was assumed of the data."""
-
-    assumed: tuple[str, ...] = ()
-    written: Path | None = None
-
-    @property
-    def answer(self) -> Answer:
-        """With what was assumed."""
-        answer: Answer = self.found.answer
-        return replace(answer, notes=(*answer.notes, *self.assumed))
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, with the rotor file that is written."""
-        return {**super().to_dict(), "rotor": self.written and str(self.written)}
-
-    def files(self, path: Path) -> Mapping[Path, bytes]:
-        """The calibrated rotor as a rotor file, .toml, with its tables; or the table of numbers.
-
-        Raises
-        ------
-        ValueError
-            For a rotor file of numbers that the data do not determine.
-        """
-        from rotorid.tables.reader.table_writing import table_bytes
-        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
-
-        if path.suffix.lower() != ".toml":
-            return {path: table_bytes(path, self.to_frame())}
-        if why := self.found.undetermined:
-            raise ValueError(f"{path}: no rotor file can be written, {why}")
-        return rotor_file_bytes(path, self.found.rotor)
-
-    def figure(self) -> Figure:
-        """The numbers with what was known of them."""
-        from rotorid.calibration.plots import calibration_figure
-
-        return calibration_figure(self.found)
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
+    to: ClassVar[Sequence[str]] = USUAL
 
 
 class Prepared(NamedTuple):
@@ -111,16 +66,23 @@ class Prepared(NamedTuple):
 
 
 @command
-def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Calibrated:
-    """Estimate numbers of a rotor from data of any mixture, with errors, and what the data do not determine.
+def calibrate(
+    rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
+) -> Outcome:
+    """Numbers of a rotor file from trial runs, critical speeds and modes, with ±.
+
+    --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
+    critical, campbell and response show bands.
+
+    Example: rotorid calibrate sample_data/compressor/rotor.toml sample_data/calibration/trial.toml
+    --estimate "bearing[*].*" --prior "bearing[*].*=20%" --output calibrated.toml
 
     Parameters
     ----------
-    rotor
-        As it is believed to be: a rotor, or its file.
-    data
-        Jobs with trial runs (or with readings of the bare rotor), tables of critical speeds, natural
-        frequencies or modes.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml).
+    data : DATA
+        Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.
     options
         What is unknown, and what is known of it.
 
@@ -130,25 +92,42 @@ def calibrate(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOpti
         For files or options that cannot be, and for data that say nothing of the rotor.
     """
     from rotorid import calibration
+    from rotorid.calibration.plots import calibration_figure
     from rotorid.commands.unknown_numbers import unknowns
 
     given = prepared(rotor, data, options)
-    log_rotor(given.rotor, unknowns=len(given.numbers))
     origin = provenance([*given.rotor_files, *given.data_files], options)
     paths = {number.path for number in given.numbers}
     beside = unknowns(given.rotor, given.probes, options.estimate, exact=False) if options.exact else []
     exact = [number for number in beside if number.path not in paths]
-    with phase("calibration"):
-        result = calibration.calibrate(*given[:4], exact=exact)
+    result = calibration.calibrate(*given[:4], exact=exact)
     of_rotor = {one["sha256"] for one in origin["inputs"][: len(given.rotor_files)]}  # which jobs name, too
     made_from = [one for one in origin["inputs"] if one["sha256"] not in of_rotor]
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-    return Calibrated(found=result, assumed=tuple(given.assumed), provenance=origin)
+
+    def rotor_file(path: Path) -> Mapping[Path, bytes]:
+        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
+
+        if why := result.undetermined:
+            raise ValueError(f"{path}: no rotor file can be written, {why}")
+        return rotor_file_bytes(path, result.rotor)
+
+    return outcome_of(
+        result,
+        origin,
+        notes=(*result.answer.notes, *given.assumed),
+        keys=lambda: {**result.to_dict(), "rotor": None},
+        files={".toml": rotor_file},
+        pictures={"The numbers, with what was known of them.": lambda: calibration_figure(result)},
+        title="Calibration",
+    )
 
 
-def prepared(rotor: Rotor | Path | str, data: DataFiles, options: CalibrateOptions) -> Prepared:
+def prepared(
+    rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
+) -> Prepared:
     """Read what is calibrated.
 
     Raises

@@ -12,12 +12,10 @@ if TYPE_CHECKING:
 
 KINDS = ("measured", "computed", "combined")
 MODEL_ERROR = 20.0
-"""Percent by which a computed coefficient may be wrong (one standard deviation) if nobody says."""
+"""Percent of a computed coefficient, one standard deviation, unless its rotor is calibrated."""
 
 
-def choose(
-    job: Job, kind: str | None = None, model_error: float | None = None, *, refined: bool = False
-) -> tuple[Influence, Trials | None]:
+def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple[Influence, Trials | None]:
     """Coefficients of a job, and the runs that give its vibration; None: those of the coefficients.
 
     Parameters
@@ -26,8 +24,6 @@ def choose(
         Its runs, stored coefficients or rotor.
     kind
         One of `KINDS`; None: measured where there are trial weights or stored coefficients.
-    model_error
-        Standard deviation of computed coefficients, percent.
     refined
         By the check runs of the job.
 
@@ -51,24 +47,18 @@ def choose(
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
             kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
-    if kind == "measured" and model_error is not None:
-        raise ValueError(
-            "--model-error is for computed coefficients: add --coefficients computed or combined"
-        )
     check = job.check if refined else None
     if refined and check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if check is not None and (kind == "computed" or job.influence is not None):
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
     if kind == "computed":
-        return computed(job, model_error or 0.0), job.trials
+        return computed(job, 0.0), job.trials
     baseline = None if job.influence is None else job.trials
     measured = job.influence or (refine(job.trials, check) if check else estimate_influence(job.trials))
     if kind == "combined":
-        error = MODEL_ERROR if model_error is None else model_error
-        if model_error is None and job.rotor is not None and job.rotor.calibration:
-            error = 0.0  # it states its own
-        measured = combine(measured, computed(job, error))
+        calibrated = job.rotor is not None and job.rotor.calibration
+        measured = combine(measured, computed(job, 0.0 if calibrated else MODEL_ERROR))
     return measured, baseline
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
@@ -28,7 +26,7 @@ from rotorid.commands.quantities import (
     pairs,
     speeds,
 )
-from rotorid.report.outcome import USUAL, Delivered, command, phase, provenance
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,6 +42,8 @@ if TYPE_CHECKING:
 View = Literal["motion", "orbits", "bode"]
 """What a picture shows."""
 Start = Literal["rest", "steady"]
+_TOLERANCE = 1e-6
+"""Error of one step, by how far the rotor has moved from where it began."""
 _SMALL = 24
 """Unknowns above which a rotor is reduced, where nothing else is asked for."""
 _LOOSER = 30.0
@@ -63,14 +63,8 @@ class MotionOptions:
         From one speed to another one, up or down, evenly: 500:9000rpm, 9000:500rpm.
     time : TIME
         How long, 2s.
-    acceleration : A
-        Of a run-up or a run-down, in place of its time: 300rpm/s; without a unit rad/s².
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
-    bow : FILE
-        Table of the shaft's bow at rest; in place of a small model's own.
-    gravity_direction : DEGREES
-        Where gravity points, from x with the rotation; default: -90, to -y.
     start
         At rest in equilibrium, or in steady motion at the first speed.
     displaced : LIST
@@ -81,10 +75,6 @@ class MotionOptions:
         Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
         together; default: as many as its natural frequencies up to twice the highest speed need to agree
         to 0.03 %; small models keep all.
-    rate : N
-        Samples a second; default: 64 a turn at the highest speed.
-    tolerance : T
-        Error of one step, by how far the rotor has moved from where it began.
     view
         What --plot draws: x and y over time with the spectrum, orbits, or a run-up over speed.
     """
@@ -92,27 +82,22 @@ class MotionOptions:
     speed: str | float | None = None
     run_up: Speeds | None = None
     time: str | float | None = None
-    acceleration: str | float | None = None
     unbalance: Path | str | Mapping[int, complex] | None = None
-    bow: Path | str | Mapping[int, complex] | None = None
-    gravity_direction: float = -90.0
     start: Start = "rest"
     displaced: str | Mapping[str, complex] | None = None
     sensors: Nodes | None = None
     modes: int | None = None
-    rate: float | None = None
-    tolerance: float = 1e-6
     view: View = "motion"
     panels: ClassVar[Mapping[str, str]] = {
         "Start": "start displaced",
-        "Method": "modes rate tolerance",
+        "Method": "modes",
         "Output": "view",
     }
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Motion(Delivered):
+class Motion(Answered):
     """Motion in time, what it comes to, and how sure it is.
 
     Attributes
@@ -314,7 +299,7 @@ class Motion(Delivered):
 
 
 @command
-def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Motion:
+def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Outcome:
     """Motion in time at a constant speed, through a run-up or a run-down.
 
     Example: rotorid motion sample_data/motion/rotor.toml --speed 4000rpm --time 2s --plot motion.png
@@ -336,46 +321,39 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     """
     import numpy as np
 
-    from rotorid.motion.run import LOOSEST, run
+    from rotorid.motion.run import run
     from rotorid.motion.steady import begin, steady_end
     from rotorid.motion.system import reduced_system
 
     one_of(options.view, "--view", get_args(View))
     ends, time = _course(options)
-    direction = degrees(options.gravity_direction, "--gravity-direction")
-    source = moving(model, options.unbalance, options.bow, direction)
+    source = moving(model, options.unbalance)
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    reduced, tolerance = None, options.tolerance
-    if tolerance > LOOSEST / _LOOSER:
-        raise ValueError(f"--tolerance {tolerance:g}: {LOOSEST / _LOOSER:.0e} at most")
+    reduced = None
     if options.modes is not None or system.size > _SMALL:
-        with phase("equations"):
-            reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
+        reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
         system = reduced.system
-    with phase("start"):
-        q, v, unsettled = begin(system, ends[0], options.start, shift, tolerance)
-    move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
-    with phase("motion"):
-        found = move(tolerance=tolerance)
-    with phase(f"motion with {_LOOSER:g} times the tolerance"):
-        rough = move(tolerance=_LOOSER * tolerance)
+    q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
+    move = partial(run, system, ends, time, (q, v), nodes=shown)
+    found = move(tolerance=_TOLERANCE)
+    rough = move(tolerance=_LOOSER * _TOLERANCE)
     if found.stopped:
         until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
         raise ValueError(found.stopped + until)
     k = min(found.time.size, rough.time.size)
     moved = np.abs(found.z - found.z[0]).max()
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
-    return Motion(
+    result = Motion(
         motion=found,
         reduced=reduced,
         end=steady_end(found),
         error=error,
         warnings=(*unsettled, *_warnings(found, error, bool(shift))),
         view=options.view,
-        provenance=provenance(source.files, options),
     )
+    return outcome_of(result, provenance(source.files, options))
 
 
 def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
@@ -384,8 +362,6 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
         raise ValueError("one of --speed and --run-up is needed")
     if options.speed is not None:
         speed = one_speed(options.speed, "--speed")
-        if options.acceleration is not None:
-            raise ValueError("--acceleration belongs to --run-up")
         ends = (speed, speed)
     else:
         given = options.run_up or ""
@@ -395,30 +371,12 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
                 f"--run-up {options.run_up!r}: use FIRST:LAST, two different speeds: 500:9000rpm"
             )
         ends = (found[0], found[1])
-    if (options.time is None) == (options.acceleration is None):
-        one = (
-            "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"
-        )
-        raise ValueError(one)
     if options.time is None:
-        return ends, abs(ends[1] - ends[0]) / _acceleration(options.acceleration or 0.0)
+        raise ValueError("--time is needed")
     time = number(str(options.time).strip().removesuffix("s"))
     if not 0 < time < FASTEST:
         raise ValueError(f"--time {options.time!r}: seconds above 0 are needed, such as 2s")
     return ends, time
-
-
-def _acceleration(given: str | float) -> float:
-    """Read "300rpm/s", or a number in rad/s², as --run-up without a unit is in rad/s."""
-    text = re.sub(r"/s(²|\^?2)$", "/s/s", str(given).strip())
-    if math.isnan(number(text)) and not re.search("(rpm|Hz|rad[/_]s)/s$", text):
-        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
-    value = one_speed(text.removesuffix("/s") if math.isnan(number(text)) else text, "--acceleration")
-    if not value > 0:
-        raise ValueError(
-            f"--acceleration {given!r} must be above 0; the speeds tell whether it goes up or down"
-        )
-    return value
 
 
 def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[int, ...]:
@@ -462,7 +420,7 @@ def _loaded(system: MotionSystem) -> list[int]:
 def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
     if not found.resolved:
-        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
+        said.append("too few samples a turn: what the shaft does between them is not told")
     if error > _UNSURE:
         said.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "

@@ -1,4 +1,4 @@
-"""What `bearings`, `motion` and `periodic` take: a rotor or a small model, its unbalance, bow and weight."""
+"""What `bearings`, `motion` and `periodic` take: a rotor or a small model, its unbalance and weight."""
 
 from __future__ import annotations
 
@@ -25,18 +25,14 @@ class Moving:
     ----------
     model
         The rotor or the small model.
-    unbalance, bow
-        By node, kg·m and m, complex; None: the small model's own.
-    direction
-        Of gravity, degrees from x with the rotation.
+    unbalance
+        By node, kg·m, complex; None: the small model's own.
     files
         Read for it.
     """
 
     model: Rotor | SmallModel
     unbalance: Mapping[int, complex] | None
-    bow: Mapping[int, complex] | None
-    direction: float
     files: tuple[Path, ...]
 
     def node(self, name: str | int) -> int:
@@ -47,18 +43,14 @@ class Moving:
         """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
         from rotorid.motion.system import rotor_system
 
-        return rotor_system(
-            self.model, lowest, highest, unbalance=self.unbalance, bow=self.bow, direction=self.direction
-        )
+        return rotor_system(self.model, lowest, highest, unbalance=self.unbalance)
 
 
 def moving(
     given: Rotor | SmallModel | Path | str,
     unbalance: Table | None = None,
-    bow: Table | None = None,
-    direction: float = -90.0,
 ) -> Moving:
-    """Read a rotor table, a rotor file or a small model, and tables of unbalance and bow.
+    """Read a rotor table, a rotor file or a small model, and a table of unbalance.
 
     Raises
     ------
@@ -66,7 +58,7 @@ def moving(
         For files that cannot be read.
     """
     from rotorid.reduction import SmallModel
-    from rotorid.tables import read_bow, read_small_model, read_unbalance, rotor_files
+    from rotorid.tables import read_small_model, read_unbalance, rotor_files
     from rotorid.tables.models.small_model_file import is_small_model
 
     model: Rotor | SmallModel
@@ -80,7 +72,4 @@ def moving(
     if isinstance(unbalance, Path | str):
         files = (*files, Path(unbalance))
         unbalance = read_unbalance(files[-1], model)
-    if isinstance(bow, Path | str):
-        files = (*files, Path(bow))
-        bow = read_bow(files[-1], model)
-    return Moving(model, unbalance, bow, direction, files)
+    return Moving(model, unbalance, files)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.logs import workflows as log
-from rotorid.base.text import counted
+from rotorid.base.answer import Answer, together
+from rotorid.base.text import counted, listing
 from rotorid.commands.quantities import (
     Band,
     Nodes,
@@ -20,24 +20,28 @@ from rotorid.commands.quantities import (
     numbers,
     one_of,
     one_speed,
-    option_name,
     rising_speeds,
 )
-from rotorid.report.options import rotor_source
-from rotorid.report.outcome import EQUATIONS, WITH_REPORT, command, provenance
+from rotorid.report.options import option_name, rotor_source
+from rotorid.report.outcome import (
+    EQUATIONS,
+    WITH_REPORT,
+    Outcome,
+    command,
+    outcome_of,
+    provenance,
+    table_of,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from fem import Rotor
-    from rotorid.commands.reduce_result import ReducedRotor
-    from rotorid.reduction import InputErrors, Placement, Reduction
+    from rotorid.reduction import InputErrors, Placement, Reduction, SmallModel
+    from rotorid.report.equations import Equations
+    from rotorid.report.outcome import Written
     from rotorid.tables.data.modes_table import MeasuredModes
 
-Place = Literal["best", "compromise", "mac", "book"]
-"""Which of all places of the masses is taken."""
-Normalise = Literal["first", "largest", "length"]
-"""How shapes are scaled."""
-Rows = Literal["equal", "relative"]
-"""How rows of the regression are weighted."""
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
@@ -49,22 +53,12 @@ class ReduceOptions:
     ----------
     nodes : LIST
         Where the masses stand: nodes or stations, 7,12,18.
-    place
-        Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
-        (extrema of the first two modes).
+    rank
+        Rank all places of the masses; without --nodes the masses are those of the best compromise.
     masses : N from 1
-        How many masses are placed or ranked; default: 3.
+        How many masses are ranked; default: 3.
     modes : N from 1
         How many modes the regression uses; default: 2.
-    normalise
-        Shapes scaled to 1 at the first mass (the book), at their largest, or in length.
-    rows
-        Rows of the regression as they stand (the book: the first mode dominates), or of each mode relative
-        to its 1/ω².
-    nonnegative
-        No mass below 0.
-    supports_apart
-        Compliance of the shaft and its two bearings apart, (47).
     measured : FILE
         Table of measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.
     compliance : FILE
@@ -73,27 +67,19 @@ class ReduceOptions:
         With a table of compliance: springs to the ground that it does not hold, N/m, 12=2e6.
     errors : LIST
         Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.
-    what_if : LIST
-        What changes of inputs do, in percent: alpha12=1.3,U31=-0.3.
+    supports_apart
+        Compliance of the shaft and its two bearings apart, (47).
+    damping : LIST
+        Modal damping of the small model, percent of critical of the first modes: 1,0.5.
     speed : SPEED
         Of tables of bearings and seals, and of the small model, such as 3000rpm; default: the lowest of the
         tables.
-    rank
-        Rank all places of the masses.
-    candidates : LIST
-        Nodes that places are chosen from.
     methods
         Beside other reductions.
     response : A:B:STEP
         Unbalance response beside the full rotor's, at speeds in rad/s or with a unit; or auto.
     stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
-    damping : LIST
-        Modal damping of the small model, percent of critical of the first modes: 1,0.5.
-    both_planes
-        Planes x and y in the model file, also where nothing couples them.
-    force : LIST
-        Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
     keep_supports
         For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
         all supports and forces stay in the model, at nodes of their own.
@@ -105,36 +91,26 @@ class ReduceOptions:
     """
 
     nodes: Nodes | None = None
-    place: Place | None = None
+    rank: bool = False
     masses: int | None = None
     modes: int | None = None
-    normalise: Normalise = "first"
-    rows: Rows = "equal"
-    nonnegative: bool = False
-    supports_apart: bool = False
     measured: Path | str | None = None
     compliance: Path | str | None = None
     seals: str | Mapping[str, float] | None = None
     errors: str | Mapping[str, float] | None = None
-    what_if: str | Mapping[str, float] | None = None
+    supports_apart: bool = False
+    damping: str | Sequence[float] | None = None
     speed: str | float | None = None
-    rank: bool = False
-    candidates: Nodes | None = None
     methods: bool = False
     response: Speeds | None = None
     stability: Band | None = None
-    damping: str | Sequence[float] | None = None
-    both_planes: bool = False
-    force: Nodes | None = None
     keep_supports: bool = False
     model: Path | None = None
     state_space: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "nodes modes speed measured compliance seals",
-        "Method": "rank place masses candidates methods",
-        "Errors": "errors what_if",
-        "Small model": "response stability model state_space damping force both_planes keep_supports",
-        "Expert": "normalise rows nonnegative supports_apart",
+        "Method": "rank masses methods errors supports_apart",
+        "Small model": "response stability model state_space damping keep_supports",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
     writes: ClassVar[Mapping[str, Sequence[str]]] = {
@@ -142,22 +118,9 @@ class ReduceOptions:
         "state_space": (".json", ".npz", ".mat"),
     }
 
-    def before(self, rotor: Path | None) -> None:
-        """Refuse what would be in no file."""
-        used = {
-            "--damping": (self.damping, self.model or self.state_space, "--model or --state-space"),
-            "--both-planes": (self.both_planes, self.model, "--model"),
-            "--force": (self.force, self.model, "--model"),
-        }
-        for option, (given, of_use, needed) in used.items():
-            if given and not of_use:
-                raise ValueError(f"{option} does nothing without {needed}")
-        if self.keep_supports and self.state_space:
-            raise ValueError("--state-space writes the rotor on its supports: leave out --keep-supports")
-
 
 @command
-def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> ReducedRotor:
+def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> Outcome:
     """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
@@ -180,41 +143,105 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     ValueError
         For a rotor or an option that cannot be, and for options that would have no effect.
     """
-    from rotorid.commands.reduce_result import ReducedRotor
-
     options = options or ReduceOptions()
-    how = {"normalise": options.normalise, "rows": options.rows, "nonnegative": options.nonnegative}
     _check_used(options, rotor is not None)
     if rotor is None:
-        result, files = _of_tables(options, how)
-        forces = _forces(options)
-        reduced = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
-    else:
-        reduced = _of_rotor(rotor, options, how)
-        if options.model or options.state_space:
-            name = Path(rotor).name if isinstance(rotor, Path | str) else ""
-            reduced = dataclasses.replace(reduced.with_small(), name=name)
-    solved = reduced.result.masses
-    log.info("rank = %s", solved.rank)
-    log.info("degrees_of_freedom = %s", solved.dof)
-    log.info("singular_values = %s", ", ".join(f"{value:.6g}" for value in solved.singular_values))
-    if options.what_if is None:
-        return reduced
-    changes = shares(options.what_if, "--what-if", "alpha12=1.3")
-    return dataclasses.replace(reduced, shift=reduced.result.what_if(changes))
+        result, files = _of_tables(options)
+        return _outcome({"": result}, options, files, "")
+    name = Path(rotor).name if isinstance(rotor, Path | str) else ""
+    parts, files = _of_rotor(rotor, options)
+    return _outcome(parts, options, files, name)
+
+
+def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[Path], name: str) -> Outcome:
+    """The masses, and what was asked for beside them, by their keys in the document; the ranking first."""
+    result: Reduction = parts[""]
+    small: SmallModel | None = parts.get("small_model")
+    placement: Placement | None = parts.get("placement")
+    speed = _speed(result.rotor, options)
+    first = [] if placement is None else [placement.answer]
+    if options.keep_supports and result.rotor is not None:
+        at = listing((str(support.node) for support in result.rotor.supports), "and")
+        first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
+    rest = (part.answer for part in parts.values() if part is not placement)
+
+    def model(path: Path) -> Written:
+        from rotorid.commands.reduce_result import model_files
+
+        return model_files(path, result, small, speed, name, keeps_supports=options.keep_supports)
+
+    def state_space(path: Path) -> Written:
+        from rotorid.commands.reduce_result import small_of, state_space_bytes
+
+        return state_space_bytes(small or small_of(result), speed, path.suffix.lower())
+
+    def solved() -> Equations:
+        from rotorid.report.equations_of_results import equations_of
+
+        return equations_of(result)
+
+    keys: dict[str, Any] = {key: part.to_dict() for key, part in parts.items()}
+    return outcome_of(
+        result,
+        provenance(files, options),
+        answer=together([*first, *rest]),
+        keys={**keys.pop(""), **keys},
+        file=lambda: table_of((placement or result).to_frame()),
+        files={"model": model, "state_space": state_space},
+        pictures=_pictures(parts),
+        title=f"Rotor reduced to {counted(len(result.nodes), 'mass', 'masses')}",
+        solved=solved,
+    )
+
+
+def _pictures(parts: Mapping[str, Any]) -> dict[str, Callable[[], Figure]]:
+    """Of what was asked for, the last first, and the shapes."""
+    captions = {
+        "stability": "Smallest logarithmic decrement over speed; below 0 a motion grows.",
+        "response": "Response of both models, and their difference.",
+        "methods": "What each method loses: errors of the frequencies, and 1 - MAC of the shapes.",
+        "placement": "All ranked choices: largest error of a frequency over the largest 1 - MAC.",
+        "": "Mode shapes of the small model over those it was made from.",
+    }
+
+    def drawn(key: str) -> Callable[[], Figure]:
+        def draw() -> Figure:
+            from rotorid.base.plot_style import new_figure
+            from rotorid.plots import plot
+
+            two = key in ("methods", "response")
+            figure = new_figure(6.2 if two else 5.0)
+            ratios = (1, 1) if key == "methods" else (3, 2)
+            axes = [*figure.subplots(2, sharex=True, height_ratios=ratios)] if two else figure.add_subplot()
+            plot(parts[key], axes)
+            return figure
+
+        return draw
+
+    return {caption: drawn(key) for key, caption in captions.items() if key in parts}
+
+
+def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
+    """Of the small model, rad/s."""
+    if options.speed is not None:
+        return one_speed(options.speed, "--speed")
+    tables = [] if rotor is None else [support.speeds[0] for support in rotor.supports if support.speeds]
+    return max(tables, default=0.0)
 
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
-    computed = ("rank", "place", "methods", "response", "stability")
+    computed = ("rank", "methods", "response", "stability")
     given = [name for name, value in vars(options).items() if value is not None and value is not False]
-    of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed", "keep_supports")
-    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "both_planes", "force")
-    ranks = options.rank or options.place is not None
+    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "state_space")
     wrong = (
-        (not has_rotor, of_rotor, "needs a rotor: give ROTOR instead of --compliance"),
+        (
+            not has_rotor,
+            (*computed, "speed", "supports_apart", "damping", "keep_supports"),
+            "needs a rotor: give ROTOR instead of --compliance",
+        ),
         (has_rotor, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both"),
-        (not ranks, ("masses", "candidates"), "does nothing without --rank or --place"),
+        (not options.rank, ("masses",), "does nothing without --rank"),
         (
             options.keep_supports,
             on_supports,
@@ -232,14 +259,18 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
             raise ValueError(f"{option_name(first)} {words}")
 
 
-def _forces(options: ReduceOptions) -> list[str | int]:
-    return [] if options.force is None else nodes(options.force, "--force")
-
-
-def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
+def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[str, Any], tuple[Path, ...]]:
     """The masses of a rotor, and what is asked for beside them."""
-    from rotorid.commands.reduce_result import ReducedRotor
-    from rotorid.reduction import check_free, held_nodes, held_rigidly, keep_supports
+    from rotorid.commands.reduce_result import small_of
+    from rotorid.reduction import (
+        check_free,
+        compare_methods,
+        compare_response,
+        compare_stability,
+        held_nodes,
+        held_rigidly,
+        keep_supports,
+    )
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
 
@@ -268,22 +299,25 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         supports_apart=options.supports_apart,
         measured=None if data is None else (data.frequencies, data.shapes),
         errors=input_errors(options.errors, data, used),
-        **how,
     )
-    tables = [support.speeds[0] for support in machine.supports if support.speeds]
-    reduced = ReducedRotor(
-        result=result,
-        placement=placement if options.rank else None,
-        damping=damping_ratios(options.damping),
-        speed=max(tables, default=0.0) if at is None else at,
-        both_planes=options.both_planes,
-        forces=[machine.node(node) for node in _forces(options)],
-        provenance=provenance(files, options),
-    )
+    parts: dict[str, Any] = {"": result}
+    if placement is not None:
+        parts["placement"] = placement
+    if options.methods:
+        parts["methods"] = compare_methods(machine, places, modes=result.modes, speed=at)
+    stable = band(options.stability, "--stability")
+    small, ratios = None, _damping_ratios(options.damping)
     if options.keep_supports:
-        model = keep_supports(whole, places, result.masses.solution, modal_damping=reduced.damping)
-        reduced = dataclasses.replace(reduced, small=model, keeps_supports=True)
-    return _beside(reduced, machine, options, at)
+        small = keep_supports(whole, places, result.masses.solution, modal_damping=ratios)
+    elif options.response is not None or stable is not None or options.model or options.state_space or ratios:
+        small = small_of(result, ratios)
+    if options.response is not None and small is not None:
+        automatic = str(options.response) == "auto"
+        speeds = None if automatic else rising_speeds(options.response, "--response")
+        parts["response"] = compare_response(machine, small, speeds)
+    if stable is not None and small is not None:
+        parts["stability"] = compare_stability(machine, small, stable[1], lowest=stable[0])
+    return parts | ({} if small is None else {"small_model": small}), files
 
 
 def _places(
@@ -293,46 +327,29 @@ def _places(
     speed: float | None,
     held: Sequence[int],
 ) -> tuple[Placement | None, list[int]]:
-    """The ranking if it is needed, and nodes of the masses: as given, by rule, or of the measured shapes."""
-    from rotorid.reduction import book_nodes, rank_nodes
+    """The ranking if it is asked for, and nodes of the masses: as given, its best, or of measured shapes."""
+    from rotorid.reduction import rank_nodes
 
-    if options.nodes is not None and options.place is not None:
-        raise ValueError("--nodes and --place are two ways to the same end: choose one")
     masses, placement = 3 if options.masses is None else options.masses, None
-    if options.rank or options.place not in (None, "book"):
-        candidates: Sequence[int | str] = [n for n in range(1, rotor.n_nodes + 1) if n not in held]
-        placement = rank_nodes(
-            rotor,
-            masses,
-            min(2, masses) if options.modes is None else options.modes,
-            candidates=candidates
-            if options.candidates is None
-            else nodes(options.candidates, "--candidates"),
-            speed=speed,
-            normalise=options.normalise,
-            rows=options.rows,
-        )
+    if options.rank:
+        modes = min(2, masses) if options.modes is None else options.modes
+        free = [node for node in range(1, rotor.n_nodes + 1) if node not in held]
+        placement = rank_nodes(rotor, masses, modes, candidates=free, speed=speed)
     if options.nodes is not None:
         return placement, [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
-    if options.place == "book":
-        return placement, list(book_nodes(rotor, masses, speed=speed))
     if placement is not None:
-        bests = {"mac": placement.best_by_mac, "best": placement.best_by_frequency}
-        which = bests.get(options.place or "", placement.compromise)
-        if which is None:
+        if placement.compromise is None:
             raise ValueError(
                 f"no choice of {counted(masses, 'node')} gives positive masses with "
                 f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
             )
-        return placement, placement.nodes[which].tolist()
+        return placement, placement.nodes[placement.compromise].tolist()
     if data is not None:
         return None, [rotor.node(node) for node in data.nodes]
-    raise ValueError(
-        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
-    )
+    raise ValueError("say where the masses stand: --nodes 7,12,18, or --rank")
 
 
-def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reduction, tuple[Path, ...]]:
+def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     """A reduction without a rotor: its compliance and its modes from tables."""
     from rotorid.reduction import reduce_measured
     from rotorid.tables.data.modes_table import read_compliance, read_modes
@@ -363,31 +380,8 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
         nodes=wanted,
         seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
         errors=input_errors(options.errors, data, used),
-        **how,
     )
     return result, (Path(options.compliance), Path(options.measured))
-
-
-def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
-    """With other methods, response and stability as asked for."""
-    from rotorid.reduction import compare_methods, compare_response, compare_stability
-
-    places = [int(node) for node in reduced.result.nodes]
-    how: dict[str, Any] = {"normalise": options.normalise, "rows": options.rows, "speed": at}
-    beside: dict[str, Any] = {}
-    if options.methods:
-        beside["methods"] = compare_methods(rotor, places, modes=reduced.result.modes, **how)
-    stable = band(options.stability, "--stability")
-    if reduced.damping or options.response is not None or stable is not None:
-        reduced = reduced.with_small()
-        assert reduced.small is not None
-        if options.response is not None:
-            automatic = str(options.response) == "auto"
-            speeds = None if automatic else rising_speeds(options.response, "--response")
-            beside["response"] = compare_response(rotor, reduced.small, speeds)
-        if stable is not None:
-            beside["stability"] = compare_stability(rotor, reduced.small, stable[1], lowest=stable[0])
-    return dataclasses.replace(reduced, **beside)
 
 
 def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:
@@ -418,7 +412,7 @@ def input_errors(
         stated["frequencies"] = data.frequency_std[:modes]
     if data is not None and data.shape_std is not None:
         stated["shapes"] = data.shape_std[:, :modes]
-    for name, value in shares(given or {}, "--errors", "compliance=1.3,shapes=1").items():
+    for name, value in numbers(given or {}, "--errors", "compliance=1.3,shapes=1", 100.0).items():
         if not 0 <= value < 1:
             raise ValueError(
                 f"--errors: {name}={100 * value:g} is no standard deviation from 0 to 100 percent"
@@ -427,12 +421,7 @@ def input_errors(
     return InputErrors(**stated) if stated else None
 
 
-def shares(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:
-    """Read "alpha12=1.3,U31=-0.3", in percent, as shares; numbers in a mapping are shares."""
-    return numbers(given, what, example, 100.0)
-
-
-def damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:
+def _damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:
     """Read "1,0.5", in percent, as damping ratios."""
     if not isinstance(given, str):
         return given or ()

@@ -21,12 +21,11 @@ from rotorid.commands.quantities import (
     nodes,
     number,
     one_of,
-    one_speed,
     rising_speeds,
     sensors,
 )
 from rotorid.report.options import file_of, rotor_source
-from rotorid.report.outcome import Outcome, command, log_rotor, phase, provenance
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import AnyArray, FloatArray
 
 STANDARD_GRAVITY = 9.80665  # m/s²
-View = Literal["bode", "polar", "orbits", "shape"]
+View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
 _KEYS = (
     *("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor"),
@@ -58,17 +57,14 @@ class ResponseOptions:
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
     view
-        What --plot draws; shape: the deflected rotor.
-    at : SPEED
-        Speed of the orbits or of the shape that are drawn, 5800rpm; default: at the largest reading.
+        What --plot draws; orbits: where the largest reading is.
     """
 
     speeds: Speeds
     sensors: str | Sequence[Sensor] | None = None
     operating: Band | None = None
     view: View = "bode"
-    at: str | float | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Output": "view at"}
+    panels: ClassVar[Mapping[str, str]] = {"Output": "view"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -213,7 +209,7 @@ class Vibration:
             columns.append(Column("phase, °", phases, "{:.1f}".format, f"phase_deg.{k}.*"))
         return Table("amplitude and phase (lead)", tuple(columns))
 
-    def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
+    def pictures(self, view: View) -> dict[str, Callable[[], Figure]]:
         """What draws amplitude and phase over speed, polar curves, or orbits."""
         from fem.plots import bode_figure, orbits_figure, polar_figure
 
@@ -225,35 +221,9 @@ class Vibration:
                 lambda: bode_figure(finer, places, self.peaks, operating=self.operating),
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
-            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
-            "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
+            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._loudest())),
         }
-        others = ("bode", "shape") if finer.steady.any() else ("bode",)
-        return dict(draw[name] for name in (view, *others))
-
-    def shape_figure(self, at: int | None) -> Figure:
-        """The deflected rotor at a speed."""
-        from fem.plots import draw_deflected_shape
-        from rotorid.base.plot_style import on_figure
-
-        shape = self._deflected(at)
-        return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
-
-    def shape(self, at: int | None) -> tuple[Table, ...]:
-        """The orbit of each node at a speed; nothing without a steady response."""
-        if not self.finer.steady.any():
-            return ()
-        from rotorid.base.rpm import phase_deg
-
-        shape = self._deflected(at)
-        columns = (
-            Column("node", shape.nodes),
-            Column("position, m", shape.rotor.positions, "{:.4f}".format),
-            Column("µm peak", 1e6 * shape.major[0], figures),
-            Column("minor axis", 1e6 * shape.minor[0], figures),
-            Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
-        )
-        return (Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns),)
+        return dict(draw[name] for name in (view, "bode"))
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
@@ -301,19 +271,13 @@ class Vibration:
             (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
         ]
 
-    def _deflected(self, at: int | None) -> Response:
-        """The response of all nodes at a speed."""
-        import fem
-
-        finer = self.finer
-        return fem.unbalance_response(finer.rotor, finer.unbalance, finer.speeds[self._speed_of(at)])
-
-    def _speed_of(self, at: int | None) -> int:
+    def _loudest(self) -> int:
+        """Which of the speeds has the largest reading."""
         steady = self.finer.steady
         if not steady.any():
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
         sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        return int((sizes * steady).argmax()) if at is None else at
+        return int((sizes * steady).argmax())
 
     def _orbits(self) -> dict[str, Any]:
         """Ellipses of the sensors' nodes, one list over speed for each sensor."""
@@ -364,7 +328,6 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
     import numpy as np
 
     import fem
-    from rotorid.commands.cross_coupling import mid_span
 
     head, _, planes = given.partition("@")
     times = number(head.partition(":")[2] or "1")
@@ -376,7 +339,7 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
     loads = dict(zip([support.node for support in rotor.supports], forces.tolist(), strict=True))
     if not planes:
         total = sum(loads[node] for node in journals)
-        return {mid_span(rotor): times * fem.api_unbalance(total, highest)}
+        return {_mid_span(rotor): times * fem.api_unbalance(total, highest)}
     mounted: dict[int, complex] = {}
     for plane in planes.split(","):
         (name,) = nodes(plane.strip().removeprefix("-"), "--unbalance")
@@ -386,6 +349,16 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
         load = loads[journals[int(np.argmin(apart))]]
         mounted[node] = sign * times * fem.api_unbalance(load, highest)
     return mounted
+
+
+def _mid_span(rotor: Rotor) -> int:
+    """The node next to the middle between the outer bearings."""
+    import numpy as np
+
+    ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"]
+    ends = ends or [rotor.positions[-1]]
+    middle = (min(ends) + max(ends)) / 2 if ends[1:] else ends[0] / 2
+    return int(np.argmin(np.abs(rotor.positions - middle))) + 1
 
 
 @command
@@ -420,7 +393,6 @@ def response(
     from fem import as_sensor
     from fem.parameters import band as error_band
     from rotorid.commands.operating_range import critical_peaks
-    from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 
     model, files = rotor_source(rotor)
@@ -439,10 +411,8 @@ def response(
         table = file_of(unbalance, "unbalance by node or station,")
         files = (*files, table)
         unbalance = read_unbalance(table, model)
-    with phase(f"response at {counted(len(speeds), 'speed')}"):
-        coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
-    with phase("peaks"):
-        finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
+    coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
+    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
 
     def amplitudes(other: Rotor) -> FloatArray:
         new = other is not model
@@ -451,7 +421,6 @@ def response(
 
     std, doubts = error_band(model, "the amplitudes", amplitudes)
     finer = dataclasses.replace(finer, warnings=(*finer.warnings, *doubts))
-    log_rotor(model, speeds=len(speeds))
     result = Vibration(
         response=dataclasses.replace(coarse, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
@@ -460,9 +429,8 @@ def response(
         peaks=peaks,
         operating=operating,
     )
-    at = None if options.at is None else _nearest(finer, options.at)
     chief, every = critical_peaks(result.labels, peaks), result.named()
-    mounted = unbalance_table(model, coarse.unbalance)
+    mounted = _mounted(model, coarse.unbalance)
     return Outcome(
         result=result,
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
@@ -471,7 +439,6 @@ def response(
             mounted,
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
-            *(result.shape(at) if options.view == "shape" else ()),
         ),
         behind=(result.readings(),),
         file=result.file(),
@@ -480,11 +447,25 @@ def response(
         notes=tuple(
             f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in every if peak.note
         ),
-        pictures=result.pictures(options.view, at),
+        pictures=result.pictures(options.view),
         title="Unbalance response",
-        rotor={"rotor": model, "planes": sorted(coarse.unbalance), "sensors": places, "meaning": "unbalance"},
         provenance=provenance(files, options, **asked),
     )
+
+
+def _mounted(rotor: Rotor, unbalance: Mapping[int, complex]) -> Table:
+    """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
+    from rotorid.base.rpm import phase_deg
+
+    each = sorted(unbalance.items())
+    names = [", ".join(name for name, at in rotor.stations.items() if at == node) for node, _ in each]
+    columns = (
+        Column("node", [f"{node} {name}".strip() for (node, _), name in zip(each, names, strict=True)]),
+        Column("position, m", [rotor.positions[node - 1] for node, _ in each], "{:.6g}".format),
+        Column("unbalance, g·mm", [1e6 * abs(u) for _, u in each], "{:.6g}".format),
+        Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in each], "{:.6g}".format),
+    )
+    return Table("what is mounted", columns)
 
 
 def _places(rotor: Rotor, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
@@ -493,15 +474,3 @@ def _places(rotor: Rotor, given: str | Sequence[Sensor] | None) -> Sequence[Sens
         return sensors(given)
     held = dict.fromkeys(support.node for support in rotor.supports)
     return [*rotor.stations] or [*held] or [*range(1, rotor.n_nodes + 1)]
-
-
-def _nearest(response: Response, at: str | float) -> int:
-    """The speed nearest to one asked for, which must lie among them."""
-    wanted = one_speed(at, "--at")
-    low, high = response.speeds[0], response.speeds[-1]
-    if not low * (1 - 1e-9) <= wanted <= high * (1 + 1e-9):
-        raise ValueError(f"--at {at}: the response was asked for from {low:.6g} to {high:.6g} rad/s only")
-    k = int(abs(response.speeds - wanted).argmin())
-    if not response.steady[k]:
-        raise ValueError(f"--at {at}: there is no steady response, so no orbit to draw; take another speed")
-    return k

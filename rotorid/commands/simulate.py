@@ -26,7 +26,7 @@ from rotorid.commands.quantities import (
     times,
 )
 from rotorid.report.options import file_of, refuse
-from rotorid.report.outcome import Outcome, command, phase, provenance
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import FloatArray
@@ -134,9 +134,8 @@ def simulate(
     if options.digits is not None and not 1 <= options.digits <= 15:
         raise ValueError(f"--digits takes a number from 1 to 15, not {options.digits}")
     files = [Path(given) for given in (model, options.input_record) if isinstance(given, Path | str)]
-    with phase("simulation"):
-        solve = _amplitudes if way in ("frequencies", "modes") else _record
-        values, told, about, notes = solve(model, options, noisy)
+    solve = _amplitudes if way in ("frequencies", "modes") else _record
+    values, told, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
     about += "" if options.digits is None else f", {counted(options.digits, 'significant digit')}"
     columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in told)

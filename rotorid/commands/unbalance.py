@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.commands.coefficients import computed
 from rotorid.commands.quantities import Nodes, nodes
-from rotorid.report.options import check_choices, job_source, refuse
-from rotorid.report.outcome import USUAL, Found, command, provenance
+from rotorid.report.options import job_source
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
-    from rotorid.base.registry import Method
     from rotorid.tables import Job
-
-
-def choices() -> dict[str, Sequence[Method[Any]]]:
-    """What `method` chooses from."""
-    from balancing import UNBALANCE_METHODS
-
-    return {"method": UNBALANCE_METHODS}
 
 
 @dataclass(frozen=True)
@@ -32,21 +24,14 @@ class UnbalanceOptions:
     ----------
     stations : LIST
         Nodes or stations where unbalance may be: 6,9,12.
-    method : METHOD
-        How the unbalance follows from the readings.
-    ridge : STRENGTH from 0
-        For ridge; default: from the errors.
     """
 
     stations: Nodes
-    method: str = "minimum-norm"
-    ridge: float | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "method ridge"}
     to: ClassVar[Sequence[str]] = USUAL
 
 
 @command
-def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
+def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Outcome:
     """Unbalance along a rotor model, from the readings of one run, without trial weights.
 
     The model counts as exact: ± are those of the readings.
@@ -66,10 +51,9 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
         For a job without a rotor, and an option that cannot be.
     """
     from balancing import unbalance_of_run
+    from rotorid.base.plot_style import on_figure
+    from rotorid.plots import plot
 
-    check_choices(options, choices())
-    if options.method != "ridge":
-        refuse(options, ("ridge",), "is an option of --method ridge")
     read = job_source(job)
     if read.rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
@@ -78,5 +62,6 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Found:
     if len(set(places.values())) < len(asked):
         raise ValueError(f"--stations {options.stations!r}: every station may stand only once")
     influence = computed(read, 0.0, places)
-    result = unbalance_of_run(influence, read.trials, method=options.method, ridge=options.ridge)
-    return Found(found=result, provenance=provenance(read.files, options))
+    result = unbalance_of_run(influence, read.trials)
+    pictures = {"Unbalance along the rotor.": lambda: on_figure(lambda ax: plot(result, ax))}
+    return outcome_of(result, provenance(read.files, options), pictures=pictures, title="Unbalance")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotorid.base.json import plain
 from rotorid.base.result import Column as Told
@@ -13,15 +13,13 @@ from rotorid.base.result import rows
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, listing
-from rotorid.commands.quantities import Names, Speeds, names, one_of, speeds
-from rotorid.report.outcome import USUAL, Outcome, command, phase, provenance
+from rotorid.commands.quantities import Names, Speeds, names, speeds
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
     from rotorid.waveforms.vectors import Vectors
 
 Phase = Literal["lead", "lag"]
-Edge = Literal["leading", "trailing", "rising", "falling", "centre"]
-Picture = Literal["tacho", "orbit", "waterfall"]
 
 
 @dataclass(frozen=True)
@@ -37,13 +35,8 @@ class VectorsOptions:
     unit : UNIT
         Of the numbers in the records, peak values: um, mm_s, g, V; where neither a channel's name nor the
         waveforms file says.
-    amplitude : UNIT
-        Of the vectors: um_pp, mm_s_rms; default: the sensors'. A displacement of an accelerometer is
-        integrated.
     pulses : N
         Of the tacho a turn; default: 1.
-    edge
-        What of a mark is angle 0; default: leading.
     rate : HZ
         Samples a second, where the records do not say.
     phase
@@ -53,26 +46,19 @@ class VectorsOptions:
     speeds : LIST
         Vectors at these (rad/s, or 900,1200rpm), where a run-up passes them first; default: one for a steady
         speed, else as many as are independent.
-    picture
-        What --plot draws of the first record.
     """
 
     tacho: str | None = None
     sensors: Names | None = None
     unit: str | None = None
-    amplitude: str | None = None
     pulses: int | None = None
-    edge: Edge | None = None
     rate: float | None = None
     phase: Phase | None = None
     orders: str | Sequence[int] | None = None
     speeds: Speeds | None = None
-    picture: Picture = "tacho"
     panels: ClassVar[Mapping[str, str]] = {
-        "Input": "tacho sensors unit amplitude phase",
-        "Tacho": "pulses edge rate",
+        "Input": "tacho sensors unit phase pulses rate",
         "Vectors": "orders speeds",
-        "Output": "picture",
     }
     to: ClassVar[Sequence[str]] = USUAL
 
@@ -102,25 +88,18 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     from rotorid.waveforms.plots import figure_of
 
     options = options or VectorsOptions()
-    if options.edge is not None:
-        one_of(options.edge, "--edge", get_args(Edge))
-    one_of(options.picture, "--picture", get_args(Picture))
     given = WaveformWishes(
         tacho=options.tacho,
         sensors=names(options.sensors),
         unit=options.unit,
-        amplitude=options.amplitude,
         pulses=options.pulses,
-        edge=options.edge,
         phase=options.phase,
-        orders=_orders(options.orders),
         rate=options.rate,
+        orders=_orders(options.orders),
         speeds=None if options.speeds is None else speeds(options.speeds),
     )
-    with phase("reading"):
-        waveforms = read_waveforms([Path(record) for record in records], given)
-    with phase("vectors"):
-        each = find_each(waveforms)
+    waveforms = read_waveforms([Path(record) for record in records], given)
+    each = find_each(waveforms)
     columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels
     orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
     many = len(each) > 1
@@ -161,8 +140,9 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         tables=(_table(columns, printed=True),),
         file=_table(columns),
         keys=dict(plain(document)),
-        pictures={"The first record.": lambda: figure_of(options.picture, waveforms.records[0], each[0])},
+        pictures={"The first record.": lambda: figure_of("tacho", waveforms.records[0], each[0])},
         warnings=tuple(words),
+        title="Vectors",
         provenance=provenance(waveforms.files, options),
     )
 

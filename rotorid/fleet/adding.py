@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.answer import Answer
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.logs import progress
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
 from rotorid.base.worker_processes import single_threads, worker_pool
-from rotorid.report.outcome import Delivered, command, provenance
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,7 +50,7 @@ class FleetAddOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FleetAdded(Delivered):
+class FleetAdded(Answered):
     """How many jobs and vectors were added, how many jobs were known; files that cannot be read, and why."""
 
     store: FleetStore
@@ -99,7 +99,7 @@ class FleetAdded(Delivered):
 @command
 def fleet_add(
     fleet: Path | str, trees: Sequence[Path | str], options: FleetAddOptions | None = None
-) -> FleetAdded:
+) -> Outcome:
     """Add the jobs of folder trees to the tables; what is known already stays as it is.
 
     Example: rotorid fleet add fans sample_data/fleet
@@ -152,14 +152,16 @@ def fleet_add(
             if damaged
             else f"{what}: there is no balancing job in it (.toml with runs, or .xlsx with a sheet runs)"
         )
-    return FleetAdded(
-        store=store,
-        jobs=len(added),
-        vectors=sum(own["vectors"][0] for own in added),
-        known=known,
-        untyped=sum(not own["machine_type"][0] for own in added),
-        damaged=damaged,
-        provenance=provenance((), options, fleet=str(fleet), trees=[str(tree) for tree in trees]),
+    return outcome_of(
+        FleetAdded(
+            store=store,
+            jobs=len(added),
+            vectors=sum(own["vectors"][0] for own in added),
+            known=known,
+            untyped=sum(not own["machine_type"][0] for own in added),
+            damaged=damaged,
+        ),
+        provenance((), options, fleet=str(fleet), trees=[str(tree) for tree in trees]),
     )
 
 

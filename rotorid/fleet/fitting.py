@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted, figures
-from rotorid.report.outcome import USUAL, Delivered, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,7 +39,7 @@ class FleetFitOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TypeFound(Delivered):
+class TypeFound(Answered):
     """Coefficients of a type, and of each odd record what would make it fit ("": not found)."""
 
     known: KnownType
@@ -140,7 +140,7 @@ def _typical(along: FloatArray, across: FloatArray) -> str:
 
 
 @command
-def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
+def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> Outcome:
     """Coefficients of a type: mean, differences between machines, odd machines.
 
     Example: rotorid fleet fit fans --type fan-132
@@ -164,8 +164,10 @@ def fleet_fit(fleet: Path | str, options: FleetFitOptions) -> TypeFound:
 
     store = FleetStore(Path(fleet))
     known = known_type(store, options.machine_type)
-    return TypeFound(
-        known=known,
-        reasons=tuple(known.kind.why_odd(odd, trials_of(store, odd.job)) for odd, _ in known.kind.odd),
-        provenance=provenance(store.files("jobs", "coefficients"), options),
+    return outcome_of(
+        TypeFound(
+            known=known,
+            reasons=tuple(known.kind.why_odd(odd, trials_of(store, odd.job)) for odd, _ in known.kind.odd),
+        ),
+        provenance(store.files("jobs", "coefficients"), options),
     )

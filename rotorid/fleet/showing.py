@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted
-from rotorid.report.outcome import Delivered, command, provenance
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ class FleetShowOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FleetShown(Delivered):
+class FleetShown(Answered):
     """Machines and jobs of a fleet.
 
     Attributes
@@ -105,7 +105,7 @@ class FleetShown(Delivered):
 
 
 @command
-def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> FleetShown:
+def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> Outcome:
     """Machines, jobs and outcomes of each type.
 
     Example: rotorid fleet show fans
@@ -140,4 +140,4 @@ def fleet_show(fleet: Path | str, options: FleetShowOptions | None = None) -> Fl
     last = outcomes[outcomes["run"] == outcomes.groupby("job")["run"].transform("last")]
     rms = (last.set_index("job")[["before", "after"]] ** 2).groupby("job").mean() ** 0.5
     jobs = jobs.assign(coefficients=own.map(coefficients).fillna(0).astype(int)).join(rms, on="job")
-    return FleetShown(jobs=jobs, provenance=provenance(store.files("jobs", "outcomes"), options))
+    return outcome_of(FleetShown(jobs=jobs), provenance(store.files("jobs", "outcomes"), options))

@@ -14,7 +14,7 @@ from rotorid.base.text import counted
 from rotorid.fleet.machine_type import MachineRecord
 from rotorid.fleet.posterior import update
 from rotorid.fleet.type_records import Grid, KnownType, known_type
-from rotorid.report.outcome import hash_of
+from rotorid.tables.reader.input_file import sha256
 
 if TYPE_CHECKING:
     from balancing import Correction
@@ -49,6 +49,10 @@ class TypeKnowledge:
     earlier: int
     probability: float
     reason: str
+
+    def files_beside(self, job: Job) -> tuple[Path, ...]:
+        """Those of a job, and those of the type."""
+        return (*job.files, *self.files)
 
     def judged(self, result: Correction) -> Correction:
         """A correction that is not to be mounted where the machine is not of its type."""
@@ -126,7 +130,7 @@ def _of_itself(store: FleetStore, job: Job, machine: str) -> list[str]:
     store.check()
     jobs, place = store.table("jobs"), "/" + job.files[0].resolve().as_posix()
     there = np.array([place.endswith(f"/{path}") for path in jobs["path"]], dtype=bool)
-    own = jobs["runs_file"].isin([hash_of(file) for file in job.files])
+    own = jobs["runs_file"].isin([sha256(file) for file in job.files])
     return jobs["job"][own | (jobs["machine"] == machine) & there].tolist()
 
 

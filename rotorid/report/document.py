@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import UserDict
-from collections.abc import Iterable
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
@@ -14,25 +12,6 @@ if TYPE_CHECKING:
 
 NOTHING = "–"
 """Printed where the document has no number (null)."""
-
-
-@dataclass(frozen=True)
-class Cells:
-    """A column of a table.
-
-    Attributes
-    ----------
-    head
-        Over it, with the unit.
-    cells
-        One a row: texts, or numbers of the document as `Document.show` prints them.
-    words
-        Whether it holds words; numbers stand at the right.
-    """
-
-    head: str
-    cells: tuple[str, ...]
-    words: bool = False
 
 
 class Document(UserDict[str, Any]):
@@ -90,39 +69,6 @@ class Document(UserDict[str, Any]):
             text += unit if unit in ("", "°") else f"\u202f{unit}"
         factor = Markup("") if scale == 1.0 else Markup(' data-scale="{}"').format(repr(scale))
         return Markup('<span data-key="{}"{}>{}</span>').format(key, factor, text.replace("-", "−"))
-
-    def column(
-        self,
-        head: str,
-        path: str,
-        digits: int = 6,
-        *,
-        rows: Iterable[int] | None = None,
-        **options: Any,  # noqa: ANN401  as for one number
-    ) -> Cells:
-        """Print one number a row.
-
-        Parameters
-        ----------
-        head
-            Over the column.
-        path
-            Such as "critical_speeds_rad_s.*": `*` is the number of the row, from 0.
-        rows
-            Which of them; None: all that the document has.
-        digits, options
-            As for one number.
-        """
-        before, _, after = path.partition("*")
-        if rows is None:
-            rows = range(len(self.found(before.rstrip("."))))
-        return Cells(head, tuple(self.show(f"{before}{row}{after}", digits, **options) for row in rows))
-
-    def listed(self, path: str, *, decimals: int) -> Markup:
-        """Print the numbers of a list, path as for a column, in one cell."""
-        from markupsafe import Markup
-
-        return Markup(", ").join(self.column("", path, decimals=decimals).cells)
 
     def value(self, key: str) -> float | None:
         """Return the number at a path; None where the document says null.

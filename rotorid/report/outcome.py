@@ -1,20 +1,16 @@
-"""What a command gives, and what it is made of: input files with their hashes, options, time."""
+"""What a command gives, and what it is made of: input files with their hashes, options, date."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import inspect
-import time
-from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from rotorid.base.answer import COLUMNS, Answer, Answered, together
-from rotorid.base.logs import workflows as log
-from rotorid.base.tables import Table, file_bytes, frame, terminal
+from rotorid.base.answer import COLUMNS, LINES, Answer, Answered
+from rotorid.base.tables import Column, Table, file_bytes, frame, terminal
 from rotorid.base.text import capital, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.report.options import changed, checked, plain
@@ -24,68 +20,20 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
     from matplotlib.figure import Figure
 
-    from fem import Rotor
     from rotorid.report.equations import Equations
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 USUAL = ("plot", "output", "table", "json")
 WITH_REPORT = ("report", *USUAL)
-EQUATIONS = ("show", "latex")
+EQUATIONS = ("show",)
 """Fields of `app.Destination` that a command has."""
+Written = bytes | Mapping[Path, bytes]
+"""A file, or several by their paths."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Delivered(Answered):
-    """What a command gives: what `Destination.deliver` takes.
-
-    Attributes
-    ----------
-    provenance
-        Program version, input files with their hashes, date, and every option that differs from its default.
-    """
-
-    provenance: Mapping[str, Any]
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-
-    @abstractmethod
-    def to_frame(self) -> pd.DataFrame:
-        """The main table."""
-
-    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
-        """What `--output` writes to a file of this name, or several files by their paths."""
-        from rotorid.tables.reader.table_writing import table_bytes
-
-        return table_bytes(path, self.to_frame())
-
-    def further_file(self, option: str, path: Path) -> bytes | Mapping[Path, bytes]:
-        """What another option that takes a file writes: `writes` of the options."""
-        raise ValueError(f"{type(self).__name__} has no file for {option}")
-
-    @property
-    def equations(self) -> Equations:
-        """What was solved, in symbols and in numbers."""
-        raise ValueError(f"{type(self).__name__} has no equations")
-
-    def figure(self) -> Figure:
-        """The main picture."""
-        raise ValueError(f"{type(self).__name__} has no picture")
-
-    def sheet(self) -> bytes:
-        """To print or to send, one HTML file."""
-        raise ValueError(f"{type(self).__name__} has no sheet")
-
-    @property
-    def document(self) -> dict[str, Any]:
-        """What `--json` prints."""
-        return {**self.to_dict(), "schema_version": SCHEMA_VERSION, "provenance": dict(self.provenance)}
-
-
-@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Outcome(Delivered):
+class Outcome(Answered):
     """Sentences and tables; terminal, JSON, files and page are made of them.
 
     Attributes
@@ -95,125 +43,157 @@ class Outcome(Delivered):
     sentences
         The decision first.
     tables, more
-        Those of the answer, and those that only `--table` and the page show.
-    file, behind
-        What `--output` writes and `to_frame` gives; numbers that only the page shows.
+        Those of the answer, and those that only `--table` and the page show; a text is a table that is
+        aligned already.
+    beyond
+        What `more` shows, in words; empty: the names of its tables.
+    behind
+        Tables that only the page shows.
+    file
+        What `--output` writes and `to_frame` gives.
+    lacking
+        Why there is no such file and no picture; empty: there are.
+    files
+        What makes other files: by the ending of their name where it is that of `--output`, else by option.
     keys
         The JSON document without its version and provenance.
     pictures
         What makes each, by its caption; the first is that of `--plot`.
-    title, rotor
-        Of the page, if there is one: its heading, and what `rotor_description.rotor_sheet` takes.
+    title, lines
+        Heading of the page, and lines of the answer at most.
     warnings, notes
         Clauses without "Warning: " and "Note: ", the worst first.
+    solved
+        What was solved, in symbols and in numbers; None: nothing that could be shown.
+    provenance
+        Program version, input files with their hashes, date, and every option that differs from its default.
     """
 
     result: Any
     sentences: tuple[str, ...]
-    tables: tuple[Table, ...]
-    file: Table
-    keys: Mapping[str, Any]
-    pictures: Mapping[str, Callable[[], Figure]]
-    title: str = ""
-    rotor: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    more: tuple[Table, ...] = ()
+    keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+    provenance: Mapping[str, Any]
+    tables: tuple[Table | str, ...] = ()
+    more: tuple[Table | str, ...] = ()
+    beyond: str = ""
     behind: tuple[Table, ...] = ()
+    file: Table | Callable[[], Table]
+    lacking: str = ""
+    files: Mapping[str, Callable[[Path], Written]] = dataclasses.field(default_factory=dict)
+    pictures: Mapping[str, Callable[[], Figure]] = dataclasses.field(default_factory=dict)
+    title: str = ""
+    lines: int = LINES
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    solved: Callable[[], Equations] | None = None
 
     @property
     def answer(self) -> Answer:
         """What a terminal shows."""
+        names = [table.name for table in self.more if isinstance(table, Table)]
         return Answer(
             "\n".join(self.sentences),
-            "\n\n".join(terminal(table, COLUMNS) for table in self.tables),
+            "\n\n".join(map(_aligned, self.tables)),
             self.warnings,
             self.notes,
-            tuple(f"{capital(table.name)}:\n{terminal(table, COLUMNS)}" for table in self.more),
-            listing([table.name for table in self.more], "and"),
+            tuple(
+                f"{capital(each.name)}:\n{_aligned(each)}" if isinstance(each, Table) else each
+                for each in self.more
+            ),
+            self.beyond or listing(names, "and"),
         )
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {**self.to_dict(), "schema_version": SCHEMA_VERSION, "provenance": dict(self.provenance)}
+
+    def summary(self) -> str:
+        """For a terminal, a few lines of at most 100 columns."""
+        return self.answer.brief(self.lines)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
-        return dict(self.keys)
+        return dict(self.keys() if callable(self.keys) else self.keys)
+
+    def table(self) -> Table:
+        """The main table; ValueError where it is lacking."""
+        if self.lacking:
+            raise ValueError(self.lacking)
+        return self.file if isinstance(self.file, Table) else self.file()
 
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
-        return frame(self.file)
+        return frame(self.table())
 
-    def table_file(self, path: Path) -> bytes:
-        """What `--output` writes to a file of this name."""
-        return file_bytes(path, self.file)
+    def written(self, path: Path, option: str = "") -> Written:
+        """What `--output`, or another option, writes to a file of this name."""
+        build = self.files.get(option or path.suffix.lower())
+        return file_bytes(path, self.table()) if build is None else build(path)
 
     def figure(self) -> Figure:
-        """The picture."""
+        """The main picture; ValueError where there is none."""
+        if not self.pictures:
+            raise ValueError(self.lacking or "there is no picture of this")
         return next(iter(self.pictures.values()))()
-
-    def sheet(self) -> bytes:
-        """To print or to send, one HTML file."""
-        from rotorid.report.rotor import rotor_page
-
-        return rotor_page(
-            self.keys,
-            self.provenance,
-            title=self.title,
-            sentences=self.sentences,
-            notes=self.notes,
-            tables=(self.tables, (*self.more, *self.behind)),
-            pictures=self.pictures,
-            rotor=self.rotor,
-        )
-
-
-@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Parts(Delivered):
-    """Results of the library beside each other."""
-
-    @property
-    @abstractmethod
-    def parts(self) -> Mapping[str, Any]:
-        """Results by their keys in the document, where "" is its top; None: not asked for."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
-        return {**known.pop("", {}), **known}
 
     @property
     def equations(self) -> Equations:
-        """Those of the first."""
-        from rotorid.report.equations_of_results import equations_of
+        """What was solved, in symbols and in numbers; ValueError where nothing can be shown."""
+        if self.solved is None:
+            raise ValueError("--show equations: there is nothing here that was solved")
+        return self.solved()
 
-        return equations_of(next(iter(self.parts.values())))
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        from rotorid.report.page import block, drawn, render_report
 
-    @property
-    def answer(self) -> Answer:
-        """Those of the parts, one after the other."""
-        return together(part.answer for part in self.parts.values() if part is not None)
+        if self.lacking and not self.pictures:
+            raise ValueError(self.lacking)
+        return render_report(
+            "outcome.html",
+            self.to_dict(),
+            title=self.title,
+            warnings=[*self.warnings, *self.notes],
+            provenance=self.provenance,
+            sentences=self.sentences,
+            tables=list(map(block, self.tables)),
+            pictures=[(drawn(draw, caption), caption) for caption, draw in self.pictures.items()],
+            more=list(map(block, (*self.more, *self.behind))),
+        )
 
-    def to_frame(self) -> pd.DataFrame:
-        """The table of the first."""
-        frame: pd.DataFrame = next(iter(self.parts.values())).to_frame()
-        return frame
+
+def _aligned(table: Table | str) -> str:
+    return terminal(table, COLUMNS) if isinstance(table, Table) else table
 
 
-@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Found(Parts):
-    """One result of the library as it is."""
+def outcome_of(
+    result: Any,  # noqa: ANN401 - any result that tells its answer
+    provenance: Mapping[str, Any],
+    *,
+    answer: Answer | None = None,
+    **more: Any,  # noqa: ANN401 - fields of an outcome
+) -> Outcome:
+    """The outcome of a result that has `answer`, `to_dict`, `to_frame`, and perhaps `figure`."""
+    told = answer or result.answer
+    draw = getattr(result, "figure", None)
+    given: dict[str, Any] = {
+        "sentences": tuple(told.judgement.splitlines()),
+        "tables": tuple(filter(None, [told.found])),
+        "more": told.tables,
+        "beyond": told.more,
+        "warnings": told.warnings,
+        "notes": told.notes,
+        "file": lambda: table_of(result.to_frame()),
+        "pictures": {} if draw is None else {"": draw},
+        "keys": getattr(result, "to_dict", None),
+    }
+    return Outcome(result=result, provenance=provenance, **given | more)
 
-    found: Any
 
-    @property
-    def parts(self) -> Mapping[str, Any]:
-        """That one."""
-        return {"": self.found}
-
-    def figure(self) -> Figure:
-        """Its picture."""
-        from rotorid.base.plot_style import on_figure
-        from rotorid.plots import plot
-
-        return on_figure(lambda ax: plot(self.found, ax))
+def table_of(data: pd.DataFrame, name: str = "result") -> Table:
+    """A DataFrame as a table."""
+    return Table(name, tuple(Column(str(each), list(data[each])) for each in data))
 
 
 def options_of(function: Callable[..., Any]) -> type[DataclassInstance]:
@@ -257,46 +237,12 @@ def provenance(
         For a file that cannot be read.
     """
     from rotorid import __version__
+    from rotorid.tables.reader.input_file import sha256
 
     return {
         "program": "rotorid",
         "version": __version__,
         "date": now().isoformat(timespec="seconds"),
-        "inputs": [{"file": str(f), "sha256": hash_of(f)} for f in files],
+        "inputs": [{"file": str(f), "sha256": sha256(f)} for f in files],
         "options": {key: plain(value) for key, value in (given | changed(options)).items()},
     }
-
-
-def hash_of(file: Path) -> str:
-    """SHA-256 of a file."""
-    from rotorid.tables.reader.input_file import sha256
-
-    return sha256(file)
-
-
-def text_of(file: object) -> str:
-    """Text of a file that was read; nothing, where what was given is none."""
-    from rotorid.tables.reader.input_file import file_content
-
-    return file_content(Path(file)).decode("utf-8-sig", "replace") if isinstance(file, Path | str) else ""
-
-
-@contextmanager
-def phase(what: str) -> Iterator[None]:
-    """Log how long a part of the work takes."""
-    begun = time.perf_counter()
-    yield
-    log.info("time: %s %.3f s", what, time.perf_counter() - begun)
-
-
-def log_rotor(rotor: Rotor, **more: object) -> None:
-    """Log how large the model of a rotor is, and more numbers."""
-    stride = 4 if rotor.model.shear else 2
-    sizes: dict[str, object] = {
-        "elements": rotor.n_elements,
-        "unknowns_per_plane": 2 * rotor.n_nodes + (stride - 2) * rotor.n_elements,
-        "discs": len(rotor.discs),
-        "supports": len(rotor.supports),
-    }
-    for name, value in (sizes | more).items():
-        log.info("%s = %s", name, f"{value:.6g}" if isinstance(value, float) else value)

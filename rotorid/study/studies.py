@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.report.options import file_of
-from rotorid.report.outcome import USUAL, command, hash_of, phase, provenance
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 from rotorid.study.study_result import StudiedMachines, StudiedStarts
 
 if TYPE_CHECKING:
@@ -53,9 +53,7 @@ class StudyOptions:
 
 
 @command
-def study(
-    file: Path | str, options: StudyOptions | None = None, executor: Executor | None = None
-) -> StudiedMachines | StudiedStarts:
+def study(file: Path | str, options: StudyOptions | None = None, executor: Executor | None = None) -> Outcome:
     """Chance that a machine meets its limit, as built and balanced, by simulation.
 
     A study that was broken off is continued by the same command with --results; the samples do not
@@ -83,6 +81,7 @@ def study(
     except ImportError as error:
         raise ValueError("a study needs pyarrow: pip install pyarrow") from error
     from rotorid.study.chunks import read_parts, run_study
+    from rotorid.tables.reader.input_file import sha256
     from rotorid.tables.study_file import read_study
 
     options = options or StudyOptions()
@@ -97,18 +96,20 @@ def study(
     kept = {"schema_version": SCHEMA_VERSION, "version": told["version"], "seed": seed}
     with tempfile.TemporaryDirectory() as own:
         folder = Path(options.results or own)
-        with _claimed(folder, {**kept, "inputs": [*map(hash_of, files)]}), phase("samples"):
+        with _claimed(folder, {**kept, "inputs": [*map(sha256, files)]}):
             run_study(task, samples, folder, options.workers, executor)
         parts = read_parts(task, samples, folder)
-        common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words, "provenance": told}
+        common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words}
         if read.machine is not None:
             from rotorid.study.machine_counts import count_machines
 
             planes, most = len(read.machine.planes), read.machine.corrections
-            return StudiedMachines(**common, **count_machines(parts, planes, most))
+            machines = StudiedMachines(**common, **count_machines(parts, planes, most))
+            return outcome_of(machines, told, title="Study of machines")
         from rotorid.study.calibration_starts import count_minima
 
-        return StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
+        starts = StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
+        return outcome_of(starts, told, title="Study of starts")
 
 
 def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], tuple[str, ...]]:

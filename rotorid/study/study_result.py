@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, figures
-from rotorid.report.outcome import Delivered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +26,7 @@ def interval(k: int, n: int) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StudiedMachines(Delivered):
+class StudiedMachines(Answered):
     """What became of all drawn machines.
 
     Attributes
@@ -115,7 +114,7 @@ class StudiedMachines(Delivered):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StudiedStarts(Delivered):
+class StudiedStarts(Answered):
     """Minima by their χ² (m,), how many starts end there, and the numbers (m, n) by their names.
 
     Attributes

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.commands.balance import Balance
-    from rotorid.report.outcome import Delivered
+    from rotorid.report.outcome import Outcome
     from rotorid.tables import Job
 
 KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
@@ -100,7 +100,7 @@ def _without_check(path: Path) -> Job:
     return job_of(path, written.top(problems), written.tables, Overrides(), problems)
 
 
-def told(outcome: Delivered) -> dict[str, Any]:
+def told(outcome: Outcome) -> dict[str, Any]:
     """The document of `--json`, and what a person reads."""
     answer = outcome.answer
     words = {"judgement": answer.judgement, "found": answer.found}

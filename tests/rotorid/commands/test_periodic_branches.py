@@ -85,10 +85,8 @@ def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
 def test_on_linear_supports_it_is_the_response():
     """The compressor on its table of bearings; the rotor is reduced here, which costs a thousandth."""
     folder = sample_data() / "compressor"
-    given = PeriodicOptions(
-        speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30", modes=40
-    )
-    found = periodic(folder / "rotor.toml", given).readings
+    given = PeriodicOptions(speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30")
+    found = periodic(folder / "rotor.toml", given).result.readings
     (branch,) = found.motion.branches
     speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
     options = ResponseOptions(speeds=speeds, sensors="2,12:30")
@@ -106,12 +104,6 @@ def test_no_bifurcation_says_what_was_tried(cli, tmp_path):
     tried = cli("periodic", tmp_path / "damper.toml", "--speeds", "590:600", "--json").json["tried"]
     assert all(speed in tried for speed in ("5634.08", "5681.83", "5729.58"))
     assert tried in " ".join(found.out.split())
-
-
-def test_a_limit_of_time_that_is_none(cli):
-    told = cli("periodic", ROTOR, *RANGE, "--max-seconds", "0")
-    assert told.code == 2
-    assert "max-seconds" in told.err
 
 
 @pytest.mark.parametrize("speeds", ["590:600", "600:600"])

@@ -1,1 +1,0 @@
-"""Commands whose modules others are rewriting."""
