@@ -31,6 +31,8 @@ from dataclasses import dataclass
 from rotorid.base.text import capital, counted, cut
 
 LINES, COLUMNS = 12, 100
+TALLEST = 14
+"""Lines of the first block that are shown whatever the room is."""
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 """What differs between two remarks of a kind: names and numbers."""
 _QUANTITY = re.compile(r"(only |at most )?([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?= ?%| (?!rpm|Hz|rad/s)[^\W\d])")
@@ -152,13 +154,13 @@ def _wrapped(lines: Iterable[str]) -> list[str]:
 def _first(lines: list[str], room: int) -> tuple[list[str], str]:
     """As many lines as there is room for, and words for the others.
 
-    A block that does not fit is left out whole, the first stands whole: half a table of weights looks like
-    all of them.
+    A block that does not fit is left out whole, the first stands whole if that can be: half a table of
+    weights looks like all of them.
     """
     if len(lines) <= room:
         return lines, ""
     ends = [k for k, line in enumerate(lines) if not line] or [len(lines)]
-    shown = lines[: max([ends[0], *(end for end in ends if end <= room)])]
+    shown = lines[: max([min(ends[0], max(room, TALLEST)), *(end for end in ends if end <= room)])]
     return shown, counted(hidden, "more line") if (hidden := sum(map(bool, lines[len(shown) :]))) else ""
 
 

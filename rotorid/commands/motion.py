@@ -75,6 +75,8 @@ class MotionOptions:
         Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
         together; default: as many as its natural frequencies up to twice the highest speed need to agree
         to 0.03 %; small models keep all.
+    rate : N
+        Samples a second; default: 64 a turn at the highest speed.
     view
         What --plot draws: x and y over time with the spectrum, orbits, or a run-up over speed.
     """
@@ -87,10 +89,11 @@ class MotionOptions:
     displaced: str | Mapping[str, complex] | None = None
     sensors: Nodes | None = None
     modes: int | None = None
+    rate: float | None = None
     view: View = "motion"
     panels: ClassVar[Mapping[str, str]] = {
         "Start": "start displaced",
-        "Method": "modes",
+        "Method": "modes rate",
         "Output": "view",
     }
     to: ClassVar[tuple[str, ...]] = USUAL
@@ -336,7 +339,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
         reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
         system = reduced.system
     q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
-    move = partial(run, system, ends, time, (q, v), nodes=shown)
+    move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
     found = move(tolerance=_TOLERANCE)
     rough = move(tolerance=_LOOSER * _TOLERANCE)
     if found.stopped:
@@ -420,7 +423,7 @@ def _loaded(system: MotionSystem) -> list[int]:
 def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
     if not found.resolved:
-        said.append("too few samples a turn: what the shaft does between them is not told")
+        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
     if error > _UNSURE:
         said.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "

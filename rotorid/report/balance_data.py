@@ -43,7 +43,7 @@ def sheet_data(result: Correction, job: Job, mounted: Mounted | None = None) -> 
 
 
 def _machine(c: Correction, job: Job) -> dict[str, Any]:
-    labels, limits = c.labels, c.limits_document() or {"max_weight": {}, "forbidden_deg": {}}
+    limits = c.limits_document() or {"max_weight": {}, "forbidden_deg": {}}
     planes = []
     for plane in c.planes:
         holes = job.holes.get(plane)
@@ -59,17 +59,7 @@ def _machine(c: Correction, job: Job) -> dict[str, Any]:
                 "node": job.plane_nodes.get(plane),
             }
         )
-    unit = units.SPEED[labels.speed_unit]
-    return {
-        "planes": planes,
-        "sensors": [
-            {"sensor": s, "node": None if (at := job.sensor_places.get(s)) is None else at.node}
-            for s in c.sensors
-        ],
-        "speeds_rpm": [rpm(w) for w in c.speeds],
-        "speed_unit": labels.speed_unit,
-        "speeds": [float(f"{w * unit.scale:.12g}") for w in c.speeds],
-    }
+    return {"planes": planes}
 
 
 def _runs(trials: Trials) -> list[dict[str, Any]]:

@@ -15,10 +15,7 @@ NOTHING = "–"
 
 
 class Document(UserDict[str, Any]):
-    """What `--json` prints, as JSON types, and its numbers as a sheet shows them.
-
-    A number that is not printed in the document's unit carries the factor as `data-scale`.
-    """
+    """What `--json` prints, as JSON types, and its numbers as a sheet shows them."""
 
     def show(
         self,
@@ -28,8 +25,6 @@ class Document(UserDict[str, Any]):
         decimals: int | None = None,
         unit: str = "",
         trim: bool = False,
-        scale: float = 1.0,
-        sign: bool = False,
     ) -> Markup:
         """Print the number at a path as `<span data-key="path">number</span>`.
 
@@ -45,10 +40,6 @@ class Document(UserDict[str, Any]):
             Printed behind the number (inside the element, after a narrow space; "°" without one).
         trim
             Whether zeros at the end are left out: 3.36 with five digits, not 3.3600.
-        scale
-            What one unit of the document is in the unit printed.
-        sign
-            Whether a + stands before numbers above zero.
 
         Raises
         ------
@@ -61,14 +52,11 @@ class Document(UserDict[str, Any]):
         if value is None:
             text = NOTHING
         else:
-            value *= scale
             text = significant(value, digits) if decimals is None else fixed(value, decimals, unit == "°")
             if trim and "." in text and "e" not in text:
                 text = text.rstrip("0").rstrip(".")
-            text = f"+{text}" if sign and value > 0 and float(text) else text
             text += unit if unit in ("", "°") else f"\u202f{unit}"
-        factor = Markup("") if scale == 1.0 else Markup(' data-scale="{}"').format(repr(scale))
-        return Markup('<span data-key="{}"{}>{}</span>').format(key, factor, text.replace("-", "−"))
+        return Markup('<span data-key="{}">{}</span>').format(key, text.replace("-", "−"))
 
     def value(self, key: str) -> float | None:
         """Return the number at a path; None where the document says null.

@@ -250,7 +250,7 @@ fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
 fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
-fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
+fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
 fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
 fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
@@ -451,7 +451,7 @@ def _all() -> list[Case]:
         Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
         Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", before=(added,)),
     ]
-    cases += [Case("demo", "demo d", "demos")]
+    cases += [Case("demo", "demo d", "demos"), Case("demo-json", "demo d --json", "demos")]
     cases += [Case(f"help-{name.replace(' ', '-')}", f"{name} --help", "usage") for name in COMMANDS]
     cases += [
         Case("help", "--help", "usage"),
