@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast, get
 
 import typer
 
-from rotorid.base.answer import kinds
+from rotorid.base.answer import LINES, kinds
 from rotorid.commands.progress import busy
 from rotorid.report.options import option_name
 from rotorid.report.outcome import WITH_REPORT, Outcome, options_of
@@ -123,7 +123,11 @@ class Destination:
             return
         written = [f"written: {printable(str(path))}" for path in built]
         answer = equations.answer(made.answer) if equations else made.answer
-        text = answer.whole() if self.table else answer.brief(made.lines - len(written))
+        text = (
+            answer.whole()
+            if self.table
+            else answer.brief((2 * LINES if equations else made.lines) - len(written))
+        )
         typer.echo("\n".join([text, *written]))
 
 
